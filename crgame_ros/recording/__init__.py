@@ -1,0 +1,3 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""MCAP recordings: writing, reading, recovery and conversion to CommonRoad."""

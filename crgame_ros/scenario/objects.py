@@ -1,0 +1,64 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What can appear in a run, and where it is at a scenario time step."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.shape import Shape
+
+
+class Role(Enum):
+    """Who moves an object."""
+
+    HUMAN = 'human'
+    AUTONOMOUS = 'autonomous'
+    RECORDED = 'recorded'
+    STATIC = 'static'
+    TRAFFIC = 'traffic'
+
+    @property
+    def is_ego(self) -> bool:
+        """Tell whether the object is a driven vehicle (a human's or an AV)."""
+        return self in (Role.HUMAN, Role.AUTONOMOUS)
+
+
+@dataclass(frozen=True)
+class ObjectDescription:
+    """
+    One object that may appear; a row of `/scenario/objects`.
+
+    :param id: name used in joint names: hv0, av0, o<obstacle id> for scenario obstacles.
+    :param type: CommonRoad obstacle type in its XML spelling (car, pedestrian, parkedVehicle…).
+    :param role: who moves it.
+    :param shape: footprint around its centre.
+    :param rear_to_center: distance from the reference point forward to the centre [m]; the
+        reference point is the rear axle of driven vehicles and the centre (0 m) of all others.
+    """
+
+    id: str
+    type: str
+    role: Role
+    shape: Shape
+    rear_to_center: float = 0.0
+
+    @property
+    def reference_point(self) -> str:
+        """Name the reference point of the object's poses: rear_axle or center."""
+        return 'rear_axle' if self.role.is_ego else 'center'
+
+
+@dataclass(frozen=True)
+class ObjectStates:
+    """
+    Where M objects that are not driven vehicles are at one scenario time step.
+
+    :param poses: (M, 3) centre x [m], y [m], yaw [rad] in frame map; NaN where absent.
+    :param velocities: (M, 3) derivatives of the poses [m/s, m/s, rad/s]; NaN where absent.
+    """
+
+    poses: NDArray[np.float64]
+    velocities: NDArray[np.float64]

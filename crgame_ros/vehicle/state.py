@@ -1,0 +1,57 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The state of a driven vehicle: rear axle, frame map, SI units and radians."""
+
+from enum import IntEnum
+import math
+from typing import NamedTuple
+
+
+class VehicleState(NamedTuple):
+    """
+    State of a human's or autonomous vehicle at one time (CRG equations 3 and 5).
+
+    :param x: rear-axle position, east [m]
+    :param y: rear-axle position, north [m]
+    :param yaw: heading, counter-clockwise from east [rad]
+    :param speed: signed speed along the heading, negative in reverse [m/s]
+    :param steering_angle: front-wheel steering angle, positive to the left [rad]
+    :param acceleration: signed longitudinal acceleration [m/s^2]
+    :param yaw_rate: [rad/s]
+    :param steering_rate: rate of the front-wheel steering angle [rad/s]
+    """
+
+    x: float
+    y: float
+    yaw: float
+    speed: float
+    steering_angle: float = 0.0
+    acceleration: float = 0.0
+    yaw_rate: float = 0.0
+    steering_rate: float = 0.0
+
+    def center(self, rear_to_center: float) -> tuple[float, float]:
+        """
+        Give the position of the vehicle's centre.
+
+        :param rear_to_center: distance l_r from the rear axle forward to the centre [m]
+        :return: (x, y) of the centre in the same frame [m]
+        """
+        return (self.x + rear_to_center * math.cos(self.yaw),
+                self.y + rear_to_center * math.sin(self.yaw))
+
+
+class StateColumn(IntEnum):
+    """Columns of an array of vehicle states; the order of `VehicleState`."""
+
+    X = 0
+    Y = 1
+    YAW = 2
+    SPEED = 3
+    STEERING_ANGLE = 4
+    ACCELERATION = 5
+    YAW_RATE = 6
+    STEERING_RATE = 7
+
+
+STATE_WIDTH = len(StateColumn)
