@@ -9,9 +9,14 @@ axle, any other object x, y and yaw of its centre; absence is NaN (`msg_defs/int
 """
 
 from dataclasses import dataclass
+import math
 
 import numpy as np
 from numpy.typing import NDArray
+
+from crgame_ros.errors import InputError
+from crgame_ros.planner.interface import Plan
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
 
 VEHICLE_JOINTS = ('x', 'y', 'yaw', 'steering')
 OBJECT_JOINTS = ('x', 'y', 'yaw')
@@ -46,3 +51,88 @@ def vehicle_joint_names(vehicle_id: str) -> tuple[str, ...]:
 def object_joint_names(object_id: str) -> tuple[str, ...]:
     """Name the joints of an object that is no driven vehicle."""
     return tuple(f'{object_id}/{joint}' for joint in OBJECT_JOINTS)
+
+
+def vehicle_to_joints(
+    state: VehicleState,
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    """
+    Give a vehicle's joint positions, velocities and accelerations (4 each).
+
+    The angular accelerations are no part of the model and stay NaN.
+    """
+    cos, sin = math.cos(state.yaw), math.sin(state.yaw)
+    return (
+        (state.x, state.y, state.yaw, state.steering_angle),
+        (state.speed * cos, state.speed * sin, state.yaw_rate, state.steering_rate),
+        (state.acceleration * cos - state.speed * state.yaw_rate * sin,
+         state.acceleration * sin + state.speed * state.yaw_rate * cos, math.nan, math.nan))
+
+
+def vehicles_from_joints(
+    positions: NDArray[np.float64], velocities: NDArray[np.float64],
+    accelerations: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """
+    Give vehicle states from joints; the inverse of `vehicle_to_joints` up to rounding.
+
+    :param positions: (..., 4) x, y, yaw, steering
+    :param velocities: (..., 4)
+    :param accelerations: (..., 4); only x and y are used
+    :return: (..., 8) states, columns as in `StateColumn`
+    """
+    states = np.empty((*positions.shape[:-1], STATE_WIDTH))
+    cos, sin = np.cos(positions[..., 2]), np.sin(positions[..., 2])
+    states[..., StateColumn.X:StateColumn.YAW + 1] = positions[..., :3]
+    states[..., StateColumn.SPEED] = velocities[..., 0] * cos + velocities[..., 1] * sin
+    states[..., StateColumn.STEERING_ANGLE] = positions[..., 3]
+    states[..., StateColumn.ACCELERATION] = accelerations[..., 0] * cos + accelerations[..., 1] * sin
+    states[..., StateColumn.YAW_RATE] = velocities[..., 2]
+    states[..., StateColumn.STEERING_RATE] = velocities[..., 3]
+    return states
+
+
+def plan_to_joints(plan: Plan, vehicle_id: str, time_step_ns: int) -> JointSeries:
+    """
+    Give a plan as joints.
+
+    :param vehicle_id: the AV it is for.
+    :param time_step_ns: Delta t_c [ns]
+    """
+    states = plan.states
+    cos, sin = np.cos(states[:, StateColumn.YAW]), np.sin(states[:, StateColumn.YAW])
+    speed, yaw_rate = states[:, StateColumn.SPEED], states[:, StateColumn.YAW_RATE]
+    acceleration = states[:, StateColumn.ACCELERATION]
+    nowhere = np.full(len(states), np.nan)
+    positions = states[:, (StateColumn.X, StateColumn.Y, StateColumn.YAW,
+                           StateColumn.STEERING_ANGLE)]
+    velocities = np.stack((speed * cos, speed * sin, yaw_rate,
+                           states[:, StateColumn.STEERING_RATE]), axis=1)
+    accelerations = np.stack((acceleration * cos - speed * yaw_rate * sin,
+                              acceleration * sin + speed * yaw_rate * cos, nowhere, nowhere),
+                             axis=1)
+    times_ns = np.arange(len(states), dtype=np.int64) * time_step_ns
+    return JointSeries(plan.stamp_ns, vehicle_joint_names(vehicle_id), times_ns,
+                       positions, velocities, accelerations)
+
+
+def plan_from_joints(series: JointSeries, vehicle_id: str, time_step_ns: int) -> Plan:
+    """
+    Read a plan from joints, whoever sent them.
+
+    :param vehicle_id: the AV that the plan must be for.
+    :param time_step_ns: Delta t_c [ns], the grid that the points must be on.
+    :raises InputError: naming what is wrong: joints, empty, lengths, grid.
+    """
+    where = f'/{vehicle_id}/plan'
+    if series.names != vehicle_joint_names(vehicle_id):
+        raise InputError('joint_names are ' + ', '.join(series.names)[:200], where,
+                         'name ' + ', '.join(vehicle_joint_names(vehicle_id)))
+    if not len(series.times_ns):
+        raise InputError('has no points', where)
+    grid = np.arange(len(series.times_ns), dtype=np.int64) * time_step_ns
+    if np.abs(series.times_ns - grid).max() > time_step_ns // 100:
+        raise InputError('time_from_start is off the grid', where,
+                         f'space the points {time_step_ns / 1e9:g} s apart, the first at 0')
+    states = vehicles_from_joints(series.positions, series.velocities, series.accelerations)
+    return Plan(series.stamp_ns, states)

@@ -1,0 +1,357 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is missing on this machine, and the remedy for each: the checks of `crgame doctor`."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+import json
+import os
+from pathlib import Path
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from typing import Literal
+
+from crgame_ros.paths import share_directory
+from crgame_ros.ros.environment import (
+    free_domain_id,
+    listening_beyond_loopback,
+    loopback_profile,
+    network_is_open,
+    prepare_environment,
+    PROFILE_VARIABLES,
+    ros_wheels_prefix,
+)
+
+Status = Literal['ok', 'warn', 'fail']
+
+BUILD_GROUP = 'Build and test'
+MODULES = (
+    'numpy', 'scipy', 'shapely', 'matplotlib', 'lxml.etree', 'yaml', 'evdev', 'rclpy',
+    'sensor_msgs.msg', 'nav_msgs.msg', 'trajectory_msgs.msg', 'diagnostic_msgs.msg',
+    'visualization_msgs.msg', 'rosgraph_msgs.msg', 'std_srvs.srv', 'commonroad.scenario.scenario',
+    'commonroad_clcs.clcs', 'commonroad_dc.pycrcc', 'commonroad_dc.boundary.boundary',
+    'commonroad_idm_planner.idm_planner', 'commonroad_rp.reactive_planner', 'mcap.writer',
+    'mcap_ros2.decoder', 'rosbags.highlevel',
+)
+PROBE_TIMEOUT_S = 60.0
+PROBE_TOPIC = 'crgame_doctor'
+PROBE_MESSAGES = 20
+DISCOVERY_TIMEOUT_S = 15.0
+JITTER_SLEEPS = 200
+JITTER_PERIOD_NS = 5_000_000
+# Above this the host, not the program, decides the timing: a twentieth of a 10 ms cycle.
+JITTER_P99_LIMIT_MS = 0.5
+DISK_WARN_GB = 5.0
+DISK_FAIL_GB = 0.2
+
+
+@dataclass(frozen=True)
+class Check:
+    """
+    One line of the report.
+
+    :param detail: what was found.
+    :param remedy: what to do about it; empty where nothing is to be done.
+    """
+
+    name: str
+    status: Status
+    detail: str
+    remedy: str = ''
+
+
+def run_checks(runs: Path | None = None) -> list[Check]:
+    """
+    Check everything; takes some seconds.
+
+    :param runs: the directory that recordings go to, `runs` where None.
+    :return: the checks in the order of the report.
+    """
+    prepare_environment()
+    checks = [check_python()]
+    checks += check_packages(share_directory() / 'requirements.txt')
+    checks += [check_imports(), check_ros(), check_profile(), check_devices(), check_priority()]
+    checks += check_discovery()
+    checks += [check_disk(runs or Path('runs')), check_processors(), check_clock()]
+    return checks
+
+
+def format_checks(checks: list[Check]) -> str:
+    """Lay the checks out as text, each remedy under its check."""
+    lines = []
+    width = max((len(check.name) for check in checks), default=0)
+    for check in checks:
+        lines.append(f'{check.status:<4}  {check.name:<{width}}  {check.detail}')
+        if check.remedy:
+            lines.append(f'{"":<4}  {"":<{width}}  -> {check.remedy}')
+    failed = sum(check.status == 'fail' for check in checks)
+    warned = sum(check.status == 'warn' for check in checks)
+    lines.append(f'{len(checks)} checks: {failed} failed, {warned} warnings')
+    return '\n'.join(lines)
+
+
+def main() -> int:
+    """Print the report; return 1 if a check failed, else 0."""
+    checks = run_checks()
+    print(format_checks(checks))
+    return 1 if any(check.status == 'fail' for check in checks) else 0
+
+
+def check_python() -> Check:
+    """Check the interpreter: the packages exist for 3.11 and 3.12."""
+    found = '.'.join(map(str, sys.version_info[:3]))
+    if sys.version_info[:2] in ((3, 11), (3, 12)):
+        return Check('Python', 'ok', f'{found} ({sys.executable})')
+    return Check('Python', 'fail', f'{found} ({sys.executable})',
+                 'use Python 3.11 or 3.12: PYTHON=python3.12 ./run.sh')
+
+
+def read_pins(requirements: Path) -> Iterator[tuple[str, str, str]]:
+    """
+    Read the pinned packages.
+
+    :return: for each its group (the comment above it), name and version.
+    """
+    group = ''
+    for line in requirements.read_text(encoding='utf-8').splitlines():
+        name, pinned, wanted = line.strip().partition('==')
+        if line.startswith('# '):
+            group = line[2:]
+        elif pinned:
+            yield group, name, wanted
+
+
+def check_packages(requirements: Path) -> list[Check]:
+    """Compare the installed packages with the pins; one check for each that differs."""
+    checks = []
+    right = 0
+    for group, name, wanted in read_pins(requirements):
+        if name.startswith('ros-') and ros_wheels_prefix() is None:
+            continue
+        try:
+            found = version(name)
+        except PackageNotFoundError:
+            status: Status = 'warn' if group == BUILD_GROUP else 'fail'
+            checks.append(Check(name, status, f'not installed, {wanted} wanted',
+                                f'pip install --no-deps {name}=={wanted}'))
+            continue
+        if found == wanted:
+            right += 1
+        else:
+            checks.append(Check(name, 'warn', f'{found} instead of {wanted}, which was tried',
+                                f'pip install --no-deps {name}=={wanted}'))
+    return [Check('packages', 'ok', f'{right} as pinned, {len(checks)} not'), *checks]
+
+
+def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
+    """Import what the programs import, in a process of its own."""
+    code = ('import importlib, json, sys\n'
+            'errors = {}\n'
+            'for name in sys.argv[1:]:\n'
+            '    try:\n'
+            '        importlib.import_module(name)\n'
+            '    except Exception as error:\n'
+            '        errors[name] = str(error)\n'
+            'print(json.dumps(errors))\n')
+    done = _run([sys.executable, '-c', code, *modules])
+    if done.returncode != 0:
+        return Check('imports', 'fail', _last_line(done.stderr), 'remove .venv and start again')
+    errors = json.loads(done.stdout.splitlines()[-1])
+    if not errors:
+        return Check('imports', 'ok', f'{len(modules)} modules import')
+    detail = '; '.join(f'{name}: {error}' for name, error in errors.items())
+    remedy = 'remove .venv and start again'
+    if 'Polygon' in detail:
+        remedy = 'apt install gcc python3-dev, then pip install --no-deps polygon3'
+    return Check('imports', 'fail', detail, remedy)
+
+
+def check_ros() -> Check:
+    """Check where ROS comes from and which middleware it takes."""
+    middleware = os.environ.get('RMW_IMPLEMENTATION') or 'the default middleware'
+    if ros_wheels_prefix() is not None:
+        return Check('ROS 2', 'ok', f'Jazzy from wheels, {middleware}')
+    distribution = os.environ.get('ROS_DISTRO')
+    if distribution == 'jazzy':
+        return Check('ROS 2', 'ok', f'Jazzy sourced, {middleware}')
+    return Check('ROS 2', 'fail', f'{distribution or "none"} sourced and no wheels',
+                 'source /opt/ros/jazzy/setup.bash or start through ./run.sh')
+
+
+def check_profile() -> Check:
+    """Check that the loopback profile is in force."""
+    if network_is_open():
+        return Check('network', 'warn', 'open: ROS traffic may leave this machine',
+                     'unset CRGAME_OPEN_NETWORK to keep it here')
+    middleware = os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp')
+    if 'fastrtps' not in middleware:
+        return Check('network', 'warn', f'{middleware} does not read the loopback profile',
+                     'export RMW_IMPLEMENTATION=rmw_fastrtps_cpp')
+    profiles = {os.environ.get(name) for name in PROFILE_VARIABLES} - {None, ''}
+    if profiles == {str(loopback_profile())}:
+        return Check('network', 'ok', 'loopback only')
+    return Check('network', 'warn', f'a profile of your own: {", ".join(map(str, profiles))}',
+                 f'unset {" ".join(PROFILE_VARIABLES)} to take the loopback profile')
+
+
+def check_devices(directory: Path = Path('/dev/input')) -> Check:
+    """Check that wheels, game pads and keyboards can be read."""
+    devices = sorted(directory.glob('event*'))
+    if not devices:
+        return Check('input devices', 'warn', f'none in {directory}',
+                     'plug in a wheel, or drive with --driver keys:FILE or joy:FILE')
+    closed = [device for device in devices if not os.access(device, os.R_OK)]
+    if not closed:
+        return Check('input devices', 'ok', f'{len(devices)} readable')
+    return Check('input devices', 'warn', f'{len(closed)} of {len(devices)} not readable',
+                 'sudo usermod -aG input $USER, then log in again')
+
+
+def check_priority() -> Check:
+    """Try to take real-time priority, and give it back."""
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+    except PermissionError:
+        return Check('real-time priority', 'warn', 'not allowed (RLIMIT_RTPRIO)',
+                     'add "@realtime - rtprio 98" to /etc/security/limits.conf, join that group '
+                     'and log in again; only --realtime-priority needs it')
+    os.sched_setscheduler(0, policy, parameters)
+    return Check('real-time priority', 'ok', 'allowed')
+
+
+def check_discovery() -> list[Check]:
+    """Start two ROS processes of our own, let them find each other and exchange messages."""
+    environment = dict(os.environ, ROS_DOMAIN_ID=str(free_domain_id()))
+    environment['PYTHONPATH'] = os.pathsep.join(
+        [str(Path(__file__).parents[1]), environment.get('PYTHONPATH', '')]).rstrip(os.pathsep)
+    command = [sys.executable, '-m', 'crgame_ros.doctor']
+    with subprocess.Popen([*command, 'talk'], env=environment, stdin=subprocess.PIPE,
+                          stderr=subprocess.DEVNULL) as talker:
+        try:
+            listener = _run([*command, 'listen'], environment)
+        finally:
+            talker.terminate()
+    if listener.returncode != 0:
+        return [Check('discovery', 'fail', _last_line(listener.stderr),
+                      'look for a firewall on the loopback device, and for a full /dev/shm')]
+    found = json.loads(listener.stdout.splitlines()[-1])
+    detail = (f'first message after {found["first_s"]:.2f} s, '
+              f'then {found["median_us"]:.0f} us a message')
+    checks = [Check('discovery', 'ok', detail)]
+    if network_is_open() or not found['beyond_loopback']:
+        where = 'on every interface' if found['beyond_loopback'] else 'on loopback only'
+        return [*checks, Check('ports', 'ok', f'DDS listens {where}')]
+    return [*checks, Check('ports', 'fail',
+                           f'DDS listens at {", ".join(found["beyond_loopback"])}',
+                           f'unset {" ".join(PROFILE_VARIABLES)}')]
+
+
+def check_disk(runs: Path) -> Check:
+    """Check the space for recordings."""
+    existing = next(path for path in (runs.absolute(), *runs.absolute().parents) if path.exists())
+    free_gb = shutil.disk_usage(existing).free / 1e9
+    status: Status = 'ok'
+    if free_gb < DISK_WARN_GB:
+        status = 'fail' if free_gb < DISK_FAIL_GB else 'warn'
+    remedy = '' if status == 'ok' else f'delete old runs in {runs}, or record elsewhere with --out'
+    return Check('disk', status, f'{free_gb:.1f} GB free for {runs}', remedy)
+
+
+def check_processors(devices: Path = Path('/sys/devices/system/cpu')) -> Check:
+    """Check the number of processors and their frequency governors."""
+    count = len(os.sched_getaffinity(0))
+    governors = {path.read_text().strip()
+                 for path in devices.glob('cpu[0-9]*/cpufreq/scaling_governor')}
+    detail = f'{count}, governor {", ".join(sorted(governors)) or "none (virtual machine)"}'
+    if count < 2:
+        return Check('processors', 'warn', detail, 'two are needed for an even 100 Hz')
+    if governors & {'powersave', 'conservative'}:
+        return Check('processors', 'warn', detail, 'sudo cpupower frequency-set -g performance')
+    return Check('processors', 'ok', detail)
+
+
+def check_clock(sleeps: int = JITTER_SLEEPS) -> Check:
+    """Sleep to absolute deadlines and see how late the host wakes us."""
+    late_ms = []
+    deadline = time.monotonic_ns()
+    for _ in range(sleeps):
+        deadline += JITTER_PERIOD_NS
+        time.sleep(max(0, deadline - time.monotonic_ns()) * 1e-9)
+        late_ms.append((time.monotonic_ns() - deadline) * 1e-6)
+    p99 = statistics.quantiles(late_ms, n=100)[98]
+    detail = (f'late by p50 {statistics.median(late_ms):.3f}, p99 {p99:.3f}, '
+              f'worst {max(late_ms):.3f} ms')
+    if p99 <= JITTER_P99_LIMIT_MS:
+        return Check('clock', 'ok', detail)
+    return Check('clock', 'warn', detail,
+                 'close other programs; a virtual machine may need processors of its own')
+
+
+def talk() -> None:
+    """Publish the steady clock's time until terminated: the other process of the exchange."""
+    import rclpy
+    from std_msgs.msg import Int64
+
+    rclpy.init()
+    node = rclpy.create_node('crgame_doctor_talker')
+    publisher = node.create_publisher(Int64, PROBE_TOPIC, 1)
+    deadline = time.monotonic() + DISCOVERY_TIMEOUT_S
+    while rclpy.ok() and time.monotonic() < deadline:
+        publisher.publish(Int64(data=time.monotonic_ns()))
+        time.sleep(0.02)
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def listen() -> None:
+    """Print as JSON when the first message came, the median delay and the open ports."""
+    import rclpy
+    from std_msgs.msg import Int64
+
+    rclpy.init()
+    started_ns = time.monotonic_ns()
+    node = rclpy.create_node('crgame_doctor_listener')
+    sent_ns, received_ns = [], []
+
+    def take(message: Int64) -> None:
+        received_ns.append(time.monotonic_ns())
+        sent_ns.append(message.data)
+
+    node.create_subscription(Int64, PROBE_TOPIC, take, 1)
+    while (len(sent_ns) < PROBE_MESSAGES
+           and time.monotonic_ns() - started_ns < DISCOVERY_TIMEOUT_S * 1e9):
+        rclpy.spin_once(node, timeout_sec=0.1)
+    beyond = listening_beyond_loopback()
+    node.destroy_node()
+    rclpy.try_shutdown()
+    if len(sent_ns) < PROBE_MESSAGES:
+        sys.exit(f'{len(sent_ns)} messages from another process in {DISCOVERY_TIMEOUT_S:.0f} s')
+    delays_us = [(end - start) * 1e-3 for start, end in zip(sent_ns, received_ns, strict=True)]
+    print(json.dumps({'first_s': (received_ns[0] - started_ns) * 1e-9,
+                      'median_us': statistics.median(delays_us), 'beyond_loopback': beyond}))
+
+
+def _run(command: list[str],
+         environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, which a time-out makes a failure."""
+    try:
+        return subprocess.run(command, env=environment, capture_output=True, text=True,
+                              timeout=PROBE_TIMEOUT_S, check=False)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(
+            command, 1, '', f'no end within {PROBE_TIMEOUT_S:.0f} s')
+
+
+def _last_line(text: str) -> str:
+    """Return the last line that is not empty."""
+    return next((line for line in reversed(text.splitlines()) if line.strip()), 'no message')
+
+
+if __name__ == '__main__':
+    prepare_environment()
+    {'talk': talk, 'listen': listen}[sys.argv[1]]()

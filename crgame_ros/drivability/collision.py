@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which objects every driven vehicle touches (CRG III-D a).
+
+Far objects are sorted out by their enclosing circles on arrays, near ones are tested by the
+CommonRoad drivability checker. The narrow test works relative to the vehicle, so that it stays
+exact on maps whose coordinates are large.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from crgame_ros.drivability.footprint import Footprint, Primitive
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.objects import ObjectStates
+
+# Enclosing circles of objects that only just touch may miss each other by rounding.
+CIRCLE_SLACK = 1e-6
+
+
+class CollisionDetector:
+    """
+    Tests V driven vehicles against each other and against M other objects.
+
+    :param driven: (V) shapes of the driven vehicles.
+    :param others: (M) shapes of all other objects, in the order of their states.
+    """
+
+    def __init__(self, driven: Sequence[Shape], others: Sequence[Shape]) -> None:
+        self._driven = [Footprint(shape) for shape in driven]
+        self._others = [Footprint(shape) for shape in others]
+        count = len(others)
+        radii = np.array([footprint.radius for footprint in self._others])
+        self._reach = [np.square(radii + footprint.radius + CIRCLE_SLACK)
+                       for footprint in self._driven]
+        self._poses = np.full((3, count), np.nan)
+        self._velocities = np.full((3, count), np.nan)
+        self._moved = np.empty((3, count))
+        self._offset = np.empty((2, count))
+        self._distance = np.empty(count)
+        self._near = np.empty(count, dtype=bool)
+
+    def set_objects(self, states: ObjectStates) -> None:
+        """
+        Take the poses and velocities of the other objects at a scenario tick.
+
+        :raises InputError: if there are more or fewer than were announced.
+        """
+        expected = (len(self._others), 3)
+        if states.poses.shape != expected or states.velocities.shape != expected:
+            raise InputError(
+                f'poses {states.poses.shape} and velocities {states.velocities.shape} of '
+                f'{len(self._others)} objects', 'object states', 'give one row of x, y, yaw each')
+        self._poses[:] = states.poses.T
+        self._velocities[:] = states.velocities.T
+
+    def move(self, seconds_since_tick: float) -> None:
+        """Carry the other objects on from the tick at their velocities [s]."""
+        np.multiply(self._velocities, seconds_since_tick, out=self._moved)
+        self._moved += self._poses
+
+    def hits(self, centers: Sequence[tuple[float, float, float]]
+             ) -> tuple[list[list[int]], list[list[int]]]:
+        """
+        Find who touches whom; a pose with NaN is an absent vehicle and touches nobody.
+
+        :param centers: (V) centre x [m], y [m], yaw [rad] of the driven vehicles.
+        :return: for every driven vehicle the indices of the driven vehicles it touches, and for
+            every driven vehicle those of the other objects.
+        """
+        among: list[list[int]] = [[] for _ in centers]
+        with_others: list[list[int]] = []
+        for index, (x, y, yaw) in enumerate(centers):
+            own = self._driven[index]
+            placed: list[Primitive] = own.at(0.0, 0.0, yaw) if yaw == yaw else []
+            for other in range(index + 1, len(centers)):
+                if self._touches(placed, own, centers[index], other, centers[other]):
+                    among[index].append(other)
+                    among[other].append(index)
+            with_others.append(self._hit_objects(placed, index, x, y))
+        return among, with_others
+
+    def _touches(self, placed: list[Primitive], own: Footprint,
+                 pose: tuple[float, float, float], index: int,
+                 other_pose: tuple[float, float, float]) -> bool:
+        dx, dy = other_pose[0] - pose[0], other_pose[1] - pose[1]
+        other = self._driven[index]
+        reach = own.radius + other.radius + CIRCLE_SLACK
+        # Written so that NaN is far away.
+        return dx * dx + dy * dy <= reach * reach and other_pose[2] == other_pose[2] \
+            and _overlap(placed, other.at(dx, dy, other_pose[2]))
+
+    def _hit_objects(self, placed: list[Primitive], index: int, x: float, y: float) -> list[int]:
+        offset, distance = self._offset, self._distance
+        np.subtract(self._moved[0], x, out=offset[0])
+        np.subtract(self._moved[1], y, out=offset[1])
+        np.multiply(offset, offset, out=offset)
+        np.add(offset[0], offset[1], out=distance)
+        np.less_equal(distance, self._reach[index], out=self._near)
+        if not self._near.any():
+            return []
+        hit = []
+        for other in np.flatnonzero(self._near).tolist():
+            other_x, other_y, yaw = self._moved[:, other].tolist()
+            if _overlap(placed, self._others[other].at(other_x - x, other_y - y, yaw)):
+                hit.append(other)
+        return hit
+
+
+def _overlap(first: list[Primitive], second: list[Primitive]) -> bool:
+    return any(a.collide(b) for a in first for b in second)

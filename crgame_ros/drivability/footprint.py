@@ -1,0 +1,84 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The footprint of an object at a pose, as collision objects and as a polygon."""
+
+import math
+from typing import TypeAlias
+
+from commonroad_dc import pycrcc
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.shape import Shape
+
+Primitive: TypeAlias = pycrcc.RectOBB | pycrcc.Circle | pycrcc.Triangle
+# Corners of the polygon that stands for a circle in tests of containment; it lies outside the
+# circle by at most 0.12 % of the radius.
+CIRCLE_CORNERS = 64
+
+
+class Footprint:
+    """
+    A shape prepared to be placed at many poses.
+
+    :param shape: the shape around its centre.
+    :raises InputError: if a polygon has no area.
+    """
+
+    def __init__(self, shape: Shape) -> None:
+        self.shape = shape
+        self.radius = shape.radius
+        self._half_length = 0.5 * shape.length
+        self._half_width = 0.5 * shape.width
+        self._kind = shape.kind
+        self._triangles = _triangulate(shape) if shape.kind == 'polygon' else []
+        self._outline = _outline(shape)
+
+    def at(self, x: float, y: float, yaw: float) -> list[Primitive]:
+        """
+        Place the shape as collision objects, of which any that is hit is a hit.
+
+        :param x: centre [m]
+        :param y: centre [m]
+        :param yaw: [rad]
+        :return: one rectangle or circle, or the triangles of a polygon.
+        """
+        if self._kind == 'rectangle':
+            return [pycrcc.RectOBB(self._half_length, self._half_width, yaw, x, y)]
+        if self._kind == 'circle':
+            return [pycrcc.Circle(self._half_length, x, y)]
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return [pycrcc.Triangle(x + cos * ax - sin * ay, y + sin * ax + cos * ay,
+                                x + cos * bx - sin * by, y + sin * bx + cos * by,
+                                x + cos * cx - sin * cy, y + sin * cx + cos * cy)
+                for ax, ay, bx, by, cx, cy in self._triangles]
+
+    def polygon(self, x: float, y: float, yaw: float) -> shapely.Polygon:
+        """Place the shape as a polygon; a circle becomes one that encloses it."""
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return shapely.Polygon(self._outline @ np.array(((cos, sin), (-sin, cos))) + (x, y))
+
+
+def _outline(shape: Shape) -> NDArray[np.float64]:
+    if shape.kind == 'polygon':
+        return np.array(shape.vertices)
+    half_length, half_width = 0.5 * shape.length, 0.5 * shape.width
+    if shape.kind == 'rectangle':
+        return np.array(((half_length, half_width), (-half_length, half_width),
+                         (-half_length, -half_width), (half_length, -half_width)))
+    angles = np.arange(CIRCLE_CORNERS) * (2.0 * math.pi / CIRCLE_CORNERS)
+    radius = half_length / math.cos(math.pi / CIRCLE_CORNERS)
+    return radius * np.column_stack((np.cos(angles), np.sin(angles)))
+
+
+def _triangulate(shape: Shape) -> list[tuple[float, ...]]:
+    polygon = shapely.make_valid(shapely.Polygon(shape.vertices)) \
+        if len(shape.vertices) > 2 else shapely.Polygon()
+    if polygon.area == 0.0:
+        raise InputError(f'a polygon of {len(shape.vertices)} corners has no area', 'shape',
+                         'give at least three corners that are not in one line')
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
+    return [tuple(shapely.get_coordinates(triangle)[:3].ravel().tolist())
+            for triangle in triangles]

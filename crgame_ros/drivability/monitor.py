@@ -1,0 +1,171 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The drivability of every driven vehicle at one simulation step (CRG III-D).
+
+Live in its node and offline in lockstep the same code runs. The states are already in the
+scenario frame: the engine has applied the transform of CRG 28 before it publishes them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from commonroad.scenario.lanelet import LaneletNetwork
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.drivability.collision import CollisionDetector
+from crgame_ros.drivability.road_boundary import RoadBoundary
+from crgame_ros.errors import InputError
+from crgame_ros.scenario.game import DrivabilitySpec
+from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleDrivability:
+    """
+    The verdict on one driven vehicle.
+
+    :param vehicle_id: hv0, av0, …
+    :param collision: True while its footprint touches another object's.
+    :param off_road: True while a part of its footprint is off the road.
+    :param hit: sorted ids of what it touches.
+    :param n: simulation step of the states that were checked.
+    :param stop_requested: True if this is a human's violation and violations end the run.
+    """
+
+    vehicle_id: str
+    collision: bool
+    off_road: bool
+    hit: tuple[str, ...]
+    n: int
+    stop_requested: bool = False
+
+    @property
+    def is_valid(self) -> bool:
+        """Tell whether nothing is violated."""
+        return not (self.collision or self.off_road)
+
+
+class DrivabilityMonitor:
+    """
+    Checks humans and AVs against each other, all other objects and the road.
+
+    :param driven: (V) the driven vehicles, in the order of their states.
+    :param others: (M) everything else that can appear, in the order of its states.
+    :param lanelet_network: the road; None leaves the road unchecked.
+    :param spec: which checks run, and whether a human's violation asks for a stop.
+    """
+
+    def __init__(self, driven: Sequence[ObjectDescription], others: Sequence[ObjectDescription],
+                 lanelet_network: LaneletNetwork | None, spec: DrivabilitySpec) -> None:
+        self._ids = [vehicle.id for vehicle in driven]
+        self._other_ids = [other.id for other in others]
+        self._rear_to_center = [vehicle.rear_to_center for vehicle in driven]
+        self._shapes = [vehicle.shape for vehicle in driven]
+        self._stops = [spec.stop and vehicle.role is Role.HUMAN for vehicle in driven]
+        self._detector = CollisionDetector(
+            self._shapes, [other.shape for other in others]) if spec.collision else None
+        self._road = RoadBoundary(lanelet_network) \
+            if spec.road and lanelet_network is not None else None
+        self._objects_n: int | None = None
+
+    @property
+    def objects_n(self) -> int | None:
+        """Simulation step of the other objects' states in use; None before the first."""
+        return self._objects_n
+
+    def prepare(self, vehicle_states: NDArray[np.float64]) -> None:
+        """
+        Build the road boundary around the vehicles; call it at setup, never in a cycle.
+
+        :param vehicle_states: (V, 8) rear-axle states, columns as in `StateColumn`.
+        """
+        if self._road is not None:
+            self._road.prepare((x, y) for x, y, _ in self._centers(vehicle_states))
+
+    def set_objects(self, n: int, states: ObjectStates) -> None:
+        """
+        Take the other objects' states at a scenario tick.
+
+        :param n: simulation step of the tick.
+        :param states: (M) poses and velocities in the order of `others`.
+        :raises InputError: if their number is not that of `others`.
+        """
+        if self._detector is not None:
+            self._detector.set_objects(states)
+        self._objects_n = n
+
+    def check(self, n: int, seconds_since_tick: float, vehicle_states: NDArray[np.float64]
+              ) -> tuple[VehicleDrivability, ...]:
+        """
+        Judge every driven vehicle; other objects move on at their velocities since the tick.
+
+        Before the first `set_objects` nothing but the driven vehicles is there. A vehicle with
+        NaN in its pose is absent and valid.
+
+        :param n: simulation step.
+        :param seconds_since_tick: simulated time since the states of `set_objects` [s]
+        :param vehicle_states: (V, 8) rear-axle states, columns as in `StateColumn`.
+        :return: (V) verdicts in the order of `driven`.
+        :raises InputError: if the number of states is not V.
+        """
+        centers = self._centers(vehicle_states)
+        hits = self._hits(centers, seconds_since_tick)
+        verdicts = []
+        for index, vehicle_id in enumerate(self._ids):
+            hit = hits[index]
+            off_road = self._is_off_road(index, centers[index])
+            collision = bool(hit)
+            verdicts.append(VehicleDrivability(
+                vehicle_id, collision, off_road, hit, n,
+                self._stops[index] and (collision or off_road)))
+        return tuple(verdicts)
+
+    def _centers(self, vehicle_states: NDArray[np.float64]) -> list[tuple[float, float, float]]:
+        """Find x, y and yaw of the vehicles' centres."""
+        if vehicle_states.shape != (len(self._ids), STATE_WIDTH):
+            raise InputError(f'states of shape {vehicle_states.shape} for {len(self._ids)} '
+                             'driven vehicles', 'vehicle states',
+                             f'give one row of {STATE_WIDTH} columns each')
+        centers = []
+        for row, offset in zip(vehicle_states.tolist(), self._rear_to_center, strict=True):
+            x, y, yaw = row[StateColumn.X], row[StateColumn.Y], row[StateColumn.YAW]
+            centers.append((x + offset * math.cos(yaw), y + offset * math.sin(yaw), yaw)
+                           if math.isfinite(x + y + yaw) else (math.nan,) * 3)
+        return centers
+
+    def _hits(self, centers: list[tuple[float, float, float]], seconds_since_tick: float
+              ) -> list[tuple[str, ...]]:
+        if self._detector is None:
+            return [()] * len(centers)
+        self._detector.move(seconds_since_tick)
+        among, with_others = self._detector.hits(centers)
+        return [tuple(sorted([self._ids[i] for i in vehicles]
+                             + [self._other_ids[i] for i in objects]))
+                if vehicles or objects else ()
+                for vehicles, objects in zip(among, with_others, strict=True)]
+
+    def _is_off_road(self, index: int, center: tuple[float, float, float]) -> bool:
+        if self._road is None or center[0] != center[0]:
+            return False
+        return self._road.is_off_road(*center, self._shapes[index])
+
+
+def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDrivability]
+            ) -> tuple[VehicleDrivability, ...]:
+    """
+    Pick the verdicts that say something new: all at first, then those that differ in more than n.
+
+    :param previous: verdicts reported last, empty at the start.
+    :param current: verdicts of this step.
+    """
+    known = {verdict.vehicle_id: verdict for verdict in previous}
+    return tuple(verdict for verdict in current
+                 if _finding(known.get(verdict.vehicle_id)) != _finding(verdict))
+
+
+def _finding(verdict: VehicleDrivability | None) -> tuple[bool, bool, tuple[str, ...]] | None:
+    return (verdict.collision, verdict.off_road, verdict.hit) if verdict else None

@@ -1,0 +1,70 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The road as a surface: the union of all lanelets, closed over the seams between them."""
+
+from collections.abc import Iterable, Sequence
+
+from commonroad.scenario.lanelet import Lanelet
+import numpy as np
+import shapely
+
+# Converted maps leave slits between neighbouring lanelets, a few millimetres to centimetres
+# wide; no vehicle leaves the road through one of them. Ditches and kerbs are wider.
+SEAM_WIDTH = 0.1
+# Patches reach this far into the lanelets around them, so that no slit of rounding width stays.
+PATCH_OVERLAP = 1e-3
+
+
+def lanelet_polygons(lanelets: Iterable[Lanelet], origin: tuple[float, float]
+                     ) -> list[shapely.Polygon]:
+    """
+    Build valid polygons of lanelets; one that crosses itself becomes several.
+
+    :param lanelets: lanelets with at least two vertices on either side.
+    :param origin: position (x, y) from which the polygons count [m]
+    """
+    rings = [np.vstack((lanelet.left_vertices, lanelet.right_vertices[::-1]))
+             for lanelet in lanelets]
+    shapes = [shapely.make_valid(shapely.Polygon(ring[:, :2] - origin)) for ring in rings]
+    return [part for shape in shapes for part in _polygons(shape)]
+
+
+def seam_patches(surface: shapely.Geometry) -> list[shapely.Polygon]:
+    """Find polygons that cover every slit and hole in a surface narrower than `SEAM_WIDTH`."""
+    gaps = _polygons(_closed(surface).difference(surface))
+    # A hole of rounding width is lost in the difference, so holes are judged one by one.
+    gaps += [hole for hole in _holes(surface) if _is_narrow(hole)]
+    # The outline of a gap is widened, not the gap: a polygon of rounding width widens to nothing.
+    covers = shapely.union_all([*gaps, *(gap.exterior.buffer(PATCH_OVERLAP) for gap in gaps)])
+    return [shapely.Polygon(cover.exterior) for cover in _polygons(covers)]
+
+
+def road_surface(polygons: Sequence[shapely.Polygon],
+                 patches: Sequence[shapely.Polygon]) -> shapely.Geometry:
+    """Unite polygons and patches to one surface, prepared for tests of containment."""
+    united = shapely.union_all([*polygons, *patches])
+    # Uniting leaves new holes of rounding width along the edges of the patches.
+    surface = shapely.MultiPolygon([
+        shapely.Polygon(part.exterior, [hole.exterior for hole in _holes(part)
+                                        if not _is_narrow(hole)])
+        for part in _polygons(united)])
+    shapely.prepare(surface)
+    return surface
+
+
+def _closed(surface: shapely.Geometry) -> shapely.Geometry:
+    half = 0.5 * SEAM_WIDTH
+    return surface.buffer(half, join_style='mitre').buffer(-half, join_style='mitre')
+
+
+def _is_narrow(hole: shapely.Polygon) -> bool:
+    return bool(hole.buffer(-0.5 * SEAM_WIDTH).is_empty)
+
+
+def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
+    return [part for part in shapely.get_parts(shapely.get_parts(geometry)).tolist()
+            if isinstance(part, shapely.Polygon) and part.area > 0.0]
+
+
+def _holes(geometry: shapely.Geometry) -> list[shapely.Polygon]:
+    return [shapely.Polygon(ring) for polygon in _polygons(geometry) for ring in polygon.interiors]

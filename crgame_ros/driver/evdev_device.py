@@ -1,0 +1,301 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A wheel, gamepad or keyboard read through evdev, which may be unplugged and come back."""
+
+from collections.abc import Iterable, Iterator, Mapping
+import errno
+import math
+from pathlib import Path
+import re
+from typing import Any
+
+from evdev import AbsInfo, ecodes, InputDevice, InputEvent
+
+from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
+from crgame_ros.driver.keyboard import KeyState
+from crgame_ros.driver.wheel import (
+    ControlLayout,
+    GearButtons,
+    joy_state,
+    JoyState,
+    RawInput,
+    reported,
+)
+from crgame_ros.errors import InputError
+
+RESCAN_PERIOD_S = 1.0
+
+
+class EventDecoder:
+    """
+    The raw state of a device from its events; no I/O.
+
+    :param gear: the buttons or keys that choose the gear.
+    :param reverse: whether reverse is selected to begin with.
+    """
+
+    def __init__(self, gear: GearButtons, reverse: bool = False) -> None:
+        self._gear = gear
+        self._dropping = False
+        self.axes: dict[int, float] = {}
+        self.pressed: set[int] = set()
+        self.reverse = reverse
+        self.stale = False
+
+    def feed(self, event: InputEvent) -> bool:
+        """
+        Take one event, and tell whether anything changed.
+
+        After the kernel's buffer ran over (SYN_DROPPED) the events up to the next report are
+        meaningless; then `stale` asks for `synchronise`.
+        """
+        if event.type == ecodes.EV_SYN:
+            if event.code == ecodes.SYN_DROPPED:
+                self._dropping = True
+            elif event.code == ecodes.SYN_REPORT and self._dropping:
+                self._dropping, self.stale = False, True
+        elif self._dropping:
+            return False
+        elif event.type == ecodes.EV_ABS:
+            changed = self.axes.get(event.code) != event.value
+            self.axes[event.code] = event.value
+            return changed
+        elif event.type == ecodes.EV_KEY and event.value in (0, 1):
+            return self._press(event.code, event.value == 1)
+        return False
+
+    def synchronise(self, axes: Mapping[int, float], pressed: Iterable[int]) -> None:
+        """
+        Take the device's whole state; presses that were missed change no gear.
+
+        :param axes: raw value by code.
+        :param pressed: codes of the keys and buttons held now.
+        """
+        gate = self._gear.held & self.pressed
+        self.axes = dict(axes)
+        self.pressed = set(pressed)
+        self.stale = False
+        if gate != self._gear.held & self.pressed:
+            self.reverse = not gate
+
+    def _press(self, code: int, pressed: bool) -> bool:
+        if (code in self.pressed) == pressed:
+            return False
+        (self.pressed.add if pressed else self.pressed.discard)(code)
+        self.reverse = self._gear.after(self.reverse, code, pressed)
+        return True
+
+
+class EvdevDevice:
+    """
+    Finds, opens, reads and finds again one input device.
+
+    Nothing here raises: `connected` tells whether the device is there, `problem` why not. A
+    lost device reads as released and is looked for once a second, by its name and map.
+
+    :param maps: device maps in order of preference.
+    :param name: part of the device's name, case ignored; empty takes the best device.
+    :param directory: where the event devices are.
+    """
+
+    def __init__(self, maps: tuple[DeviceMap, ...], name: str = '',
+                 directory: Path = Path('/dev/input')) -> None:
+        self._maps = maps
+        self._pattern = re.compile(re.escape(name), re.IGNORECASE)
+        self._directory = directory
+        self._device: InputDevice[str] | None = None
+        self._next_scan_s = -math.inf
+        self._limits: dict[int, tuple[float, float]] = {}
+        self._buttons: tuple[int, ...] = ()
+        self.problem: InputError | None = None
+        self.device_map: DeviceMap | None = None
+        self.layout: ControlLayout | None = None
+        self.decoder = EventDecoder(GearButtons())
+        self._connect()
+
+    @property
+    def connected(self) -> bool:
+        """Whether the device is open."""
+        return self._device is not None
+
+    @property
+    def name(self) -> str:
+        """The device's name; empty while none is open."""
+        return str(self._device.name) if self._device is not None else ''
+
+    @property
+    def raw(self) -> RawInput:
+        """Raw axes and pressed buttons; nothing while disconnected."""
+        return RawInput(self.decoder.axes, frozenset(self.decoder.pressed))
+
+    @property
+    def keys(self) -> KeyState:
+        """The driving keys held on a keyboard; none held on other devices."""
+        if self.device_map is None or self.device_map.keys is None:
+            return KeyState()
+        return self.device_map.keys.held(self.decoder.pressed, self.decoder.reverse)
+
+    @property
+    def joy(self) -> JoyState:
+        """What the `joy` node would publish; for a keyboard, its driving keys as buttons."""
+        if self.device_map is not None and self.device_map.keys is not None:
+            return JoyState((), tuple(map(int, self.keys)))
+        rests = {axis.code: axis.rest for axis in self.layout.ranges} if self.layout else {}
+        return joy_state(rests | self.decoder.axes, self.decoder.pressed, self._limits,
+                         self._buttons)
+
+    def fileno(self) -> int | None:
+        """Give the descriptor to wait on until something can be read; None if disconnected."""
+        return self._device.fd if self._device is not None else None
+
+    def poll(self, now_s: float) -> bool:
+        """
+        Read what is pending without blocking, or look for the lost device.
+
+        :param now_s: steady clock [s].
+        :return: whether anything changed.
+        """
+        if self._device is not None:
+            return self._read(self._device)
+        if now_s < self._next_scan_s:
+            return False
+        self._next_scan_s = now_s + RESCAN_PERIOD_S
+        return self._connect()
+
+    def close(self) -> None:
+        """Close the device; `poll` would find it again."""
+        if self._device is not None:
+            self._device.close()
+            self._device = None
+        self.decoder.synchronise({}, ())
+
+    def _read(self, device: 'InputDevice[str]') -> bool:
+        changed = False
+        try:
+            for event in _pending(device):
+                changed = self.decoder.feed(event) or changed
+            if self.decoder.stale:
+                self._synchronise(device)
+                changed = True
+        except OSError as error:
+            return self._lose(error)
+        return changed
+
+    def _lose(self, error: OSError) -> bool:
+        why = 'was unplugged' if error.errno == errno.ENODEV else f'failed ({error.strerror})'
+        self.problem = InputError(f'{self.name or "the device"} {why}', str(self._directory),
+                                  'plug it in again; it is looked for once a second')
+        self._pattern = re.compile(f'^{re.escape(self.name)}$')
+        self._maps = tuple(m for m in self._maps if m is self.device_map)
+        self.close()
+        return True
+
+    def _synchronise(self, device: 'InputDevice[str]') -> None:
+        axes = {code: float(info.value) for code, info in _abs_infos(device).items()}
+        if self.layout is not None:
+            axes = reported(axes, self.layout, self.decoder.axes)
+        self.decoder.synchronise(axes, device.active_keys())
+
+    def _connect(self) -> bool:
+        try:
+            self._adopt(*_find_device(self._maps, self._pattern, self._directory))
+        except InputError as error:
+            # The reason of a loss stays: that the device is not there yet is no news.
+            if self.device_map is None:
+                self.problem = error
+            return False
+        self.problem = None
+        return True
+
+    def _adopt(self, device: 'InputDevice[str]', device_map: DeviceMap) -> None:
+        try:
+            self._limits = {code: (float(info.min), float(info.max))
+                            for code, info in _abs_infos(device).items() if info.min < info.max}
+            self._buttons = tuple(device.capabilities().get(ecodes.EV_KEY, ()))
+            if device_map.keys is not None:
+                gear, self.layout = GearButtons(toggle=device_map.keys.reverse), None
+            else:
+                assert device_map.evdev is not None
+                gear, self.layout = device_map.evdev.gear, device_map.evdev.layout(self._limits)
+            self.decoder = EventDecoder(gear, self.decoder.reverse)
+            self._synchronise(device)
+        except (InputError, OSError) as error:
+            device.close()
+            raise InputError(f'cannot be used with {device.name}: {error}',
+                             f'device map {device_map.name}', 'see docs/driving.md') from error
+        self._device, self.device_map = device, device_map
+
+
+def open_evdev(name: str = '', directory: Path = Path('/dev/input')) -> EvdevDevice:
+    """
+    Open what `evdev[:NAME]` asks for.
+
+    :param name: empty for the best device; a device map (its name in `config/devices/`, or a
+        YAML file); or part of a device's name.
+    :raises InputError: if a device map is wrong. A missing device is no error: see `problem`.
+    """
+    if name.endswith('.yaml'):
+        return EvdevDevice((load_device_map(name),), directory=directory)
+    maps = load_device_maps()
+    named = tuple(device_map for device_map in maps if device_map.name == name)
+    return EvdevDevice(named or maps, '' if named else name, directory)
+
+
+def _find_device(maps: tuple[DeviceMap, ...], pattern: re.Pattern[str], directory: Path,
+                 ) -> 'tuple[InputDevice[str], DeviceMap]':
+    """Open the device of the first map that any fits; an InputError says why there is none."""
+    if not directory.is_dir():
+        raise InputError('this machine has no input devices', str(directory),
+                         'drive with keys:FILE, joy:FILE or joy; a container must be given '
+                         f'{directory} (docs/driving.md)')
+    candidates: list[tuple[tuple[int, bool, int], InputDevice[str], DeviceMap]] = []
+    others, unreadable = [], []
+    paths = sorted(directory.glob('event*'), key=lambda path: (len(path.name), path.name))
+    for order, path in enumerate(paths):
+        try:
+            device = InputDevice(str(path))
+            has = device.capabilities(absinfo=False)
+        except OSError as error:
+            unreadable.append(f'{path.name} ({error.strerror})')
+            continue
+        buttons, axes = (frozenset(has.get(kind, ())) for kind in (ecodes.EV_KEY, ecodes.EV_ABS))
+        fitting = [m for m in maps if pattern.search(device.name)
+                   and m.fits(device.name, axes, buttons)]
+        if fitting:
+            # Mice pose as keyboards too, but have no lamps; a keyboard with lamps is real.
+            rank = (fitting[0].kind, ecodes.EV_LED not in has, order)
+            candidates.append((rank, device, fitting[0]))
+        else:
+            others.append(device.name)
+            device.close()
+    candidates.sort(key=lambda candidate: candidate[0])
+    for _, device, _ in candidates[1:]:
+        device.close()
+    if not candidates:
+        raise _nothing_found(maps, others, unreadable, directory)
+    return candidates[0][1:]
+
+
+def _nothing_found(maps: tuple[DeviceMap, ...], others: list[str], unreadable: list[str],
+                   directory: Path) -> InputError:
+    wanted = ', '.join(device_map.name for device_map in maps)
+    if unreadable:
+        return InputError(f'no readable device fits {wanted}; not readable: '
+                          + ', '.join(unreadable), str(directory),
+                          'add yourself to the group input (sudo usermod -aG input $USER) and log '
+                          'in again')
+    return InputError(f'no device fits {wanted}; found: {", ".join(others) or "none"}',
+                      str(directory), 'plug it in, or add a device map (docs/driving.md)')
+
+
+def _pending(device: 'InputDevice[str]') -> Iterator[InputEvent]:
+    try:
+        while True:
+            yield from device.read()
+    except BlockingIOError:
+        return
+
+
+def _abs_infos(device: 'InputDevice[str]') -> dict[int, AbsInfo]:
+    infos: Any = device.capabilities().get(ecodes.EV_ABS, ())
+    return dict(infos)

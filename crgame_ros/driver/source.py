@@ -1,0 +1,299 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The sources of a human's command: idle, scripted, an external joy node, or a device."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from crgame_ros.driver.command import DriverCommand, RELEASED
+from crgame_ros.driver.keyboard import KeyboardCycles, KeyboardParameters
+from crgame_ros.driver.timeline import (
+    JoyTimeline,
+    KeyTimeline,
+    parse_timeline,
+    read_timeline,
+    SCRIPTED_LAYOUT,
+    Timeline,
+)
+from crgame_ros.driver.wheel import JoyState, normalize, RawInput, reported
+from crgame_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from crgame_ros.driver.device_map import DeviceMap
+    from crgame_ros.driver.evdev_device import EvdevDevice
+
+JOY_TIMEOUT_S = 0.5
+
+_FORMS = {
+    'auto': 'auto', 'idle': 'idle', 'evdev': 'evdev or evdev:NAME', 'keys': 'keys:FILE',
+    'joy': 'joy or joy:FILE', 'replay': 'replay:BAG'}
+_WITHOUT_ARGUMENT = {'auto', 'idle', 'evdev', 'joy'}
+_WITH_ARGUMENT = {'evdev', 'keys', 'joy', 'replay'}
+
+
+@dataclass(frozen=True)
+class SourceSpec:
+    """
+    A source as the game or the command line names it.
+
+    :param kind: auto, idle, evdev, keys, joy or replay.
+    :param argument: device name, file or bag; empty for `auto`, `idle`, the best evdev device
+        and the external joy node.
+    """
+
+    kind: str
+    argument: str = ''
+
+    def __str__(self) -> str:
+        """Give the text that `parse_source` reads."""
+        return f'{self.kind}:{self.argument}' if self.argument else self.kind
+
+    @property
+    def has_timeline(self) -> bool:
+        """Whether the source is a timeline file, which the resolved game carries as text."""
+        return self.kind == 'keys' or (self.kind == 'joy' and bool(self.argument))
+
+
+def parse_source(text: str) -> SourceSpec:
+    """
+    Read a driver source.
+
+    :raises InputError: listing the forms.
+    """
+    kind, colon, argument = text.strip().partition(':')
+    argument = argument.strip()
+    if bool(colon) == bool(argument) and kind in (
+            _WITH_ARGUMENT if argument else _WITHOUT_ARGUMENT):
+        return SourceSpec(kind, argument)
+    raise InputError(f'there is no driver source {text!r}', 'driver',
+                     f'give one of {", ".join(_FORMS.values())}')
+
+
+def load_timeline(spec: SourceSpec, base: Path) -> Timeline:
+    """
+    Read the timeline that a source names.
+
+    :param spec: a source with `has_timeline`.
+    :param base: directory against which its file is resolved.
+    :raises InputError: if the file is missing, wrong, or of the other kind.
+    """
+    path = base / Path(spec.argument).expanduser()
+    timeline = read_timeline(path)
+    kind = 'keys' if isinstance(timeline, KeyTimeline) else 'joy'
+    if kind != spec.kind:
+        raise InputError(f'is a timeline of {kind}, not of {spec.kind}', str(path),
+                         f'name it as {kind}:{spec.argument}')
+    return timeline
+
+
+class DriverSource(ABC):
+    """
+    Where a seat's command comes from.
+
+    Cycle n lasts from n * dt to (n + 1) * dt of simulation time. `command(n, dt)` may be asked
+    again for the same n when the input has changed; asking for a later n commits the earlier
+    cycles. Filters therefore run in simulation time, and a pause holds the pedals.
+    """
+
+    problem: InputError | None = None
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is anybody; while not, nothing should be published for the seat."""
+        return True
+
+    @abstractmethod
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """
+        Give the command for cycle n.
+
+        :param n: the cycle, never less than the one asked for last (`reset` begins anew).
+        :param dt_s: length of a cycle in simulation time [s].
+        """
+
+    def poll(self, now_s: float) -> bool:
+        """
+        Take what is new, without blocking.
+
+        :param now_s: steady clock [s].
+        :return: whether anything changed.
+        """
+        return False
+
+    def fileno(self) -> int | None:
+        """Give a descriptor that becomes readable when `poll` has something to take."""
+        return None
+
+    def joy(self) -> JoyState | None:
+        """Give the raw device as a `joy` node would publish it; None if there is none."""
+        return None
+
+    def reset(self) -> None:  # noqa: B027 - most sources remember nothing
+        """Begin a new run at cycle 0, released."""
+
+    def close(self) -> None:  # noqa: B027 - most sources hold nothing
+        """Let go of the device."""
+
+
+class IdleDriver(DriverSource):
+    """Nobody: every pedal released."""
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Give the released command."""
+        return RELEASED
+
+
+class ScriptedDriver(DriverSource):
+    """
+    Plays a timeline, in lockstep offline and live alike.
+
+    Cycle n gets the keys or axes at its start, t = n * dt; keys go through the keyboard filter
+    advanced over that cycle (CRG 18-19), axes through the normalisation (CRG 17). A driver
+    that joins at a later cycle has first gone through all earlier ones.
+
+    :param timeline: of keys or of axes.
+    :param parameters: of the keyboard filter; None takes the paper's.
+    """
+
+    def __init__(self, timeline: Timeline, parameters: KeyboardParameters | None = None) -> None:
+        self.timeline = timeline
+        self._cycles = KeyboardCycles(parameters)
+        self._time_s = 0.0
+
+    @classmethod
+    def from_text(cls, text: str, where: str) -> 'ScriptedDriver':
+        """
+        Make a driver of a timeline's text, as the resolved game carries it.
+
+        :raises InputError: if the text is no timeline.
+        """
+        return cls(parse_timeline(text, where))
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Give the command for cycle n."""
+        self._time_s = n * dt_s
+        if isinstance(self.timeline, JoyTimeline):
+            raw = self.timeline.raw_at(self._time_s)
+            return normalize(raw, SCRIPTED_LAYOUT, bool(raw.pressed))
+        for earlier in range(self._cycles.cycle + 1, n):
+            self._cycles.command(earlier, self.timeline.keys_at(earlier * dt_s), dt_s)
+        return self._cycles.command(n, self.timeline.keys_at(self._time_s), dt_s)
+
+    def joy(self) -> JoyState:
+        """Give the scripted axes and the gear, or the held keys as buttons."""
+        if isinstance(self.timeline, JoyTimeline):
+            raw = self.timeline.raw_at(self._time_s)
+            return JoyState(tuple(raw.axes.values()), (int(bool(raw.pressed)),))
+        return JoyState((), tuple(map(int, self.timeline.keys_at(self._time_s))))
+
+    def reset(self) -> None:
+        """Begin a new run at cycle 0, released."""
+        self._cycles.reset()
+        self._time_s = 0.0
+
+
+class JoyDriver(DriverSource):
+    """
+    The messages of an external `joy` node, normalised by a device map (CRG 17).
+
+    :param device_map: of a wheel or gamepad.
+    :param timeout_s: silence after which the node counts as gone [s]; a `joy` node repeats its
+        message at 20 Hz unless told otherwise.
+    :raises InputError: if the map is a keyboard's.
+    """
+
+    def __init__(self, device_map: 'DeviceMap', timeout_s: float = JOY_TIMEOUT_S) -> None:
+        if device_map.joy is None:
+            raise InputError('is a keyboard, which has no joy node', device_map.name,
+                             'choose the map of a wheel or gamepad')
+        self._layout = device_map.joy.layout()
+        self._name = device_map.name
+        self._timeout_s = timeout_s
+        self._heard_s = self._now_s = -math.inf
+        self._raw = RawInput()
+        self._reverse = False
+
+    @property
+    def connected(self) -> bool:
+        """Whether a message came within the timeout and holds the axes of the map."""
+        return self.problem is None and self._now_s - self._heard_s <= self._timeout_s
+
+    def receive(self, axes: Sequence[float], buttons: Sequence[int], now_s: float) -> None:
+        """
+        Take a message.
+
+        :param axes: `Joy.axes`, in [-1, 1].
+        :param buttons: `Joy.buttons`, 1 while pressed.
+        :param now_s: steady clock [s].
+        """
+        self._heard_s = self._now_s = now_s
+        missing = [axis.code for axis in self._layout.ranges if axis.code >= len(axes)]
+        self.problem = InputError(
+            f'the joy message has {len(axes)} axes, device map {self._name} needs axis '
+            f'{max(missing)}', 'joy', 'choose the device map of this device') if missing else None
+        pressed = frozenset(index for index, value in enumerate(buttons) if value)
+        for button in sorted(pressed ^ self._raw.pressed):
+            self._reverse = self._layout.gear.after(self._reverse, button, button in pressed)
+        moved = reported(dict(enumerate(axes)), self._layout, self._raw.axes)
+        self._raw = RawInput(moved, pressed)
+
+    def poll(self, now_s: float) -> bool:
+        """Let the time pass, and tell whether the node has fallen silent since."""
+        before = self.connected
+        self._now_s = max(self._now_s, now_s)
+        return self.connected != before
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Give the command of the last message."""
+        return normalize(self._raw, self._layout, self._reverse)
+
+
+class EvdevDriver(DriverSource):
+    """
+    A device read through evdev: wheels and gamepads by CRG 17, keyboards by CRG 18-19.
+
+    :param device: the device, connected or not yet.
+    :param parameters: of the keyboard filter; None takes the paper's.
+    """
+
+    def __init__(self, device: 'EvdevDevice', parameters: KeyboardParameters | None = None,
+                 ) -> None:
+        self.device = device
+        self._cycles = KeyboardCycles(parameters)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the device is open."""
+        return self.device.connected
+
+    def poll(self, now_s: float) -> bool:
+        """Read what is pending, or look for the lost device; keep its problem."""
+        changed = self.device.poll(now_s)
+        self.problem = self.device.problem
+        return changed
+
+    def fileno(self) -> int | None:
+        """Give the device's descriptor; None while disconnected."""
+        return self.device.fileno()
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Give the command for cycle n from the device's state now."""
+        if self.device.layout is not None:
+            return normalize(self.device.raw, self.device.layout, self.device.decoder.reverse)
+        return self._cycles.command(n, self.device.keys, dt_s)
+
+    def joy(self) -> JoyState | None:
+        """Give the raw device; None while disconnected."""
+        return self.device.joy if self.device.connected else None
+
+    def reset(self) -> None:
+        """Begin a new run at cycle 0, released; the gear stays as the device has it."""
+        self._cycles.reset()
+
+    def close(self) -> None:
+        """Close the device."""
+        self.device.close()

@@ -1,0 +1,279 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From the raw axes of a wheel, pedals or a gamepad to a driver command (CRG equation 17)."""
+
+from collections.abc import Container, Iterable, Mapping
+from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.errors import InputError
+
+# From linux/input-event-codes.h: the hats, and the first button of joysticks.
+HATS = range(0x10, 0x18)
+BTN_JOYSTICK = 0x120
+
+
+class JoyState(NamedTuple):
+    """
+    Raw device as the standard `joy` node would publish it (sensor_msgs/Joy).
+
+    :param axes: in [-1, 1], positive left and up; a pedal that rests at its largest raw value
+        (Logitech) reads -1 released and 1 pressed, a gamepad's trigger 1 and -1
+    :param buttons: 1 while pressed, 0 otherwise
+    """
+
+    axes: tuple[float, ...]
+    buttons: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class RawInput:
+    """
+    Raw values of a device at one time.
+
+    :param axes: value by evdev code, or by index in `Joy.axes`; an axis that has not reported
+        is absent and counts as at rest.
+    :param pressed: evdev codes, or indices in `Joy.buttons`, of the pressed buttons.
+    """
+
+    axes: Mapping[int, float] = field(default_factory=dict)
+    pressed: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True)
+class AxisRange:
+    """
+    Calibrated range of one axis; minimum < maximum.
+
+    :param code: evdev code, or index in `Joy.axes`.
+    :param minimum: smallest raw value.
+    :param maximum: largest raw value.
+    :param rest: raw value when nobody touches it: the centre, or the released pedal.
+    :param inverted: the command falls as the raw value rises.
+    :param deadzone: share of the travel around the rest that counts as rest, in [0, 1).
+    """
+
+    code: int
+    minimum: float
+    maximum: float
+    rest: float
+    inverted: bool = False
+    deadzone: float = 0.0
+
+    def deflection(self, raw: RawInput) -> float:
+        """
+        Give the signed share of the travel from the rest: CRG 17 for theta_sw.
+
+        Linear on each side of the rest, exactly -1, 0 and 1 at minimum, rest and maximum
+        (signs turned if inverted), clipped. Beyond the deadzone the rest of the travel is
+        stretched to the full range, so that nothing jumps.
+        """
+        value = raw.axes.get(self.code, self.rest)
+        if not math.isfinite(value):
+            return 0.0
+        side = self.maximum - self.rest if value > self.rest else self.rest - self.minimum
+        share = (value - self.rest) / side if side > 0.0 else 0.0
+        size = min(1.0, max(0.0, (abs(share) - self.deadzone) / (1.0 - self.deadzone)))
+        return math.copysign(size, -share if self.inverted else share) if size else 0.0
+
+    def travel(self, raw: RawInput) -> float:
+        """Give a pedal's share of its travel from the rest, in [0, 1]: CRG 17 for ell."""
+        return max(0.0, self.deflection(raw))
+
+
+@dataclass(frozen=True)
+class GearButtons:
+    """
+    Buttons that choose the gear, as evdev codes or indices in `Joy.buttons`.
+
+    :param on: a press selects reverse.
+    :param off: a press selects forward.
+    :param toggle: a press changes between the two.
+    :param held: reverse exactly while held (the gate of a shifter).
+    """
+
+    on: frozenset[int] = frozenset()
+    off: frozenset[int] = frozenset()
+    toggle: frozenset[int] = frozenset()
+    held: frozenset[int] = frozenset()
+
+    def after(self, reverse: bool, button: int, pressed: bool) -> bool:
+        """
+        Give the gear after a button changed.
+
+        :param reverse: whether reverse was selected before.
+        :param button: the button that changed.
+        :param pressed: whether it is pressed now.
+        """
+        if button in self.held:
+            return pressed
+        if not pressed:
+            return reverse
+        if button in self.toggle:
+            return not reverse
+        return button in self.on or (reverse and button not in self.off)
+
+
+@dataclass(frozen=True)
+class ControlLayout:
+    """
+    Where a device's controls are, for one way of reading it (evdev or the `joy` node).
+
+    :param steering: the wheel or stick; positive to the left after inversion.
+    :param throttle: throttle pedal; None with combined pedals.
+    :param brake: brake pedal; None with combined pedals.
+    :param pedals: one axis for both pedals, throttle on its positive side.
+    :param gear: the gear buttons.
+    """
+
+    steering: AxisRange
+    throttle: AxisRange | None = None
+    brake: AxisRange | None = None
+    pedals: AxisRange | None = None
+    gear: GearButtons = GearButtons()
+
+    @property
+    def ranges(self) -> tuple[AxisRange, ...]:
+        """Every axis in use."""
+        axes = (self.steering, self.throttle, self.brake, self.pedals)
+        return tuple(axis for axis in axes if axis is not None)
+
+
+@dataclass(frozen=True)
+class AxisBinding:
+    """
+    One axis as a device map states it, for evdev or for the `joy` node.
+
+    :param code: evdev code, or index in `Joy.axes`.
+    :param minimum: smallest raw value; None takes what the device reports.
+    :param maximum: largest raw value; None likewise.
+    :param rest: raw value at rest; None is the middle for steering and combined pedals, and
+        the minimum (inverted: the maximum) for a pedal.
+    :param inverted: the command falls as the raw value rises.
+    :param centred: rests in the middle (steering, combined pedals).
+    :param deadzone: share of the travel that counts as rest.
+    """
+
+    code: int
+    minimum: float | None
+    maximum: float | None
+    rest: float | None
+    inverted: bool
+    centred: bool
+    deadzone: float
+
+    def range(self, reported: tuple[float, float] | None = None) -> AxisRange:
+        """
+        Complete the range with what the device reports.
+
+        :param reported: the device's own minimum and maximum, if it tells them.
+        :raises InputError: if the map does not fit this device: neither tells a limit, or the
+            map covers less than half of the reported range or leaves it.
+        """
+        lower, upper = reported or (self.minimum, self.maximum)
+        minimum = lower if self.minimum is None else self.minimum
+        maximum = upper if self.maximum is None else self.maximum
+        if minimum is None or maximum is None or not minimum < maximum:
+            raise InputError(f'axis {self.code} has the range {minimum} to {maximum}', '',
+                             'state min and max in the device map')
+        if reported is not None and not (
+                reported[0] <= minimum and maximum <= reported[1]
+                and 2.0 * (maximum - minimum) >= reported[1] - reported[0]):
+            raise InputError(f'axis {self.code} reports {reported[0]:g} to {reported[1]:g}, the '
+                             f'map says {minimum:g} to {maximum:g}', '',
+                             'mend min and max in the device map, or leave them out')
+        rest = self.rest
+        if rest is None and self.centred:
+            rest = 0.5 * (minimum + maximum)
+        elif rest is None:
+            rest = maximum if self.inverted else minimum
+        if not minimum <= rest <= maximum:
+            raise InputError(f'axis {self.code} rests at {rest:g}, outside {minimum:g} to '
+                             f'{maximum:g}', '', 'mend rest in the device map')
+        return AxisRange(self.code, minimum, maximum, rest, self.inverted, self.deadzone)
+
+
+@dataclass(frozen=True)
+class ControlBindings:
+    """The controls of a wheel or gamepad for one way of reading it; None where it has none."""
+
+    steering: AxisBinding
+    throttle: AxisBinding | None
+    brake: AxisBinding | None
+    pedals: AxisBinding | None
+    gear: GearButtons
+
+    def layout(self, reported: Mapping[int, tuple[float, float]] | None = None) -> ControlLayout:
+        """
+        Give the calibrated layout.
+
+        :param reported: minimum and maximum by axis code, as the device tells them.
+        :raises InputError: if the map does not fit the device.
+        """
+        known = reported or {}
+
+        def complete(axis: AxisBinding | None) -> AxisRange | None:
+            return axis.range(known.get(axis.code)) if axis is not None else None
+
+        return ControlLayout(
+            self.steering.range(known.get(self.steering.code)), complete(self.throttle),
+            complete(self.brake), complete(self.pedals), self.gear)
+
+
+def reported(axes: Mapping[int, float], layout: ControlLayout,
+             known: Container[int] = ()) -> dict[int, float]:
+    """
+    Keep the axes that the device has really reported.
+
+    Drivers show exactly 0 until an axis first moves, which on a pedal that rests elsewhere
+    would be half or full throttle; such an axis is left out and so counts as at rest.
+
+    :param axes: raw value by code.
+    :param layout: the device's calibrated axes.
+    :param known: axes that have reported before, whose 0 is real.
+    """
+    rests = {axis.code: axis.rest for axis in layout.ranges}
+    return {code: value for code, value in axes.items()
+            if value != 0.0 or code in known or rests.get(code, 0.0) == 0.0}
+
+
+def joy_state(axes: Mapping[int, float], pressed: Iterable[int],
+              limits: Mapping[int, tuple[float, float]], buttons: Iterable[int]) -> JoyState:
+    """
+    Give what the `joy` node would publish for a device, without its deadzone.
+
+    Axes stand in the order of their codes without the hats, turned so that left and up are
+    positive; buttons in the order of their codes, those from BTN_JOYSTICK on first.
+
+    :param axes: raw value by code; an absent axis counts as in the middle.
+    :param pressed: codes of the pressed buttons.
+    :param limits: the device's minimum and maximum by axis code.
+    :param buttons: codes of all its buttons.
+    """
+    order = sorted(buttons, key=lambda code: (code < BTN_JOYSTICK, code))
+    down = set(pressed)
+    values = []
+    for code, (minimum, maximum) in sorted(limits.items()):
+        if code not in HATS:
+            middle = 0.5 * (minimum + maximum)
+            values.append((middle - axes.get(code, middle)) / (maximum - middle))
+    return JoyState(tuple(values), tuple(int(code in down) for code in order))
+
+
+def normalize(raw: RawInput, layout: ControlLayout, reverse: bool = False) -> DriverCommand:
+    """
+    Map raw values linearly to (p_th, p_br, s), without further conditioning (CRG 17).
+
+    :param raw: what the device reports.
+    :param layout: the device's calibrated axes.
+    :param reverse: the gear that its buttons have chosen (`GearButtons.after`).
+    """
+    if layout.pedals is not None:
+        both = layout.pedals.deflection(raw)
+        throttle, brake = max(0.0, both), max(0.0, -both)
+    else:
+        throttle = layout.throttle.travel(raw) if layout.throttle else 0.0
+        brake = layout.brake.travel(raw) if layout.brake else 0.0
+    return DriverCommand(throttle, brake, layout.steering.deflection(raw), reverse)

@@ -1,0 +1,177 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""driver_node: one human's input, normalised and filtered in simulation time (CRG III-C1)."""
+
+import select
+import threading
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Joy
+from std_msgs.msg import String
+
+from crgame_ros.driver.device_map import load_device_map
+from crgame_ros.driver.source import DriverSource, JoyDriver, parse_source
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.live_driver import live_driver
+from crgame_ros.ros.messages import from_time, to_joy, to_time
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.spinning import spin
+from crgame_ros.simulation.documents import GameDocument, parse_game_document
+
+DEVICE_POLL_S = 0.02
+
+
+class DriverNode(Node):
+    """
+    Publishes the command of each coming cycle, and again at once when the input changes.
+
+    `/clock` of step n asks for the command that moves the vehicle from n to n + 1. A device is
+    waited for by a thread of its own, so that a key takes effect in the cycle it is pressed in.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('driver_node')
+        declare = self.declare_parameter
+        self._vehicle_id: str = declare('vehicle', 'hv0', ParameterDescriptor(
+            description='id of the human\'s vehicle', read_only=True)).value
+        self._choice: str = declare('source', '', ParameterDescriptor(
+            description='driver source instead of the game\'s: auto, idle, evdev[:NAME], '
+            'keys:FILE, joy:FILE, joy, replay:BAG', read_only=True)).value
+        self._joy_map: str = declare('joy_map', 'generic_gamepad', ParameterDescriptor(
+            description='device map for the messages of an external joy node',
+            read_only=True)).value
+        if self._choice:
+            parse_source(self._choice)
+        if self._choice == 'joy':
+            load_device_map(self._joy_map)
+        endpoints = Endpoints(self)
+        self._commands = endpoints.publisher('/<hv>/driver_command', self._vehicle_id)
+        self._raw = endpoints.publisher('/<hv>/joy', self._vehicle_id)
+        self._diagnostics = endpoints.publisher('/diagnostics')
+        self._lock = threading.Lock()
+        self._driver: DriverSource | None = None
+        self._game: GameDocument | None = None
+        self._cycle = -1
+        self._told = ''
+        self._running = True
+        self._kept = [endpoints.subscription('/scenario/game', self._on_game),
+                      endpoints.subscription('/clock', self._on_clock)]
+        self._joy_subscription = None
+        self._endpoints = endpoints
+
+    def run(self, stop: StopFlag) -> None:
+        """Serve cycles until asked to stop."""
+        watcher = threading.Thread(target=self._watch_device, name='device')
+        watcher.start()
+        try:
+            spin(self, stop)
+        finally:
+            self._running = False
+            watcher.join()
+            if self._driver is not None:
+                self._driver.close()
+
+    def _on_game(self, message: String) -> None:
+        try:
+            game = parse_game_document(message.data)
+            entry = game.vehicle(self._vehicle_id)
+            if entry is None:
+                self.get_logger().warning(f'{self._vehicle_id} takes no part in this game')
+                driver = None
+            else:
+                driver = live_driver(self._choice or entry['driver'],
+                                     '' if self._choice else entry['timeline'],
+                                     self._vehicle_id, self._joy_map)
+                self.get_logger().info(
+                    f'{self._vehicle_id}: driven by {self._choice or entry["driver"]}')
+        except CrgameError as error:
+            self.get_logger().error(str(error))
+            return
+        with self._lock:
+            if self._driver is not None:
+                self._driver.close()
+            self._driver, self._game, self._cycle = driver, game, -1
+        if isinstance(driver, JoyDriver) and self._joy_subscription is None:
+            self._joy_subscription = self._endpoints.subscription(
+                '/<hv>/joy', self._on_joy, self._vehicle_id)
+
+    def _on_clock(self, message: Clock) -> None:
+        """Begin the cycle that the clock has reached."""
+        with self._lock:
+            if self._game is None or self._driver is None:
+                return
+            scheduler = self._game.scheduler
+            cycle = scheduler.step_of_stamp(from_time(message.clock))
+            if cycle <= self._cycle:
+                return
+            self._cycle = cycle
+            self._driver.poll(time.monotonic())
+            self._publish()
+
+    def _publish(self) -> None:
+        """Publish the command of the present cycle; the lock is held."""
+        assert self._driver is not None and self._game is not None
+        self._tell_of_problem()
+        if not self._driver.connected or self._cycle < 0:
+            return
+        scheduler = self._game.scheduler
+        stamp_ns = scheduler.stamp_ns(self._cycle)
+        self._commands.publish(to_joy(self._driver.command(self._cycle, scheduler.dt_s), stamp_ns))
+        raw = self._driver.joy()
+        if raw is not None and not isinstance(self._driver, JoyDriver):
+            message = Joy(axes=list(raw.axes), buttons=list(raw.buttons))
+            message.header.stamp = to_time(stamp_ns)
+            self._raw.publish(message)
+
+    def _on_joy(self, message: Joy) -> None:
+        with self._lock:
+            if isinstance(self._driver, JoyDriver):
+                self._driver.receive(message.axes, message.buttons, time.monotonic())
+                if self._cycle >= 0:
+                    self._publish()
+
+    def _watch_device(self) -> None:
+        """Wait for events of the device and publish what they change at once."""
+        while self._running:
+            with self._lock:
+                descriptor = None if self._driver is None else self._driver.fileno()
+            if descriptor is None:
+                time.sleep(DEVICE_POLL_S)
+                continue
+            try:
+                select.select([descriptor], [], [], DEVICE_POLL_S)
+                with self._lock:
+                    if self._driver is not None and self._driver.poll(time.monotonic()):
+                        self._publish()
+            except (OSError, ValueError):
+                # The device went away between two looks; the driver finds it again.
+                time.sleep(DEVICE_POLL_S)
+
+    def _tell_of_problem(self) -> None:
+        """Tell once of each new trouble with the device, and of its end."""
+        assert self._driver is not None
+        problem: InputError | None = self._driver.problem
+        text = '' if problem is None else str(problem)
+        if text == self._told:
+            return
+        self._told = text
+        if text:
+            self.get_logger().warning(text)
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.ERROR if text else DiagnosticStatus.OK,
+            name=f'driver_node: {self._vehicle_id}', message=text or 'device found')
+        self._diagnostics.publish(DiagnosticArray(status=[status]))
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(DriverNode, args)
+
+
+if __name__ == '__main__':
+    main()

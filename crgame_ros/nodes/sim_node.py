@@ -1,0 +1,86 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""sim_node: paces the simulation against the wall clock (CRG algorithms 1 and 2, live)."""
+
+import os
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.ros.live_run import LiveRun, Outcome
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.sim_control import SimControl
+from crgame_ros.simulation.setup import build_setup, Setup
+
+NS_PER_S = 1_000_000_000
+# /clock starts here: ROS takes a time of zero for "no clock yet".
+FIRST_OFFSET_NS = NS_PER_S
+REALTIME_PRIORITY = 50
+
+
+class SimNode(Node):
+    """The live runner: one epoch after the other, each with its own stretch of /clock."""
+
+    def __init__(self) -> None:
+        super().__init__('sim_node')
+        self._control = SimControl(self)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self)
+
+    def run(self, stop: StopFlag) -> None:
+        """Run until the game ends or a stop is asked for."""
+        setup = self._told(build_setup(self._control.first_game()))
+        if self._control.wants_realtime_priority:
+            self._raise_priority()
+        self._control.paused = self._control.starts_paused
+        epoch, offset_ns = 0, FIRST_OFFSET_NS
+        while True:
+            run = LiveRun(self, self._executor, self._control, setup, epoch, offset_ns)
+            outcome = run.run(stop)
+            simulation = run.simulation
+            now_ns = simulation.scheduler.stamp_ns(simulation.n)
+            self.get_logger().info(
+                f'{outcome.name.lower()} at {(now_ns - offset_ns) / NS_PER_S:.2f} s '
+                f'(n = {simulation.n})')
+            run.destroy()
+            if outcome is not Outcome.RESET:
+                return
+            self._control.reset_wanted = False
+            setup = self._next_setup(setup)
+            epoch += 1
+            offset_ns = (now_ns // NS_PER_S + 2) * NS_PER_S
+
+    def _next_setup(self, present: Setup) -> Setup:
+        """Load what the parameters name now; keep the present game if that is unusable."""
+        try:
+            return self._told(build_setup(self._control.next_game()))
+        except CrgameError as error:
+            self.get_logger().error(f'{error}; the present game starts again')
+            return present
+
+    def _told(self, setup: Setup) -> Setup:
+        for notice in setup.loaded.notices:
+            self.get_logger().info(notice)
+        self.get_logger().info(
+            f'{setup.loaded.benchmark_id}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s), '
+            f'{len(setup.obstacles.descriptions)} objects, '
+            f'{1.0 / setup.scheduler.dt_s:g} Hz, tick {setup.scheduler.time_step_s:g} s')
+        return setup
+
+    def _raise_priority(self) -> None:
+        try:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(REALTIME_PRIORITY))
+        except PermissionError:
+            self.get_logger().warning(
+                'real-time priority refused by the system: set rtprio in '
+                '/etc/security/limits.d, or run without realtime_priority')
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(SimNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,100 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""timesync_node: the time-sync supervisor; computes CRG table I live and orders frame skipping."""
+
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from std_msgs.msg import Bool
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.spinning import poll
+from crgame_ros.scenario.game import TimingSpec
+from crgame_ros.simulation.documents import GameDocument, parse_game_document
+from crgame_ros.timing.cycle_rows import CycleTable
+from crgame_ros.timing.frame_skipping import FrameSkipping
+from crgame_ros.timing.timing_metrics import TimingMetrics
+
+PERIOD_S = 0.02
+REPORT_S = 1.0
+
+
+class TimesyncNode(Node):
+    """Reads every cycle that sim_node measured."""
+
+    def __init__(self) -> None:
+        super().__init__('timesync_node')
+        endpoints = Endpoints(self)
+        self._cycles = endpoints.polled('/timing/cycle')
+        self._games = endpoints.polled('/scenario/game')
+        self._diagnostics = endpoints.publisher('/diagnostics')
+        self._orders = endpoints.publisher('/timing/frame_skip')
+        self._game: GameDocument | None = None
+        self._metrics: TimingMetrics | None = None
+        self._skipping = FrameSkipping(TimingSpec())
+        self._report_s = 0.0
+
+    def run(self, stop: StopFlag) -> None:
+        """Supervise until asked to stop."""
+        poll(self, stop, PERIOD_S, self._work)
+
+    def _work(self) -> None:
+        message = self._games.latest()
+        if message is not None:
+            self._begin(message.data)
+        while (message := self._cycles.take()) is not None:
+            table = CycleTable.from_message(message.layout.dim[1].label, message.data)
+            if self._game is not None and self._metrics is not None \
+                    and table.epoch == self._game.epoch:
+                self._metrics.add_rows(table.timing_rows())
+                self._order(table.column('cumulative_error_s')[-1])
+        if self._metrics is not None and time.monotonic() - self._report_s > REPORT_S:
+            self._report_s = time.monotonic()
+            self._report(self._metrics)
+
+    def _begin(self, text: str) -> None:
+        try:
+            self._game = parse_game_document(text)
+            self._metrics = TimingMetrics(self._game.scheduler.dt_s)
+            self._skipping = FrameSkipping(TimingSpec(**self._game.content['timing']))
+        except (CrgameError, TypeError) as error:
+            self.get_logger().error(str(error))
+
+    def _order(self, lag_s: float) -> None:
+        """Order frame skipping, or its end (CRG III-A2a, mechanism 2)."""
+        if self._skipping.update(float(lag_s), time.monotonic()):
+            self._orders.publish(Bool(data=self._skipping.active))
+
+    def _report(self, metrics: TimingMetrics) -> None:
+        if metrics.cycles < 2:
+            return
+        summary = metrics.summary()
+        late = summary.worst_lag_ms > 10.0 * metrics.dt_s * 1e3
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if late or self._skipping.active else DiagnosticStatus.OK,
+            name='timesync_node: table I',
+            message=f'mean step error {summary.mean_step_error_ms:.3f} ms, '
+            f'worst lag {summary.worst_lag_ms:.1f} ms, timeouts {summary.timeout_ratio:.2%}')
+        values = summary.as_dict()
+        ratios = values.pop('real_time_ratio')
+        values.update({f'real_time_ratio_{key}': value for key, value in ratios.items()})
+        values['frame_skipping'] = self._skipping.active
+        values['frame_skip_orders'] = self._skipping.orders
+        status.values = [
+            KeyValue(key=key, value=f'{value:.6g}' if isinstance(value, float) else str(value))
+            for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(TimesyncNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The adapter that every planner runs behind: its failures become braking plans."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import re
+
+from crgame_ros.errors import CrgameError, PlanningError
+from crgame_ros.planner.braking import braking_plan
+from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.plan_check import check_start
+
+Clock = Callable[[], float]
+
+
+@dataclass
+class PlannerStatistics:
+    """
+    What a planner did so far.
+
+    :param plans: answers given, braking plans included.
+    :param fallbacks: braking plans given.
+    :param reasons: how often each reason for braking occurred, numbers replaced by `#`.
+    :param durations_s: duration of each call; empty without a clock [s]
+    """
+
+    plans: int = 0
+    fallbacks: int = 0
+    reasons: Counter[str] = field(default_factory=Counter)
+    durations_s: list[float] = field(default_factory=list)
+
+
+class PlannerAdapter:
+    """
+    Run a planner so that it always answers.
+
+    Any exception of its `setup` or `plan`, and any plan that has the wrong stamp, numbers that
+    are not finite or another first state than the request, is replaced by a braking plan along
+    the last one (`Plan.fallback` is set) and counted. Exits and interrupts pass.
+
+    :param planner: the planner.
+    :param clock: seconds from a steady clock, to time each call; None measures nothing.
+    :param deceleration: of braking plans [m/s^2]
+    """
+
+    def __init__(self, planner: Planner, clock: Clock | None = None,
+                 deceleration: float = 4.0) -> None:
+        self.planner = planner
+        self.statistics = PlannerStatistics()
+        self.last_reason: str | None = None
+        self._clock = clock
+        self._deceleration = deceleration
+        self._setup_failure: str | None = 'the planner was not set up'
+        self._last_plan: Plan | None = None
+
+    def setup(self, context: PlannerContext) -> str | None:
+        """
+        Set the planner up.
+
+        :return: why it failed, or None; until the next setup it is then not asked for plans.
+        """
+        self._vehicle = context.vehicle
+        self._last_plan = None
+        self._setup_failure = None
+        self.last_reason = None
+        try:
+            self.planner.setup(context)
+        except Exception as error:
+            self._setup_failure = self.last_reason = f'setup failed: {describe(error)}'
+        return self._setup_failure
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """
+        Answer a request: with the planner's plan or by braking.
+
+        :raises CrgameError: if `setup` was never called.
+        """
+        if not hasattr(self, '_vehicle'):
+            raise CrgameError(f'planner {self.planner.name} was asked for a plan before its setup')
+        start = self._clock() if self._clock else 0.0
+        plan, reason = self._ask(request)
+        if plan is None:
+            plan = braking_plan(request, self._last_plan, self._vehicle, self._deceleration)
+        if self._clock:
+            self.statistics.durations_s.append(self._clock() - start)
+        self.last_reason = reason
+        self.statistics.plans += 1
+        if reason is not None:
+            self.statistics.fallbacks += 1
+            self.statistics.reasons[re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', reason)] += 1
+        self._last_plan = plan
+        return plan
+
+    def _ask(self, request: PlanRequest) -> tuple[Plan | None, str | None]:
+        if self._setup_failure is not None:
+            return None, self._setup_failure
+        try:
+            plan = self.planner.plan(request)
+            if not isinstance(plan, Plan):
+                return None, f'the planner returned a {type(plan).__name__}, not a Plan'
+            reason = check_start(plan, request.ego, request.stamp_ns)
+        except Exception as error:
+            return None, describe(error)
+        return (plan, None) if reason is None else (None, reason)
+
+
+def describe(error: Exception) -> str:
+    """Put an exception into one line; unexpected ones with their type."""
+    text = ' '.join(str(error).split())
+    if isinstance(error, PlanningError):
+        return text
+    return f'{type(error).__name__}: {text}' if text else type(error).__name__

@@ -1,0 +1,56 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A planner that holds its speed, whatever happens: the simplest opponent."""
+
+import math
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from crgame_ros.geometry.polyline import ReferencePath
+from crgame_ros.planner.interface import Plan, PlannerContext, PlanRequest
+from crgame_ros.planner.path_following import PathFollower
+from crgame_ros.planner.path_planner import check_positive, PathPlanner
+from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+
+class ConstantVelocityPlanner(PathPlanner):
+    """
+    Hold the speed of the request along the reference path; obstacles are ignored.
+
+    :param path: `lane` follows the reference path, `straight` goes straight ahead.
+    :param horizon: length of a plan [s]
+    """
+
+    name: ClassVar[str] = 'constant-velocity'
+
+    def __init__(self, path: Literal['lane', 'straight'] = 'lane', horizon: float = 3.0) -> None:
+        check_positive(self.name, horizon=horizon)
+        self._straight = path == 'straight'
+        self._horizon = horizon
+
+    def setup(self, context: PlannerContext) -> None:
+        """Plan the path; going straight needs none."""
+        self._context = context
+        if not self._straight:
+            super().setup(context)
+
+    def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
+        """Need nothing but the path."""
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Hold the speed."""
+        steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
+        if self._straight:
+            ego = request.ego
+            ahead = np.array([[0.0], [abs(ego.speed) * self._horizon + 10.0]])
+            line = (ego.x, ego.y) + ahead * (math.cos(ego.yaw), math.sin(ego.yaw))
+            follower = PathFollower(ReferencePath.from_polyline(line), self._context.vehicle)
+            position = follower.locate(ego.x, ego.y, ego.yaw, 0.0)
+        else:
+            position = self.locate(request)
+            follower = self.follower
+        states = follower.drive(request.ego, position, steps, request.time_step_s,
+                                lambda i, s, speed: 0.0)
+        return self.answer(request, states)

@@ -1,0 +1,224 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The default planner: the Intelligent Driver Model on the reference path."""
+
+from collections.abc import Sequence
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from crgame_ros.planner.interface import Plan, PlanRequest
+from crgame_ros.planner.obstacles import Corridor, ObstacleProjector, PathObstacles
+from crgame_ros.planner.path_following import Longitudinal, PathPosition
+from crgame_ros.planner.path_planner import check_positive, PathPlanner
+from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds
+from crgame_ros.planner.stop_lines import StopLines
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+EXPONENT = 4
+LINE_GAP = 0.5
+CLOSEST = 0.1
+STANDING = 0.1
+# A standing vehicle starts when the model wants at least this share of a; it stops below it.
+START_SHARE = 0.2
+# Who may still come into the way is answered less hard than who is in the way [m/s^2].
+ANTICIPATION_LIMIT = 3.0
+PASSING_MARGIN_S = 0.5
+PASSING_MARGIN = 2.0
+
+
+class IdmParameters(NamedTuple):
+    """
+    Parameters of the model, in the notation of CRG reference 10.
+
+    :param time_headway: T [s]
+    :param s0: gap at standstill [m]
+    :param a: maximum acceleration [m/s^2]
+    :param b: comfortable deceleration [m/s^2]
+    :param b_max: hardest deceleration [m/s^2]
+    """
+
+    time_headway: float
+    s0: float
+    a: float
+    b: float
+    b_max: float
+
+
+class Leader(NamedTuple):
+    """
+    One obstacle on the path over the steps of a plan.
+
+    :param rear: arc length of its rear at each step [m]
+    :param center: of its centre [m]
+    :param speed: along the path [m/s]
+    :param blocking: whether it is in the corridor.
+    :param coming: whether it gets there later.
+    """
+
+    rear: Sequence[float]
+    center: Sequence[float]
+    speed: Sequence[float]
+    blocking: Sequence[bool]
+    coming: Sequence[bool]
+
+
+def free_acceleration(speed: float, desired: float, model: IdmParameters) -> float:
+    """Accelerate on a free road, a (1 - (v / v0)^4); not below -b where v exceeds v0 [m/s^2]."""
+    return max(model.a * (1.0 - (speed / desired) ** EXPONENT), -model.b)
+
+
+def interaction(speed: float, gap: float, leader_speed: float, model: IdmParameters) -> float:
+    """
+    Give the interaction term -a (s* / s)^2 of the IDM (CRG reference 10) [m/s^2].
+
+    The desired gap is s* = s0 + max(0, v T + v dv / (2 sqrt(a b))) with dv = v - v_leader.
+
+    :param gap: s, bumper to bumper [m]
+    """
+    closing = speed * (speed - leader_speed) / (2.0 * math.sqrt(model.a * model.b))
+    wanted = model.s0 + max(0.0, speed * model.time_headway + closing)
+    return -model.a * (wanted / max(gap, CLOSEST)) ** 2
+
+
+class IdmPlanner(PathPlanner):
+    """
+    Follow the reference path with the Intelligent Driver Model (Treiber, CRG reference 10).
+
+    At each step of the horizon a = a0 (1 - (v / v0)^4 - (s* / s)^2) with the nearest obstacle
+    that the request predicts to be in the corridor then; red lights, stop signs and the end of
+    the road count as standing obstacles; curves and speed limits bound the speed.
+
+    :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
+    :param time_headway: T [s]
+    :param s0: gap at standstill [m]
+    :param a: maximum acceleration [m/s^2]
+    :param b: comfortable deceleration [m/s^2]
+    :param b_max: hardest deceleration [m/s^2]
+    :param horizon: length of a plan [s]
+    :param lateral_acceleration: comfortable in curves [m/s^2]
+    :param lateral_margin: distance to the side below which an obstacle is in the way [m]
+    """
+
+    name: ClassVar[str] = 'idm'
+
+    def __init__(self, v0: float | None = None, time_headway: float = 1.5, s0: float = 2.0,
+                 a: float = 1.5, b: float = 2.0, b_max: float = 8.0, horizon: float = 3.0,
+                 lateral_acceleration: float = 2.5, lateral_margin: float = 0.3) -> None:
+        check_positive(self.name, v0=v0, time_headway=time_headway, s0=s0, a=a, b=b, b_max=b_max,
+                       horizon=horizon, lateral_acceleration=lateral_acceleration,
+                       lateral_margin=lateral_margin)
+        self._model = IdmParameters(time_headway, s0, a, b, b_max)
+        self._v0 = v0
+        self._horizon = horizon
+        self._lateral_acceleration = lateral_acceleration
+        self._lateral_margin = lateral_margin
+
+    def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
+        """Compute the speeds along a new path and find its stop lines."""
+        context = self._context
+        desired = desired_speeds(driving, self._v0, default_speed(context.planning_problem))
+        self._desired: list[float] = np.minimum(desired, vehicle.max_speed).tolist()
+        self._admissible: list[float] = admissible_speeds(
+            driving, desired, vehicle, self._lateral_acceleration, self._model.b).tolist()
+        self._stop_lines = StopLines(context.scenario, driving, self._model.b_max,
+                                     self._model.b + 1.0)
+        self._projector = ObstacleProjector(context.objects)
+        self._front = vehicle.rear_to_center + 0.5 * vehicle.length
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Plan over the horizon; see the class."""
+        position = self.locate(request)
+        steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
+        obstacles = self._obstacles(request, position, steps)
+        leaders = _leaders(obstacles, request, position.s, self._context.vehicle)
+        states = self.follower.drive(
+            request.ego, position, steps, request.time_step_s,
+            self._longitudinal(request, position, leaders))
+        return self.answer(request, states)
+
+    def target_speed(self, request: PlanRequest, time_s: float) -> float:
+        """
+        Give the speed that the model reaches after a time, for planners that need a target.
+
+        :param time_s: at most the horizon [s]
+        """
+        states = self.plan(request).states
+        return float(states[min(round(time_s / request.time_step_s), len(states) - 1), 3])
+
+    def _obstacles(self, request: PlanRequest, position: PathPosition,
+                   steps: int) -> PathObstacles:
+        speed = max(request.ego.speed, 0.0)
+        model = self._model
+        corridor = Corridor(
+            position.s, position.d, self.follower.correction_length(position, speed),
+            40.0 + speed * (model.time_headway + self._horizon) + speed ** 2 / (2.0 * model.b),
+            0.5 * self._context.vehicle.width + self._lateral_margin, self._front)
+        return self._projector.project(self._driving.path, corridor, request, steps + 1)
+
+    def _longitudinal(self, request: PlanRequest, position: PathPosition,
+                      leaders: list[Leader]) -> Longitudinal:
+        model, dt_s = self._model, request.time_step_s
+        front, middle = self._front, self._context.vehicle.rear_to_center
+        halts = [self._driving.end_s]
+        line = self._stop_lines.halt_before(
+            request.k, position.s + front, max(request.ego.speed, 0.0))
+        if line is not None:
+            halts.append(line)
+        # A standing obstacle is halted at with the gap s0, a line with LINE_GAP.
+        halt = min(halts) + model.s0 - LINE_GAP
+
+        def acceleration(i: int, s: float, speed: float) -> float:
+            if speed < 0.0:
+                return min(model.b, -speed / dt_s)
+            free = free_acceleration(speed, self._at(self._desired, s), model)
+            wanted = free + interaction(speed, halt - s - front, 0.0, model)
+            for leader in leaders:
+                if leader.center[i] <= s + middle:
+                    continue
+                gap = leader.rear[i] - s - front
+                if leader.blocking[i]:
+                    wanted = min(wanted, free + interaction(speed, gap, leader.speed[i], model))
+                elif leader.coming[i]:
+                    wanted = min(wanted, max(-ANTICIPATION_LIMIT, free + interaction(
+                        speed, gap, leader.speed[i], model)))
+            bound = (self._at(self._admissible, s + speed * dt_s) - speed) / dt_s
+            wanted = min(wanted, max(bound, -2.0 * model.b))
+            if speed < STANDING and wanted < START_SHARE * model.a:
+                return -speed / dt_s
+            return max(wanted, -model.b_max)
+
+        return acceleration
+
+    def _at(self, row: list[float], s: float) -> float:
+        index = min(max(int(s / self._driving.path.step), 0), len(row) - 1)
+        return row[index]
+
+
+def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
+             vehicle: VehicleParameters) -> list[Leader]:
+    """List the obstacles in the way, and those that come into it before the ego has passed."""
+    result = []
+    speed = max(request.ego.speed, 0.0)
+    ego_rear = s + vehicle.rear_to_center - 0.5 * vehicle.length
+    ego_front = ego_rear + vehicle.length
+    for column in range(len(obstacles.ids)):
+        blocking = obstacles.blocking[:, column]
+        coming = np.logical_or.accumulate(blocking[::-1])[::-1]
+        rear = obstacles.rear[:, column]
+        if not blocking[0]:
+            steps = np.flatnonzero(blocking)
+            first, last = steps[0], steps[-1]
+            entry_s = request.time_step_s * first
+            passed = ego_rear + speed * entry_s > obstacles.front[first, column] + PASSING_MARGIN
+            leaves = last < len(blocking) - 1 and speed > 0.0
+            arrival_s = (rear[last] - ego_front) / speed if leaves else 0.0
+            gone = leaves and arrival_s > request.time_step_s * last + PASSING_MARGIN_S
+            if passed or gone:
+                coming = np.zeros_like(coming)
+        result.append(Leader(rear.tolist(), obstacles.center[:, column].tolist(),
+                             obstacles.speed[:, column].tolist(), blocking.tolist(),
+                             coming.tolist()))
+    return result

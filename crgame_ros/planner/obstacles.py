@@ -1,0 +1,199 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The obstacles of a request, seen along a path: which of them are in the way, and when."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import PlanningError
+from crgame_ros.geometry.polyline import ReferencePath
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.planner.interface import PlanRequest
+from crgame_ros.scenario.objects import ObjectDescription
+
+Array = NDArray[np.float64]
+
+ANCHORS = 5
+CIRCLE_CORNERS = 8
+
+
+@dataclass(frozen=True)
+class Corridor:
+    """
+    What the ego sweeps along its path.
+
+    :param s: arc length of the ego's rear axle now [m]
+    :param d: its offset to the left now [m]
+    :param return_length: length over which it takes the offset back [m]
+    :param ahead: how far obstacles matter [m]
+    :param half_width: half the ego's width and the margin [m]
+    :param front: distance from the rear axle to the front bumper [m]
+    """
+
+    s: float
+    d: float
+    return_length: float
+    ahead: float
+    half_width: float
+    front: float
+
+    def bounds(self, path: ReferencePath, s: Array) -> tuple[Array, Array]:
+        """Give the least and the greatest offset that the ego covers at arc lengths s [m]."""
+        u = np.clip((s - self.front - self.s) / max(self.return_length, 1.0), 0.0, 1.0)
+        offset = self.d * (1.0 - u * u * (3.0 - 2.0 * u))
+        # In a curve the front swings out of the rear axle's path.
+        swing = path.pose_at(s - 0.5 * self.front)[..., 3] * (0.5 * self.front ** 2)
+        swing = np.clip(swing, -1.0, 1.0)
+        return (offset - self.half_width - np.maximum(swing, 0.0),
+                offset + self.half_width - np.minimum(swing, 0.0))
+
+
+@dataclass(frozen=True)
+class PathObstacles:
+    """
+    The K obstacles that get into the corridor, over S steps from now.
+
+    :param ids: (K) names.
+    :param rear: (S, K) arc length of the hindmost point [m]
+    :param front: (S, K) arc length of the foremost point [m]
+    :param center: (S, K) arc length of the centre [m]
+    :param speed: (S, K) speed along the path [m/s]
+    :param blocking: (S, K) True while the footprint overlaps the corridor.
+    """
+
+    ids: tuple[str, ...]
+    rear: Array
+    front: Array
+    center: Array
+    speed: Array
+    blocking: NDArray[np.bool_]
+
+
+class ObstacleProjector:
+    """
+    Project the predicted footprints of obstacles on a path.
+
+    :param objects: description of everything that may appear.
+    """
+
+    def __init__(self, objects: Mapping[str, ObjectDescription]) -> None:
+        self._objects = objects
+        self._ids: tuple[str, ...] | None = None
+        self._outlines = np.empty((0, 4, 2))
+        self._radii = np.empty(0)
+
+    def project(self, path: ReferencePath, corridor: Corridor, request: PlanRequest,
+                steps: int) -> PathObstacles:
+        """
+        Find the obstacles that are or get in the way.
+
+        :param request: with poses over P points; beyond them objects keep their velocity.
+        :param steps: number S of points wanted, the first being now.
+        :raises PlanningError: if an obstacle was never described.
+        """
+        self._describe(request.obstacle_ids)
+        poses, velocities = _prolong(request, steps)
+        near = self._near(path, corridor, poses)
+        poses, velocities = poses[:, near], velocities[:, near]
+        if not len(near):
+            nothing = np.empty((steps, 0))
+            return PathObstacles((), nothing, nothing, nothing, nothing, nothing.astype(bool))
+        s, d = _project_tracks(path, corridor, poses)
+        radius = self._radii[near]
+        low, high = corridor.bounds(path, s)
+        with np.errstate(invalid='ignore'):
+            close = ((d - radius < high) & (d + radius > low)
+                     & (s > corridor.s - 30.0) & (s < corridor.s + corridor.ahead + radius))
+        kept = np.flatnonzero(close.any(axis=0))
+        near = near[kept]
+        extent = _extents(path, poses[:, kept], s[:, kept], self._outlines[near])
+        low, high = corridor.bounds(path, extent[0])
+        with np.errstate(invalid='ignore'):
+            blocking = close[:, kept] & (extent[2] < high) & (extent[3] > low)
+        hit = np.flatnonzero(blocking.any(axis=0))
+        heading = path.pose_at(s[:, kept[hit]])[..., 2]
+        velocity = velocities[:, kept[hit]]
+        speed = velocity[..., 0] * np.cos(heading) + velocity[..., 1] * np.sin(heading)
+        names = tuple(request.obstacle_ids[i] for i in near[hit])
+        return PathObstacles(names, extent[0][:, hit], extent[1][:, hit], s[:, kept[hit]],
+                             np.nan_to_num(speed), blocking[:, hit])
+
+    def _describe(self, ids: tuple[str, ...]) -> None:
+        if ids == self._ids:
+            return
+        unknown = [name for name in ids if name not in self._objects]
+        if unknown:
+            raise PlanningError(f'the request names "{unknown[0]}", which was never described')
+        outlines = [outline(self._objects[name].shape) for name in ids]
+        corners = max((len(points) for points in outlines), default=4)
+        self._outlines = np.array([np.resize(points, (corners, 2)) for points in outlines]
+                                  ).reshape(len(ids), corners, 2)
+        self._radii = np.array([self._objects[name].shape.radius for name in ids])
+        self._ids = ids
+
+    def _near(self, path: ReferencePath, corridor: Corridor, poses: Array) -> NDArray[np.intp]:
+        """Drop the obstacles that cannot reach the corridor: absent, or too far to the side."""
+        present = np.isfinite(poses[..., 0])
+        first = np.argmax(present, axis=0)
+        origin = np.take_along_axis(poses, first[None, :, None], axis=0)[0, :, :2]
+        moved = np.hypot(*np.moveaxis(poses[..., :2] - origin, -1, 0))
+        reach = np.nanmax(np.where(present, moved, 0.0), axis=0, initial=0.0)
+        low = max(0, int((corridor.s - 30.0) / path.step))
+        line = path.points[low:int((corridor.s + corridor.ahead) / path.step) + 2:8]
+        distance = np.hypot(origin[:, 0, None] - line[None, :, 0],
+                            origin[:, 1, None] - line[None, :, 1])
+        limit = reach + self._radii + corridor.half_width + abs(corridor.d) + 6.0
+        nearest = np.where(present.any(axis=0), distance.min(axis=1), np.inf)
+        return np.flatnonzero(nearest < limit)
+
+
+def outline(shape: Shape) -> Array:
+    """Give the corners (n, 2) of a footprint around its centre [m]; of a circle, eight."""
+    if shape.kind == 'polygon':
+        return np.array(shape.vertices, dtype=np.float64)
+    if shape.kind == 'circle':
+        angle = 2.0 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
+        return shape.radius * np.column_stack((np.cos(angle), np.sin(angle)))
+    return 0.5 * np.array([[shape.length, shape.width], [shape.length, -shape.width],
+                           [-shape.length, -shape.width], [-shape.length, shape.width]])
+
+
+def _prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
+    poses, velocities = request.obstacle_poses, request.obstacle_velocities
+    given = len(poses)
+    if given >= steps:
+        return poses[:steps], velocities[:steps]
+    time_s = request.time_step_s * np.arange(1, steps - given + 1)[:, None, None]
+    last = np.nan_to_num(velocities[-1:])
+    return (np.concatenate((poses, poses[-1:] + time_s * last)),
+            np.concatenate((velocities, np.repeat(velocities[-1:], steps - given, axis=0))))
+
+
+def _project_tracks(path: ReferencePath, corridor: Corridor,
+                    poses: Array) -> tuple[Array, Array]:
+    """Project centres (S, K, 3): searched at a few steps, refined in between."""
+    steps, count = poses.shape[:2]
+    anchors = np.unique(np.linspace(0, steps - 1, ANCHORS).astype(int))
+    found, _ = path.project(np.nan_to_num(poses[anchors, :, :2]), corridor.s - 30.0,
+                            corridor.s + corridor.ahead + 40.0)
+    position = np.interp(np.arange(steps), anchors, np.arange(len(anchors)))
+    index = np.minimum(position.astype(int), max(len(anchors) - 2, 0))
+    fraction = (position - index)[:, None]
+    after = np.minimum(index + 1, len(anchors) - 1)
+    guess = found[index] * (1.0 - fraction) + found[after] * fraction
+    s, d = path.refine(poses[..., :2].reshape(-1, 2), guess.reshape(-1), 2)
+    return s.reshape(steps, count), d.reshape(steps, count)
+
+
+def _extents(path: ReferencePath, poses: Array, s: Array, outlines: Array) -> Array:
+    """Project footprints: least and greatest s, least and greatest d, (4, S, K)."""
+    cos, sin = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
+    x = poses[..., 0, None] + cos * outlines[..., 0] - sin * outlines[..., 1]
+    y = poses[..., 1, None] + sin * outlines[..., 0] + cos * outlines[..., 1]
+    guess = np.broadcast_to(np.nan_to_num(s)[..., None], x.shape)
+    along, across = path.refine(np.column_stack((x.ravel(), y.ravel())), guess.ravel(), 2)
+    along, across = along.reshape(x.shape), across.reshape(x.shape)
+    return np.stack((along.min(-1), along.max(-1), across.min(-1), across.max(-1)))

@@ -1,0 +1,158 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Driving a kinematic single-track vehicle along a path, step by step."""
+
+from collections.abc import Callable
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import PlanningError
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.polyline import ReferencePath
+from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+
+Array = NDArray[np.float64]
+# Acceleration [m/s^2] as a function of step, arc length [m] and speed [m/s].
+Longitudinal = Callable[[int, float, float], float]
+
+MAX_HEADING_ERROR = 2.0
+# Shares of the vehicle's limits that corrections may use; the path's own curvature needs the rest.
+RATE_SHARE = 0.6
+LATERAL_ACCELERATION = 1.5
+CORRECTION_CURVATURE = 0.12
+SHORTEST_CORRECTION = 6.0
+CORRECTION_TIME = 2.5
+
+
+class PathPosition(NamedTuple):
+    """Arc length s [m], offset d to the left [m] and heading error [rad] against a path."""
+
+    s: float
+    d: float
+    heading_error: float
+
+
+class PathFollower:
+    """
+    Steer a vehicle along a path within its steering limits.
+
+    The offset follows the third derivative that a quintic d(l) to the path has at its start,
+    d''' = -60 d / L^3 - 36 d' / L^2 - 9 d'' / L, evaluated anew at each step: the feedback form
+    of replanning the quintic. Its poles (-3.6, -2.7 ± 3.1i) / L are well damped, it needs no
+    memory between ticks, and every step is a step of the KS model (CRG 2-4), so that yaw,
+    steering angle, speed and position agree.
+
+    :param path: the path of the rear axle.
+    :param vehicle: its parameters.
+    """
+
+    def __init__(self, path: ReferencePath, vehicle: VehicleParameters) -> None:
+        self.path = path
+        self._vehicle = vehicle
+        self._rows = path.rows
+        self._last_index = len(path.heading) - 2
+
+    def locate(self, x: float, y: float, yaw: float, guess: float) -> PathPosition:
+        """Project a pose whose arc length is known to a few metres [m]."""
+        xs, ys, headings, curvatures = self._rows
+        step = self.path.step
+        s = guess
+        for last in (False, False, True):
+            index = min(max(int(s / step), 0), self._last_index)
+            f = s / step - index
+            heading = headings[index] + f * (headings[index + 1] - headings[index])
+            curvature = curvatures[index]
+            cos, sin = math.cos(heading), math.sin(heading)
+            dx = x - xs[index] - f * (xs[index + 1] - xs[index])
+            dy = y - ys[index] - f * (ys[index + 1] - ys[index])
+            d = dy * cos - dx * sin
+            along = dx * cos + dy * sin
+            s += along if last else along / max(0.3, 1.0 - curvature * d)
+        return PathPosition(s, d, wrap_pi(yaw - heading))
+
+    def curvature(self, s: float) -> float:
+        """Interpolate the curvature of the path [1/m]."""
+        index = min(max(int(s / self.path.step), 0), self._last_index)
+        f = min(max(s / self.path.step - index, 0.0), 1.0)
+        row = self._rows[3]
+        return row[index] + f * (row[index + 1] - row[index])
+
+    def correction_length(self, position: PathPosition, speed: float) -> float:
+        """Choose the length L over which the offset is taken back [m]."""
+        d, error = abs(position.d), min(abs(position.heading_error), 1.2)
+        rate = RATE_SHARE * self._vehicle.max_steering_rate
+        jerk = speed * self._vehicle.wheelbase / max(rate, 1e-3)
+        return max(
+            SHORTEST_CORRECTION, CORRECTION_TIME * speed,
+            speed * math.sqrt(5.8 * d / LATERAL_ACCELERATION),
+            math.sqrt(5.8 * d / CORRECTION_CURVATURE),
+            (60.0 * d * jerk) ** (1.0 / 3.0), math.sqrt(36.0 * error * jerk),
+            6.0 * error / CORRECTION_CURVATURE)
+
+    def drive(self, ego: VehicleState, start: PathPosition, steps: int, dt_s: float,
+              longitudinal: Longitudinal) -> Array:
+        """
+        Drive along the path.
+
+        :param ego: state at the start, kept as row 0 in all its columns.
+        :param start: where the ego is on the path.
+        :param steps: number of steps of dt_s [s].
+        :param longitudinal: acceleration wanted at each step; the speed stops at 0.
+        :return: (steps + 1, 8) rear-axle states; yaw continues that of the ego.
+        :raises PlanningError: if the ego faces away from the path.
+        """
+        if abs(start.heading_error) > MAX_HEADING_ERROR:
+            raise PlanningError(
+                f'the vehicle faces away from its path by {start.heading_error:.2f} rad')
+        wheelbase = self._vehicle.wheelbase
+        length = self.correction_length(start, abs(ego.speed))
+        gains = (60.0 / length ** 3, 36.0 / length ** 2, 9.0 / length)
+        x, y, yaw, speed, steering = ego[:5]
+        states = np.empty((steps + 1, STATE_WIDTH))
+        states[0] = ego
+        position = start
+        for i in range(steps):
+            if i:
+                guess = position.s + moved
+                position = self.locate(x, y, yaw, guess)
+            wanted = longitudinal(i, position.s, speed)
+            # A vehicle that brakes to a stop inside the step stands for the rest of it.
+            moving = dt_s
+            if speed * wanted < 0.0:
+                moving = min(dt_s, -speed / wanted)
+            moved = (speed + 0.5 * wanted * moving) * moving
+            rate = self._steering_rate(position, speed, steering, moved, moving, gains)
+            before = speed
+            x, y, yaw, speed, steering = integrate(
+                x, y, yaw, speed, steering, wanted, rate, wheelbase, moving)
+            if moving < dt_s:
+                speed = 0.0
+            states[i + 1] = (x, y, yaw, speed, steering, 0.0,
+                             speed * math.tan(steering) / wheelbase, 0.0)
+            if i:
+                states[i, StateColumn.ACCELERATION] = (speed - before) / dt_s
+                states[i, StateColumn.STEERING_RATE] = rate * moving / dt_s
+        return states
+
+    def _steering_rate(self, position: PathPosition, speed: float, steering: float, moved: float,
+                       time_s: float, gains: tuple[float, float, float]) -> float:
+        if abs(moved) < 1e-4 or time_s <= 0.0:
+            return 0.0
+        vehicle = self._vehicle
+        path_curvature = self.curvature(position.s)
+        curvature = math.tan(steering) / vehicle.wheelbase
+        cos = max(math.cos(position.heading_error), 0.2)
+        bend = curvature - path_curvature * cos / max(0.3, 1.0 - path_curvature * position.d)
+        third = -(gains[0] * position.d + gains[1] * math.sin(position.heading_error)
+                  + gains[2] * cos * bend)
+        change = self.curvature(position.s + moved) - path_curvature + third * moved
+        limit = vehicle.max_steering_angle
+        wanted = math.atan(vehicle.wheelbase * (curvature + change))
+        wanted = min(max(wanted, -limit), limit)
+        rate = vehicle.max_steering_rate
+        return min(max((wanted - steering) / time_s, -rate), rate)

@@ -1,0 +1,134 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a plan may be followed: the engine's grounds for refusing one."""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
+from crgame_ros.planner.interface import Plan
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import StateColumn, VehicleState
+
+Array = NDArray[np.float64]
+SHORTEST = 2
+
+
+@dataclass(frozen=True)
+class PlanTolerances:
+    """
+    How far a plan may be off, on top of the vehicle's limits.
+
+    Planners discretise, and the request may be a perceived state; the defaults admit the
+    planners that ship with the package and refuse a jump of 1 m or twice the maximum speed.
+
+    :param start_position: distance of state 0 from the request's ego [m]
+    :param start_yaw: its heading error [rad]
+    :param start_speed: its speed error [m/s]
+    :param jump: error between displacement and mean speed times step [m]
+    :param jump_share: the same as a share of the displacement [-]
+    :param speed: beyond the vehicle's speed range [m/s]
+    :param acceleration: beyond a_max, forwards and backwards [m/s^2]
+    :param lateral_acceleration: beyond friction times gravity [m/s^2]
+    :param yaw: change of heading beyond what the tightest turn allows in a step [rad]
+    :param steering: beyond the steering limit, and of a step beyond the rate limit [rad]
+    :param steering_rate_share: of the steering rate beyond its limit [-]
+    """
+
+    start_position: float = 0.5
+    start_yaw: float = 0.15
+    start_speed: float = 1.0
+    jump: float = 0.25
+    jump_share: float = 0.05
+    speed: float = 0.5
+    acceleration: float = 1.0
+    lateral_acceleration: float = 1.0
+    yaw: float = 0.03
+    steering: float = 0.03
+    steering_rate_share: float = 0.25
+
+
+DEFAULT_TOLERANCES = PlanTolerances()
+
+
+def check_start(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
+                tolerances: PlanTolerances = DEFAULT_TOLERANCES) -> str | None:
+    """
+    Check that a plan answers a request: stamp, shape, finite numbers, first state.
+
+    :return: why it is refused, or None.
+    """
+    if plan.stamp_ns != request_stamp_ns:
+        return (f'the stamp {plan.stamp_ns} ns is not that of the request, '
+                f'{request_stamp_ns} ns')
+    states = plan.states
+    if len(states) < SHORTEST:
+        return f'{len(states)} state is no plan, at least {SHORTEST} are needed'
+    if not np.isfinite(states).all():
+        row, column = np.argwhere(~np.isfinite(states))[0]
+        return f'{StateColumn(column).name.lower()} of state {row} is {states[row, column]}'
+    x, y, yaw, speed = states[0, :4].tolist()
+    distance = math.hypot(x - request_ego.x, y - request_ego.y)
+    if distance > tolerances.start_position:
+        return f'the first state is {distance:.2f} m from the vehicle'
+    if abs(wrap_pi(yaw - request_ego.yaw)) > tolerances.start_yaw:
+        return f'the first state is turned by {wrap_pi(yaw - request_ego.yaw):.2f} rad'
+    if abs(speed - request_ego.speed) > tolerances.start_speed:
+        return f'the first state is {speed - request_ego.speed:+.2f} m/s off the speed'
+    return None
+
+
+def check_plan(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
+               vehicle: VehicleParameters, time_step_s: float,
+               tolerances: PlanTolerances = DEFAULT_TOLERANCES) -> str | None:
+    """
+    Check that a plan answers a request and that the vehicle can follow it.
+
+    :param request_ego: the ego state that the planner was sent (the perceived one).
+    :param time_step_s: Delta t_c, the distance of the plan's rows [s]
+    :return: why it is refused, naming the state and the limit, or None.
+    """
+    reason = check_start(plan, request_ego, request_stamp_ns, tolerances)
+    if reason is None:
+        reason = _check_limits(plan.states, vehicle, time_step_s, tolerances)
+    return reason
+
+
+def _check_limits(states: Array, vehicle: VehicleParameters, dt_s: float,
+                  tolerances: PlanTolerances) -> str | None:
+    speed, steering = states[:, StateColumn.SPEED], states[:, StateColumn.STEERING_ANGLE]
+    change = states[1:, :5] - states[:-1, :5]
+    turn = wrap_pi_array(change[:, StateColumn.YAW])
+    mean = 0.5 * (speed[1:] + speed[:-1])
+    expected = mean * dt_s
+    middle = states[:-1, StateColumn.YAW] + 0.5 * turn
+    error = np.hypot(change[:, 0] - expected * np.cos(middle),
+                     change[:, 1] - expected * np.sin(middle))
+    covered = np.abs(expected)
+    tightest = math.tan(vehicle.max_steering_angle) / vehicle.wheelbase
+    grip = vehicle.friction * vehicle.gravity + tolerances.lateral_acceleration
+    fastest = vehicle.max_acceleration + tolerances.acceleration
+    rate = vehicle.max_steering_rate * (1.0 + tolerances.steering_rate_share)
+    checks = (
+        ('speed', speed - vehicle.max_speed, tolerances.speed, 'm/s beyond the limit'),
+        ('speed in reverse', -speed - vehicle.max_reverse_speed, tolerances.speed,
+         'm/s beyond the limit'),
+        ('jump', error, tolerances.jump + tolerances.jump_share * covered, 'm'),
+        ('acceleration', np.abs(change[:, StateColumn.SPEED]) / dt_s, fastest, 'm/s^2'),
+        ('stated acceleration', np.abs(states[1:, StateColumn.ACCELERATION]), fastest, 'm/s^2'),
+        ('lateral acceleration', np.abs(mean * turn) / dt_s, grip, 'm/s^2'),
+        ('change of heading', np.abs(turn), tightest * covered + tolerances.yaw, 'rad'),
+        ('steering angle', np.abs(steering[1:]) - vehicle.max_steering_angle,
+         tolerances.steering, 'rad beyond the limit'),
+        ('change of steering', np.abs(change[:, StateColumn.STEERING_ANGLE]),
+         rate * dt_s + tolerances.steering, 'rad'))
+    for what, values, limit, unit in checks:
+        excess = values - limit
+        worst = int(excess.argmax())
+        if excess[worst] > 0.0:
+            first = worst + (len(values) < len(states))
+            return f'{what} of {values[worst]:.2f} {unit} at state {first}'
+    return None

@@ -1,0 +1,167 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The drivable path of a planning problem: routed, smoothed, prolonged beyond the goal."""
+
+from dataclasses import dataclass
+
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.scenario import Scenario
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import CrgameError, PlanningError
+from crgame_ros.geometry.polyline import arc_length, ReferencePath
+from crgame_ros.planner.route import find_route, goal_lanelets, Route, start_lanelet
+from crgame_ros.scenario.road_network import LaneLine, RoadNetwork
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+
+Array = NDArray[np.float64]
+
+BEHIND = 30.0
+BEYOND = 250.0
+LENGTH = 1500.0
+CHANGE_TIME = 4.0
+CHANGE_MIN = 25.0
+
+
+@dataclass(frozen=True)
+class DrivingPath:
+    """
+    The path that the rear axle follows, with what the map says along it.
+
+    :param roads: the road network that it follows.
+    :param path: the smooth path; it begins some way behind the vehicle.
+    :param start_s: arc length at which the vehicle starts [m]
+    :param end_s: arc length at which the road ends; infinite if it goes on [m]
+    :param lanelets: ids of the lanelets passed.
+    :param lanelet_spans: (n, 2) arc lengths at which each is entered and left [m]
+    :param reaches_goal: True if the route leads to the goal's position.
+    """
+
+    roads: RoadNetwork
+    path: ReferencePath
+    start_s: float
+    end_s: float
+    lanelets: tuple[int, ...]
+    lanelet_spans: Array
+    reaches_goal: bool
+
+
+def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: VehicleState,
+                      vehicle: VehicleParameters, follow_lane: bool = False) -> DrivingPath:
+    """
+    Route a planning problem and make its path.
+
+    The path follows the centre lines to the goal, blends lane changes over a length that grows
+    with the speed, and goes on beyond the goal for at least 200 m: along the straightest
+    successors, then straight ahead where the map ends.
+
+    :param start: where the vehicle is (rear axle); it need not be on the road.
+    :param follow_lane: ignore the goal and follow the lane.
+    :raises PlanningError: if the scenario has no lanelets or no usable geometry.
+    """
+    if not scenario.lanelet_network.lanelets:
+        raise PlanningError('the scenario has no lanelets to follow')
+    roads = RoadNetwork(scenario.lanelet_network)
+    lanelet, s = start_lanelet(roads, start.x, start.y, start.yaw)
+    goals = frozenset[int]() if follow_lane else goal_lanelets(roads, problem)
+    route = find_route(roads, lanelet, s, goals, LENGTH)
+    change = max(CHANGE_MIN, CHANGE_TIME * abs(start.speed))
+    try:
+        line = _center_line(roads, route, s, change)
+        before = _before(roads, lanelet, line)
+        after = line[-1] + _direction(line[-3:]) * np.array([[10.0], [0.5 * BEYOND], [BEYOND]])
+        # A vehicle turns no tighter than its largest steering angle; keep a reserve to correct.
+        bound = 0.8 * np.tan(vehicle.max_steering_angle) / vehicle.wheelbase
+        path = ReferencePath.from_polyline(np.concatenate((before, line, after)),
+                                           max_curvature=float(bound))
+    except CrgameError as error:
+        raise PlanningError(f'no path along lanelet {lanelet}: {error}') from error
+    start_s = float(path.project(np.array([[start.x, start.y]]), 0.0, BEHIND + s + 20.0)[0][0])
+    end_s = float(path.length - BEYOND) if route.road_ends else np.inf
+    lanelets, spans = _spans(roads, route, path)
+    return DrivingPath(roads, path, start_s, end_s, lanelets, spans, route.goal is not None)
+
+
+def _center_line(roads: RoadNetwork, route: Route, start_s: float, change: float) -> Array:
+    """Join the centre lines of the legs, blending each lane change."""
+    parts: list[Array] = []
+    position = start_s
+    entered = 0.0
+    for index, leg in enumerate(route.legs):
+        lines = [roads.line(lanelet) for lanelet in leg]
+        points = np.concatenate([line.points for line in lines])
+        if index:
+            points = _from(points, entered)
+            position = 0.0
+        if index + 1 < len(route.legs):
+            following = roads.line(route.legs[index + 1][0])
+            s = arc_length(points)
+            first = s[-1] - (lines[-1].length if len(leg) > 1 else s[-1])
+            first = max(first, min(position, s[-1] - 5.0), 0.0)
+            # Several changes in a row share what is left of the lane.
+            share = 1 + _changes_in_row(route, index)
+            last = min(first + change, first + (s[-1] - first) / share)
+            blended, entered = _blend(points, s, following, first, last)
+            points = np.concatenate((points[s < first - 0.1], blended))
+        parts.append(points)
+    return np.concatenate(parts)
+
+
+def _changes_in_row(route: Route, index: int) -> int:
+    """Count the further lane changes that must happen beside the same stretch of road."""
+    count = 0
+    for leg in route.legs[index + 1:-1]:
+        if len(leg) > 1:
+            break
+        count += 1
+    return count
+
+
+def _blend(points: Array, s: Array, target: LaneLine, first: float,
+           last: float) -> tuple[Array, float]:
+    u = np.linspace(0.0, 1.0, max(8, int(last - first)))
+    at = first + u * (last - first)
+    here = np.column_stack((np.interp(at, s, points[:, 0]), np.interp(at, s, points[:, 1])))
+    along, _ = target.project(here)
+    there = target.poses(along, np.zeros_like(along))[:, :2]
+    weight = (u ** 3 * (10.0 - 15.0 * u + 6.0 * u ** 2))[:, None]
+    return here * (1.0 - weight) + there * weight, float(along[-1])
+
+
+def _from(points: Array, start: float) -> Array:
+    """Cut a polyline off before an arc length."""
+    return points[arc_length(points) > start + 0.5]
+
+
+def _before(roads: RoadNetwork, lanelet: int, line: Array) -> Array:
+    predecessor = roads.straightest_predecessor(lanelet)
+    points = np.empty((0, 2))
+    if predecessor is not None:
+        points = roads.line(predecessor).points[:-1]
+        ahead = arc_length(np.concatenate((points, line[:1])))
+        points = points[ahead[-1] - ahead[:-1] < BEHIND]
+    head = np.concatenate((points, line))[:3]
+    return np.concatenate((head[:1] - _direction(head) * BEHIND, points))
+
+
+def _direction(points: Array) -> Array:
+    """Give the unit vector from the first to the last of a few points."""
+    chord = points[-1] - points[0]
+    return np.asarray(chord / max(float(np.hypot(*chord)), 1e-6))
+
+
+def _spans(roads: RoadNetwork, route: Route,
+           path: ReferencePath) -> tuple[tuple[int, ...], Array]:
+    """Find where the path enters and leaves each lanelet, in order."""
+    lanelets = tuple(lanelet for leg in route.legs for lanelet in leg)
+    spans = np.empty((len(lanelets), 2))
+    at = 0.0
+    for row, lanelet in enumerate(lanelets):
+        line = roads.line(lanelet)
+        low, high = max(0.0, at - 60.0), at + line.length + 80.0
+        ends, _ = path.project(line.points[[0, -1]], low, high)
+        spans[row] = ends
+        at = max(at, float(ends[1]))
+    return lanelets, spans

@@ -1,0 +1,215 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is in a recording, for people."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+import json
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.metadata import BagTopic
+from crgame_ros.recording.reader import BagReader
+
+_GAME_TOPIC = '/scenario/game'
+_GAME_TYPE = 'std_msgs/msg/String'
+_CYCLE_TOPIC = '/timing/cycle'
+_CYCLE_TYPE = 'std_msgs/msg/Float64MultiArray'
+_GAPS_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """A topic; `rate_hz` is over the whole recording, None for fewer than two messages."""
+
+    topic: BagTopic
+    rate_hz: float | None
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Cycles `first_n` to `last_n` of an epoch that were not recorded."""
+
+    epoch: int
+    first_n: int
+    last_n: int
+
+    @property
+    def missing(self) -> int:
+        """Return the number of cycles that are missing."""
+        return self.last_n - self.first_n + 1
+
+
+@dataclass(frozen=True)
+class CycleInfo:
+    """The recorded cycles: how many, and what is missing between the first and the last."""
+
+    recorded: int
+    gaps: tuple[Gap, ...]
+
+    @property
+    def missing(self) -> int:
+        """Return the number of cycles that are missing."""
+        return sum(gap.missing for gap in self.gaps)
+
+
+@dataclass(frozen=True)
+class GameInfo:
+    """The game that was played: vehicle id and what drives it, for humans and for AVs."""
+
+    benchmark_id: str
+    humans: tuple[tuple[str, str], ...]
+    avs: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class BagInfo:
+    """
+    A recording at a glance; times are log times [ns].
+
+    :param cycles: None where `/timing/cycle` was not recorded.
+    :param game: None where `/scenario/game` was not recorded.
+    """
+
+    path: Path
+    files: tuple[Path, ...]
+    storage: str
+    size_bytes: int
+    start_ns: int
+    end_ns: int
+    complete: bool
+    notices: tuple[str, ...]
+    topics: tuple[TopicInfo, ...]
+    game: GameInfo | None
+    cycles: CycleInfo | None
+
+    @property
+    def duration_s(self) -> float:
+        """Return the time from the first to the last message [s]."""
+        return (self.end_ns - self.start_ns) / 1e9
+
+    @property
+    def message_count(self) -> int:
+        """Return the number of messages of all topics."""
+        return sum(entry.topic.message_count for entry in self.topics)
+
+
+def describe(path: Path) -> BagInfo:
+    """
+    Look through a recording.
+
+    :param path: as for `BagReader`.
+    :raises InputError: if it cannot be read, or its game or cycles are malformed.
+    """
+    with BagReader(path) as reader:
+        duration_s = (reader.end_ns - reader.start_ns) / 1e9
+        return BagInfo(
+            path=path, files=reader.files, storage=reader.storage,
+            size_bytes=sum(file.stat().st_size for file in reader.files),
+            start_ns=reader.start_ns, end_ns=reader.end_ns,
+            complete=reader.complete, notices=reader.notices,
+            topics=tuple(TopicInfo(topic, _rate_hz(topic.message_count, duration_s))
+                         for topic in reader.topics.values()),
+            game=_read_game(reader), cycles=_read_cycles(reader))
+
+
+def _rate_hz(count: int, duration_s: float) -> float | None:
+    return (count - 1) / duration_s if count > 1 and duration_s > 0 else None
+
+
+def _holds(reader: BagReader, topic: str, type_name: str) -> bool:
+    found = reader.topics.get(topic)
+    return found is not None and found.message_count > 0 and found.type_name == type_name
+
+
+def _read_game(reader: BagReader) -> GameInfo | None:
+    if not _holds(reader, _GAME_TOPIC, _GAME_TYPE):
+        return None
+    latched = reader.latched(_GAME_TOPIC)
+    try:
+        game = json.loads(latched.message.data) if latched else {}
+        return GameInfo(
+            str(game['benchmark_id']),
+            tuple((str(human['id']), str(human['driver'])) for human in game['humans']),
+            tuple((str(av['id']), str(av['planner'])) for av in game['avs']))
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f'{_GAME_TOPIC} is no game of this program ({error!r})',
+                         str(reader.path), 'record it again with the present version') from error
+
+
+def _read_cycles(reader: BagReader) -> CycleInfo | None:
+    if not _holds(reader, _CYCLE_TOPIC, _CYCLE_TYPE):
+        return None
+    cycles = np.concatenate(list(_cycle_numbers(reader)))
+    return CycleInfo(len(cycles), tuple(_find_gaps(cycles)))
+
+
+def _cycle_numbers(reader: BagReader) -> Iterator[npt.NDArray[np.int64]]:
+    """Yield arrays of rows (epoch, n)."""
+    for _, _, _, message in reader.decoded([_CYCLE_TOPIC]):
+        try:
+            rows, columns = message.layout.dim
+            names = columns.label.split(',')
+            table = message.data.reshape(rows.size, len(names))
+            picked = table[:, [names.index('epoch'), names.index('n')]]
+        except ValueError as error:
+            raise InputError(f'{_CYCLE_TOPIC} is not as the contract has it ({error})',
+                             str(reader.path),
+                             'its second dimension names the columns, epoch and n among them'
+                             ) from error
+        yield picked.astype(np.int64)
+
+
+def _find_gaps(cycles: npt.NDArray[np.int64]) -> Iterator[Gap]:
+    """Yield what is missing between the first and the last n of each epoch."""
+    for epoch in np.unique(cycles[:, 0]):
+        numbers = np.unique(cycles[cycles[:, 0] == epoch, 1])
+        for index in np.flatnonzero(np.diff(numbers) > 1):
+            yield Gap(int(epoch), int(numbers[index]) + 1, int(numbers[index + 1]) - 1)
+
+
+def format_info(info: BagInfo) -> str:
+    """Write a recording's description as a text of several lines."""
+    lines = [
+        f'recording  {info.path}',
+        f'files      {", ".join(file.name for file in info.files)} ({info.storage}, '
+        f'{info.size_bytes / 1e6:.1f} MB)',
+        f'duration   {info.duration_s:.2f} s, from {info.start_ns / 1e9:.3f} s '
+        f'to {info.end_ns / 1e9:.3f} s',
+        f'messages   {info.message_count}',
+        f'complete   {"yes" if info.complete else "no"}',
+        *(f'           {notice}' for notice in info.notices)]
+    if info.game is not None:
+        lines += [f'scenario   {info.game.benchmark_id}',
+                  f'humans     {_drivers(info.game.humans)}',
+                  f'avs        {_drivers(info.game.avs)}']
+    if info.cycles is not None:
+        lines += _format_cycles(info.cycles)
+    return '\n'.join([*lines, '', *_format_topics(info.topics)])
+
+
+def _drivers(pairs: Iterable[tuple[str, str]]) -> str:
+    return ', '.join(f'{vehicle} ({driver})' for vehicle, driver in pairs) or 'none'
+
+
+def _format_cycles(cycles: CycleInfo) -> list[str]:
+    lines = [f'cycles     {cycles.recorded} recorded, {cycles.missing} missing']
+    lines += [f'           epoch {gap.epoch}: n = {gap.first_n} to {gap.last_n} missing'
+              for gap in cycles.gaps[:_GAPS_SHOWN]]
+    if len(cycles.gaps) > _GAPS_SHOWN:
+        lines.append(f'           and {len(cycles.gaps) - _GAPS_SHOWN} more gaps')
+    return lines
+
+
+def _format_topics(topics: Iterable[TopicInfo]) -> list[str]:
+    table = [('topic', 'type', 'messages', 'Hz', 'QoS')]
+    table += [(entry.topic.name, entry.topic.type_name, str(entry.topic.message_count),
+               '-' if entry.rate_hz is None else f'{entry.rate_hz:.1f}',
+               '; '.join(f'{qos.reliability} {qos.durability} {qos.depth}'
+                         for qos in entry.topic.qos) or '-') for entry in topics]
+    widths = [max(len(row[column]) for row in table) for column in range(4)]
+    return [f'{row[0]:<{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]:>{widths[2]}}  '
+            f'{row[3]:>{widths[3]}}  {row[4]}'.rstrip() for row in table]

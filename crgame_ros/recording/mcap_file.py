@@ -1,0 +1,251 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One MCAP file, finished or cut off anywhere, read without help of its index.
+
+The index at the end of the file is what a killed recorder never wrote. Walking over the records
+from the front costs one seek per chunk and reads both kinds of file in the same way.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+import struct
+from typing import BinaryIO, NamedTuple
+import zlib
+
+import lz4.frame
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import Channel, Header, Schema, Statistics
+import zstandard
+
+from crgame_ros.errors import InputError
+
+_MAGIC = b'\x89MCAP0\r\n'
+_RECORD = struct.Struct('<BQ')
+_MESSAGE = struct.Struct('<HIQQ')
+_CHUNK = struct.Struct('<QQQII')
+_LENGTH = struct.Struct('<Q')
+_RUN_BYTES = 1 << 20
+_DAMAGES = (struct.error, ValueError, RuntimeError, MemoryError, EOFError, EndOfFile,
+            OverflowError, zstandard.ZstdError)
+_LAST_DEFINED_OPCODE = max(Opcode)
+_FIRST_PRIVATE_OPCODE = 0x80
+
+
+class McapMessage(NamedTuple):
+    """A message as it is stored; times in ns."""
+
+    channel_id: int
+    sequence: int
+    log_time_ns: int
+    publish_time_ns: int
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A chunk, or a run of records outside of chunks, with the range of its log times [ns]."""
+
+    offset: int
+    size: int
+    start_ns: int
+    end_ns: int
+    chunked: bool
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Messages by channel id, and the range of their log times [ns], 0 where there are none."""
+
+    counts: dict[int, int]
+    start_ns: int
+    end_ns: int
+
+
+class McapFile:
+    """
+    What a walk over the records of a file finds; the messages stay in the file.
+
+    :param path: the file.
+    :ivar complete: whether the file has its closing records.
+    :ivar segments: where the messages are, in file order.
+    :ivar kept: offset and size of each metadata and attachment record.
+    :ivar useless_bytes: size of what is cut off or damaged, as far as a walk over the records shows.
+    :ivar channels: by id; in a file without summary only after its messages were read.
+    :raises InputError: if it is no MCAP file or cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.complete = False
+        self.size = self.useless_bytes = 0
+        self.header = Header('', '')
+        self.segments: list[Segment] = []
+        self.kept: list[tuple[int, int]] = []
+        self.channels: dict[int, Channel] = {}
+        self.schemas: dict[int, Schema] = {}
+        self.statistics: Statistics | None = None
+        try:
+            self.size = self.path.stat().st_size
+            with self.path.open('rb') as stream:
+                if stream.read(len(_MAGIC)) != _MAGIC:
+                    raise InputError('no MCAP file' if self.size else 'the file is empty',
+                                     str(self.path), 'give a recording made with MCAP storage')
+                self._walk(stream)
+        except OSError as error:
+            raise InputError(f'cannot be read: {error.strerror}', str(self.path)) from error
+        while not self.complete and self.segments and not self.is_sound(self.segments[-1]):
+            # A power cut can leave a last chunk that has its length but not its bytes.
+            self.useless_bytes += self.segments.pop().size
+
+    def _walk(self, stream: BinaryIO) -> None:
+        position = len(_MAGIC)
+        run: list[int] = []
+        while True:
+            readable = position
+            head = stream.read(_RECORD.size)
+            if len(head) < _RECORD.size:
+                break
+            opcode, length = _RECORD.unpack(head)
+            end = position + _RECORD.size + length
+            defined = 0 < opcode <= _LAST_DEFINED_OPCODE or opcode >= _FIRST_PRIVATE_OPCODE
+            if end > self.size or not defined:
+                break
+            if opcode == Opcode.MESSAGE:
+                _, _, log_time_ns, _ = _MESSAGE.unpack(stream.read(_MESSAGE.size))
+                self._extend_run(run, position, end, log_time_ns)
+            else:
+                self._close_run(run)
+                try:
+                    self._take(stream, opcode, position, end)
+                except _DAMAGES:
+                    self.useless_bytes += end - position
+            stream.seek(end)
+            position = end
+            if opcode == Opcode.FOOTER:
+                # Bytes behind the closing mark hide the index from every other reader.
+                self.complete = stream.read(len(_MAGIC) + 1) == _MAGIC
+                readable = min(end + len(_MAGIC), self.size)
+                break
+        self._close_run(run)
+        self.complete = self.complete and not self.useless_bytes
+        self.useless_bytes += self.size - readable
+
+    def _take(self, stream: BinaryIO, opcode: int, position: int, end: int) -> None:
+        length = end - position - _RECORD.size
+        if opcode == Opcode.CHUNK:
+            start_ns, end_ns, _, _, _ = _CHUNK.unpack(stream.read(_CHUNK.size))
+            self.segments.append(Segment(position, end - position, start_ns, end_ns, True))
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._define(opcode, stream.read(length))
+        elif opcode == Opcode.HEADER:
+            self.header = Header.read(ReadDataStream(BytesIO(stream.read(length))))
+        elif opcode == Opcode.STATISTICS:
+            self.statistics = Statistics.read(ReadDataStream(BytesIO(stream.read(length))))
+        elif opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
+            self.kept.append((position, end - position))
+
+    def _extend_run(self, run: list[int], position: int, end: int, log_time_ns: int) -> None:
+        """Grow `run`: offset, end, first and last log time of messages outside of chunks."""
+        if run and end - run[0] > _RUN_BYTES:
+            self._close_run(run)
+        if not run:
+            run += [position, end, log_time_ns, log_time_ns]
+        run[1:] = [end, min(run[2], log_time_ns), max(run[3], log_time_ns)]
+
+    def _close_run(self, run: list[int]) -> None:
+        if run:
+            self.segments.append(Segment(run[0], run[1] - run[0], run[2], run[3], False))
+            run.clear()
+
+    def _define(self, opcode: int, data: bytes) -> None:
+        stream = ReadDataStream(BytesIO(data))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self.schemas[schema.id] = schema
+        else:
+            channel = Channel.read(stream)
+            self.channels[channel.id] = channel
+
+    def is_sound(self, segment: Segment) -> bool:
+        """Return whether all of a segment can be read."""
+        try:
+            for _ in self.messages(segment):
+                pass
+        except InputError:
+            return False
+        return True
+
+    def tally(self) -> Tally:
+        """
+        Count the messages of each channel, by the summary or else by reading them all.
+
+        :raises InputError: as `messages`.
+        """
+        found = self.statistics
+        if self.complete and found is not None and self.channels:
+            return Tally({number: count for number, count in found.channel_message_counts.items()
+                          if count}, found.message_start_time, found.message_end_time)
+        counts: Counter[int] = Counter()
+        for segment in self.segments:
+            counts.update(message.channel_id for message in self.messages(segment))
+        return Tally(dict(counts), min((s.start_ns for s in self.segments), default=0),
+                     max((s.end_ns for s in self.segments), default=0))
+
+    def messages(self, segment: Segment) -> Iterator[McapMessage]:
+        """
+        Read the messages of a segment in file order, and take up the channels it defines.
+
+        :raises InputError: if the segment is damaged; nothing of it is yielded then, save where
+            the damage passes the checksum or there is none.
+        """
+        try:
+            yield from self._messages(self._content(segment))
+        except _DAMAGES as error:
+            raise InputError(f'the data at byte {segment.offset} is damaged ({error})',
+                             str(self.path), '`crgame recover` keeps the rest') from error
+
+    def _content(self, segment: Segment) -> bytes:
+        with self.path.open('rb') as stream:
+            stream.seek(segment.offset)
+            data = stream.read(segment.size)
+        if not segment.chunked:
+            return data
+        body = _RECORD.size
+        _, _, size, checksum, name_length = _CHUNK.unpack_from(data, body)
+        body += _CHUNK.size
+        compression = data[body:body + name_length].decode()
+        body += name_length + _LENGTH.size
+        content = _decompress(compression, data[body:], size)
+        if len(content) != size or checksum and zlib.crc32(content) != checksum:
+            raise ValueError('wrong size or checksum')
+        return content
+
+    def _messages(self, content: bytes) -> Iterator[McapMessage]:
+        position = 0
+        while position < len(content):
+            opcode, length = _RECORD.unpack_from(content, position)
+            body = position + _RECORD.size
+            position = body + length
+            if position > len(content):
+                raise ValueError('a record is longer than its chunk')
+            if opcode == Opcode.MESSAGE:
+                yield McapMessage._make((*_MESSAGE.unpack_from(content, body),
+                                         content[body + _MESSAGE.size:position]))
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._define(opcode, content[body:position])
+
+
+def _decompress(compression: str, data: bytes, size: int) -> bytes:
+    if compression == 'zstd':
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+    if compression == 'lz4':
+        return bytes(lz4.frame.decompress(data))
+    if compression:
+        raise ValueError(f'unknown compression {compression!r}')
+    return data

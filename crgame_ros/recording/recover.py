@@ -1,0 +1,198 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Finishing what a killed recorder left, without ever risking it."""
+
+from dataclasses import dataclass
+from io import BytesIO
+import os
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata
+from mcap.writer import CompressionType, Writer
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.exceptions import RecordingError
+from crgame_ros.recording.mcap_file import McapFile, McapMessage
+from crgame_ros.recording.metadata import (
+    BagFile,
+    BagMetadata,
+    METADATA_FILE,
+    read_metadata,
+    write_metadata,
+)
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.storage import McapStorage
+from crgame_ros.recording.writer import CHUNK_BYTES
+
+_RECORD_HEAD_BYTES = 9
+
+
+@dataclass(frozen=True)
+class RecoverReport:
+    """
+    What `recover` found and did.
+
+    :param path: the recording.
+    :param messages: how many messages it has now.
+    :param duration_s: from its first to its last message [s].
+    :param bytes_dropped: bytes of the old files that held no readable message.
+    :param rewritten: names of the files that were finished.
+    :param metadata_written: whether `metadata.yaml` was written.
+    """
+
+    path: Path
+    messages: int
+    duration_s: float
+    bytes_dropped: int
+    rewritten: tuple[str, ...]
+    metadata_written: bool
+
+    @property
+    def changed(self) -> bool:
+        """Return whether anything was amiss; if not, nothing was touched."""
+        return bool(self.rewritten) or self.metadata_written
+
+
+def recover(path: Path) -> RecoverReport:
+    """
+    Finish a recording whose recorder was killed; leave a finished one as it is.
+
+    Each unfinished file is copied, message by message, to a file beside it, which is read back and
+    then takes its place in one step: at every moment there is one file with all messages.
+
+    :param path: the folder of a recording, or a bare `.mcap` file.
+    :raises InputError: if there is nothing that could be finished.
+    :raises RecordingError: if the disk refuses; the recording is then as it was.
+    """
+    if not path.exists():
+        raise InputError('no such file or folder', str(path), 'give a recording')
+    files = [path] if path.is_file() else sorted(path.glob('*.mcap'))
+    if not files or files[0].suffix != '.mcap':
+        return _untouched(path)
+    try:
+        dropped = {file.name: _finish(file) for file in files}
+        written = path.is_dir() and not _has_metadata(path, files, any(
+            count is not None for count in dropped.values()))
+        if written:
+            _describe(path, files)
+    except OSError as error:
+        raise RecordingError(path, f'cannot be finished: {error.strerror}',
+                             'free some space; the recording is as it was') from error
+    with BagReader(path) as reader:
+        return RecoverReport(
+            path, reader.message_count, (reader.end_ns - reader.start_ns) / 1e9,
+            sum(count or 0 for count in dropped.values()),
+            tuple(name for name, count in dropped.items() if count is not None), written)
+
+
+def _untouched(path: Path) -> RecoverReport:
+    """Report on a recording in another storage, if it is finished."""
+    with BagReader(path) as reader:
+        if not reader.complete:
+            raise InputError(f'{reader.notices[0].split(";")[0]} in a recording that is not MCAP',
+                             str(path), 'use `ros2 bag reindex`')
+        return RecoverReport(path, reader.message_count,
+                             (reader.end_ns - reader.start_ns) / 1e9, 0, (), False)
+
+
+def _finish(path: Path) -> int | None:
+    """Rewrite a file unless it is finished and sound; return the bytes dropped, or None."""
+    source = McapFile(path)
+    damaged = {segment for segment in source.segments if not source.is_sound(segment)}
+    if source.complete and not damaged:
+        return None
+    source.segments = [segment for segment in source.segments if segment not in damaged]
+    temporary = path.with_name(f'.{path.name}.part')
+    try:
+        with temporary.open('wb') as stream:
+            count, lost = _copy(source, stream)
+            stream.flush()
+            os.fsync(stream.fileno())
+        copy = McapFile(temporary)
+        if not copy.complete or sum(copy.tally().counts.values()) != count:
+            raise RecordingError(temporary, 'what was written does not read back',
+                                 'check the disk; the recording is as it was')
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return source.useless_bytes + lost + sum(segment.size for segment in damaged)
+
+
+def _copy(source: McapFile, target: BinaryIO) -> tuple[int, int]:
+    """Copy all messages; return how many, and the bytes of those whose channel is not known."""
+    writer: Any = Writer(target, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer.start(source.header.profile, source.header.library)
+    schemas: dict[int, int] = {}
+    channels: dict[int, int] = {}
+    count = lost = 0
+    for segment in source.segments:
+        for message in source.messages(segment):
+            if message.channel_id not in source.channels:
+                lost += len(message.data)
+                continue
+            if message.channel_id not in channels:
+                _register(source, message.channel_id, writer, schemas, channels)
+            _write(writer, channels[message.channel_id], message)
+            count += 1
+    for number in source.channels.keys() - channels.keys():
+        _register(source, number, writer, schemas, channels)
+    for offset, size in source.kept:
+        _copy_record(source.path, offset, size, writer)
+    writer.finish()
+    return count, lost
+
+
+def _register(source: McapFile, number: int, writer: Writer, schemas: dict[int, int],
+              channels: dict[int, int]) -> None:
+    channel = source.channels[number]
+    schema = source.schemas.get(channel.schema_id)
+    if schema is not None and schema.id not in schemas:
+        schemas[schema.id] = writer.register_schema(
+            schema.name, schema.encoding, schema.data)
+    channels[number] = writer.register_channel(
+        channel.topic, channel.message_encoding, schemas.get(channel.schema_id, 0),
+        channel.metadata)
+
+
+def _write(writer: Writer, channel: int, message: McapMessage) -> None:
+    writer.add_message(channel, message.log_time_ns, message.data, message.publish_time_ns,
+                       message.sequence)
+
+
+def _copy_record(path: Path, offset: int, size: int, writer: Writer) -> None:
+    with path.open('rb') as stream:
+        stream.seek(offset)
+        record = stream.read(size)
+    body = ReadDataStream(BytesIO(record[_RECORD_HEAD_BYTES:]))
+    if record[0] == Opcode.METADATA:
+        metadata = Metadata.read(body)
+        writer.add_metadata(metadata.name, metadata.metadata)
+    else:
+        attachment = Attachment.read(body)
+        writer.add_attachment(attachment.create_time, attachment.log_time, attachment.name,
+                              attachment.media_type, attachment.data)
+
+
+def _has_metadata(folder: Path, files: list[Path], rewritten: bool) -> bool:
+    """Return whether `metadata.yaml` is there and speaks of these files as they are now."""
+    if rewritten or not (folder / METADATA_FILE).is_file():
+        return False
+    try:
+        listed = {file.name for file in read_metadata(folder).files}
+    except InputError:
+        # Unreadable metadata is one of the damages that are mended here.
+        return False
+    return listed == {file.name for file in files}
+
+
+def _describe(folder: Path, files: list[Path]) -> None:
+    entries = []
+    for file in files:
+        tally = McapFile(file).tally()
+        entries.append(BagFile(file.name, tally.start_ns, tally.end_ns,
+                               sum(tally.counts.values())))
+    entries.sort(key=lambda entry: entry.start_ns)
+    write_metadata(folder, BagMetadata('mcap', tuple(entries), McapStorage(files).topics))

@@ -1,0 +1,191 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the messages of a recording come from: MCAP files, or SQLite and compressed ones."""
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+import sqlite3
+from typing import NamedTuple, Protocol
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader, ReaderError
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.mcap_file import McapFile, Segment
+from crgame_ros.recording.metadata import BagTopic, parse_qos, TopicQos
+
+
+class BagMessage(NamedTuple):
+    """A recorded message: `data` is CDR with its header, the log time is in ns."""
+
+    topic: str
+    type_name: str
+    log_time_ns: int
+    data: bytes
+
+
+class Storage(Protocol):
+    """
+    The messages of a recording.
+
+    :ivar topics: what it holds, by name.
+    :ivar start_ns: log time of the first message [ns], 0 where there is none.
+    :ivar end_ns: log time of the last message [ns], 0 where there is none.
+    :ivar damages: what is wrong with it although it can be read.
+    """
+
+    topics: tuple[BagTopic, ...]
+    start_ns: int
+    end_ns: int
+    damages: tuple[str, ...]
+
+    def messages(self, topics: Collection[str] | None) -> Iterator[BagMessage]:
+        """Yield the messages of these topics, or of all, in the order of their log time."""
+
+    def definition(self, type_name: str) -> str:
+        """Return the stored `ros2msg` definition of a type, empty where there is none."""
+
+    def close(self) -> None:
+        """Let go of the files."""
+
+
+class McapStorage:
+    """
+    The messages of the MCAP files of one recording, finished or not.
+
+    :raises InputError: if a file is no MCAP file, or a file without summary is damaged inside.
+    """
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._files = [McapFile(path) for path in paths]
+        self.damages = tuple(
+            f'{file.path.name} was not finished or is damaged ({file.useless_bytes} bytes are of '
+            'no use); `crgame recover` finishes it'
+            for file in self._files if not file.complete)
+        tallies = [file.tally() for file in self._files]
+        filled = [tally for tally in tallies if tally.counts]
+        self.start_ns = min((tally.start_ns for tally in filled), default=0)
+        self.end_ns = max((tally.end_ns for tally in filled), default=0)
+        self.topics = _merge(
+            BagTopic(channel.topic, _schema_name(file, channel.schema_id),
+                     tally.counts.get(number, 0),
+                     parse_qos(channel.metadata.get('offered_qos_profiles'), channel.topic),
+                     channel.metadata.get('topic_type_hash', ''))
+            for file, tally in zip(self._files, tallies, strict=True)
+            for number, channel in file.channels.items())
+
+    def messages(self, topics: Collection[str] | None) -> Iterator[BagMessage]:
+        """Yield the messages of these topics, or of all, in the order of their log time."""
+        order: list[tuple[McapFile, Segment]] = sorted(
+            ((file, segment) for file in self._files for segment in file.segments),
+            key=lambda pair: pair[1].start_ns)
+        held: list[BagMessage] = []
+        for file, segment in order:
+            # What is earlier than this segment's start is earlier than all that follows.
+            ready = 0
+            while ready < len(held) and held[ready].log_time_ns < segment.start_ns:
+                ready += 1
+            yield from held[:ready]
+            held = held[ready:] + list(self._select(file, segment, topics))
+            held.sort(key=lambda message: message.log_time_ns)
+        yield from held
+
+    @staticmethod
+    def _select(file: McapFile, segment: Segment,
+                topics: Collection[str] | None) -> Iterator[BagMessage]:
+        names: dict[int, tuple[str, str] | None] = {}
+        for number, _, log_time_ns, _, data in file.messages(segment):
+            if number not in names:
+                if number not in file.channels:
+                    raise InputError(f'a message on the unknown channel {number}', str(file.path),
+                                     'the file is damaged; record again')
+                channel = file.channels[number]
+                wanted = topics is None or channel.topic in topics
+                names[number] = ((channel.topic, _schema_name(file, channel.schema_id))
+                                 if wanted else None)
+            name = names[number]
+            if name is not None:
+                yield BagMessage(*name, log_time_ns, data)
+
+    def definition(self, type_name: str) -> str:
+        """Return the stored `ros2msg` definition of a type, empty where there is none."""
+        for file in self._files:
+            for schema in file.schemas.values():
+                if schema.name == type_name and schema.encoding == 'ros2msg':
+                    return schema.data.decode('utf-8', 'replace')
+        return ''
+
+    def close(self) -> None:
+        """Do nothing: files are open only while a chunk is read."""
+
+
+def _schema_name(file: McapFile, schema_id: int) -> str:
+    return file.schemas[schema_id].name if schema_id in file.schemas else ''
+
+
+def _merge(topics: Iterator[BagTopic]) -> tuple[BagTopic, ...]:
+    """Join the channels of one topic: several publishers, or several files."""
+    merged: dict[str, BagTopic] = {}
+    for topic in topics:
+        known = merged.get(topic.name, topic)
+        count = topic.message_count + (known.message_count if topic.name in merged else 0)
+        qos = tuple(dict.fromkeys(known.qos + topic.qos))
+        merged[topic.name] = BagTopic(topic.name, known.type_name, count, qos, known.type_hash)
+    return tuple(merged[name] for name in sorted(merged))
+
+
+class RosbagsStorage:
+    """
+    SQLite recordings, and those that rosbag2 has compressed file by file or message by message.
+
+    :param path: the folder with its `metadata.yaml`, or a bare `.db3` file.
+    :raises InputError: if it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.damages: tuple[str, ...] = ()
+        with self._explained():
+            self._reader = Reader(path)
+            self._reader.open()
+            self._connections = list(self._reader.connections)
+            filled = self._reader.message_count > 0
+            self.start_ns = self._reader.start_time if filled else 0
+            # rosbags counts the end as the first instant after the last message.
+            self.end_ns = self._reader.end_time - 1 if filled else 0
+        self.topics = _merge(
+            BagTopic(connection.topic, connection.msgtype, connection.msgcount,
+                     _qos_of(connection), connection.digest or '')
+            for connection in self._connections)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except (ReaderError, OSError, sqlite3.Error, ValueError, AssertionError) as error:
+            raise InputError(f'cannot be read ({error})', str(self._path),
+                             'check it with `ros2 bag info`, or `ros2 bag reindex` it') from error
+
+    def messages(self, topics: Collection[str] | None) -> Iterator[BagMessage]:
+        """Yield the messages of these topics, or of all, in the order of their log time."""
+        wanted = [c for c in self._connections if topics is None or c.topic in topics]
+        if not wanted:
+            return
+        with self._explained():
+            for connection, log_time_ns, data in self._reader.messages(wanted):
+                yield BagMessage(connection.topic, connection.msgtype, log_time_ns, bytes(data))
+
+    def definition(self, type_name: str) -> str:
+        """Return the stored `ros2msg` definition of a type, empty where there is none."""
+        return next((c.msgdef.data for c in self._connections
+                     if c.msgtype == type_name and c.msgdef.format.name == 'MSG'), '')
+
+    def close(self) -> None:
+        """Close the database."""
+        self._reader.close()
+
+
+def _qos_of(connection: Connection) -> tuple[TopicQos, ...]:
+    return tuple(TopicQos(qos.depth, qos.reliability.name.lower(), qos.durability.name.lower())
+                 for qos in getattr(connection.ext, 'offered_qos_profiles', ()))

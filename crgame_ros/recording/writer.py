@@ -1,0 +1,216 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Writing a recording: serialised messages, as they come, into MCAP in a rosbag2 folder."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, cast, IO, Self
+
+from mcap.writer import CompressionType, Writer
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.exceptions import RecordingError
+from crgame_ros.recording.metadata import (
+    BagFile,
+    BagMetadata,
+    BagTopic,
+    METADATA_FILE,
+    qos_text,
+    TopicQos,
+    write_metadata,
+)
+from crgame_ros.recording.schemas import schema_text, type_hash
+
+FLUSH_INTERVAL_NS = 900_000_000
+# The writer keeps an index of each chunk in memory: with chunks that hold more than the busiest
+# flush interval, it grows by the second, not by the message.
+CHUNK_BYTES = 4 << 20
+
+
+class _UnbufferedFile:
+    """A file whose every write reaches the operating system whole before it returns."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open('xb', buffering=0)
+        self._position = 0
+
+    def write(self, data: bytes) -> int:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest):]
+        self._position += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._position
+
+    def flush(self) -> None:
+        """Do nothing: nothing is held back."""
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class BagWriter:
+    """
+    Writes `<folder>/<folder name>_0.mcap` and, when closed, `<folder>/metadata.yaml`.
+
+    Messages go to the operating system with the first that comes `FLUSH_INTERVAL_NS` after the
+    previous flush, so a recorder that is killed loses at most its last second, provided that it
+    also calls `flush_if_due` now and then, for when no more messages come. The missing
+    `metadata.yaml` is what tells an unfinished recording from a finished one. One thread only.
+
+    :param folder: made, with its parents; must not hold a recording of that name yet.
+    :param now_ns: steady clock that decides when to flush [ns].
+    :raises InputError: if the folder already holds a recording.
+    :raises RecordingError: if the file cannot be made.
+    """
+
+    def __init__(self, folder: Path, *, now_ns: Callable[[], int]) -> None:
+        self.folder = folder
+        self.path = folder / f'{folder.resolve().name}_0.mcap'
+        self.failed: RecordingError | None = None
+        self.refused = 0
+        self._now_ns = now_ns
+        self._flushed_ns = now_ns()
+        self._closed = False
+        self._topics: dict[int, tuple[str, str, TopicQos]] = {}
+        self._counts: dict[int, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._start_ns = self._end_ns = 0
+        self.message_count = 0
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if (folder / METADATA_FILE).exists():
+                raise FileExistsError
+            self._stream = _UnbufferedFile(self.path)
+            self._mcap: Any = Writer(cast(IO[Any], self._stream), chunk_size=CHUNK_BYTES,
+                                     compression=CompressionType.ZSTD)
+            self._mcap.start('ros2')
+        except FileExistsError as error:
+            raise InputError('a recording is there already', str(self.path),
+                             'choose another folder') from error
+        except OSError as error:
+            raise RecordingError(self.path, f'cannot record: {error.strerror}',
+                                 'choose a folder that can be written') from error
+
+    def add_topic(self, name: str, type_name: str, qos: TopicQos) -> int:
+        """
+        Announce a topic before its first message.
+
+        :param name: topic, such as `/clock`.
+        :param type_name: such as `nav_msgs/msg/Odometry`.
+        :param qos: what its publisher offers; a replay offers the same.
+        :returns: the channel to write its messages to.
+        :raises InputError: if the type is not installed.
+        :raises RecordingError: if the recording has failed.
+        """
+        if self.failed is not None:
+            raise self.failed
+        definition, digest = schema_text(type_name), type_hash(type_name)
+        try:
+            if type_name not in self._schemas:
+                self._schemas[type_name] = self._mcap.register_schema(
+                    type_name, 'ros2msg', definition.encode())
+            channel: int = self._mcap.register_channel(
+                name, 'cdr', self._schemas[type_name],
+                {'offered_qos_profiles': qos_text([qos]), 'topic_type_hash': digest})
+        except OSError as error:
+            raise self._fail(error) from error
+        self._topics[channel] = (name, type_name, qos)
+        self._counts[channel] = 0
+        return channel
+
+    def write(self, channel: int, data: bytes, log_time_ns: int,
+              publish_time_ns: int | None = None) -> None:
+        """
+        Store one message; after a failure it only counts in `refused`.
+
+        :param channel: from `add_topic`.
+        :param data: the message as serialised by the middleware (CDR with its header).
+        :param log_time_ns: when it was received, not negative [ns].
+        :param publish_time_ns: when it was sent, by default the same [ns].
+        :raises RecordingError: if the disk refuses; once, and the recording is then at its end.
+        """
+        if self.failed is not None:
+            self.refused += 1
+            return
+        if self._closed or log_time_ns < 0:
+            raise ValueError('the writer is closed' if self._closed else 'negative time')
+        sequence = self._counts[channel]
+        sent_ns = log_time_ns if publish_time_ns is None else publish_time_ns
+        if self.message_count == 0:
+            self._start_ns = self._end_ns = log_time_ns
+        self._start_ns = min(self._start_ns, log_time_ns)
+        self._end_ns = max(self._end_ns, log_time_ns)
+        self._counts[channel] = sequence + 1
+        self.message_count += 1
+        try:
+            self._mcap.add_message(channel, log_time_ns, data, sent_ns, sequence)
+        except OSError as error:
+            raise self._fail(error) from error
+        self.flush_if_due()
+
+    def flush_if_due(self) -> None:
+        """
+        Flush if the last flush is more than `FLUSH_INTERVAL_NS` ago.
+
+        :raises RecordingError: as `write`.
+        """
+        if self._now_ns() - self._flushed_ns >= FLUSH_INTERVAL_NS:
+            self.flush()
+
+    def flush(self) -> None:
+        """
+        Hand every message so far to the operating system.
+
+        :raises RecordingError: as `write`.
+        """
+        if self.failed is not None or self._closed:
+            return
+        self._flushed_ns = self._now_ns()
+        try:
+            self._mcap.flush()
+        except OSError as error:
+            raise self._fail(error) from error
+
+    def close(self) -> None:
+        """
+        Finish the file and write `metadata.yaml`; does nothing after a failure or a second time.
+
+        :raises RecordingError: as `write`.
+        """
+        if self.failed is not None or self._closed:
+            return
+        try:
+            self._mcap.finish()
+            self._stream.close()
+            write_metadata(self.folder, self._metadata())
+        except OSError as error:
+            raise self._fail(error) from error
+        self._closed = True
+
+    def _metadata(self) -> BagMetadata:
+        topics = tuple(BagTopic(name, type_name, self._counts[channel], (qos,),
+                                type_hash(type_name))
+                       for channel, (name, type_name, qos) in self._topics.items())
+        file = BagFile(self.path.name, self._start_ns, self._end_ns, self.message_count)
+        return BagMetadata('mcap', (file,), topics)
+
+    def _fail(self, error: OSError) -> RecordingError:
+        self.failed = RecordingError(
+            self.path, f'recording stopped: {error.strerror}',
+            'free some space; what was stored reads, and `crgame recover` finishes the file')
+        # Closing a file on a failing disk may fail once more; the first reason is the one to tell.
+        with suppress(OSError):
+            self._stream.close()
+        return self.failed
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()

@@ -1,0 +1,42 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The driver source that a live seat uses, from its text in the game."""
+
+from pathlib import Path
+
+from crgame_ros.driver.device_map import load_device_map
+from crgame_ros.driver.evdev_device import open_evdev
+from crgame_ros.driver.replay import ReplayDriver
+from crgame_ros.driver.source import (
+    DriverSource, EvdevDriver, IdleDriver, JoyDriver, load_timeline, parse_source, ScriptedDriver)
+from crgame_ros.errors import InputError
+from crgame_ros.recording.run_log import read_cycles
+
+
+def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str) -> DriverSource:
+    """
+    Make a driver.
+
+    :param text: source as the game or the parameter names it.
+    :param timeline: text of the timeline, if the game carries it.
+    :param vehicle_id: whose commands to take from a recording.
+    :param joy_map: device map for an external joy node.
+    :raises InputError: if the source names nothing that can be used.
+    """
+    source = parse_source(text)
+    if source.has_timeline:
+        if timeline:
+            return ScriptedDriver.from_text(timeline, f'{vehicle_id}: {text}')
+        return ScriptedDriver(load_timeline(source, Path('.')))
+    if source.kind == 'replay':
+        return ReplayDriver(read_cycles(Path(source.argument)).commands(vehicle_id))
+    if source.kind == 'joy':
+        return JoyDriver(load_device_map(joy_map))
+    if source.kind == 'idle':
+        return IdleDriver()
+    try:
+        return EvdevDriver(open_evdev(source.argument))
+    except InputError:
+        if source.kind == 'auto':
+            return IdleDriver()
+        raise

@@ -1,0 +1,255 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One epoch of a live run: from the request of k0 to the end, a reset or a stop."""
+
+from enum import auto, Enum
+import gc
+import time
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from crgame_ros.errors import InputError
+from crgame_ros.ros.contract import load_contract
+from crgame_ros.ros.live_diagnostics import LiveDiagnostics
+from crgame_ros.ros.node_main import StopFlag
+from crgame_ros.ros.sim_control import SimControl
+from crgame_ros.ros.sim_inputs import SimInputs
+from crgame_ros.ros.sim_outputs import SimOutputs
+from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.time_controller import TimeController
+
+NS_PER_S = 1_000_000_000
+# How often the executor looks for service calls [Hz], and the least time left for it [ns].
+SERVICE_RATE = 20.0
+SERVICE_SLACK_NS = 1_500_000
+RESEND_S = 0.5
+# The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
+WAKE_UP_NS = 120_000
+SETTLE_NS = 200_000_000
+WATCHED_TOPICS = ('/clock', '/vehicles/state', '/timing/cycle')
+
+
+class Outcome(Enum):
+    """Why an epoch ended."""
+
+    FINISHED = auto()
+    RESET = auto()
+    STOPPED = auto()
+
+
+class LiveRun:
+    """
+    Paces one simulation against the steady clock.
+
+    :param node: the node that owns the endpoints.
+    :param executor: runs its services.
+    :param control: orders from outside.
+    :param setup: the run.
+    :param epoch: counts resets.
+    :param clock_offset_ns: simulation time of step 0 [ns]
+    """
+
+    def __init__(self, node: Node, executor: SingleThreadedExecutor, control: SimControl,
+                 setup: Setup, epoch: int, clock_offset_ns: int) -> None:
+        self._node = node
+        self._executor = executor
+        self._control = control
+        self._epoch = epoch
+        self._outputs = SimOutputs(node, setup)
+        self._inputs = SimInputs(node, setup)
+        self.simulation = Simulation(setup, clock_offset_ns)
+        scheduler = self.simulation.scheduler
+        self._dt_s = scheduler.dt_s
+        self._controller = TimeController(setup.game.timing, self._dt_s)
+        self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
+        duration_s = control.duration_s or setup.game.duration
+        self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
+        self._service_every = max(1, round(1.0 / self._dt_s / SERVICE_RATE))
+        self._second = max(1, round(1.0 / self._dt_s))
+        self._setup = setup
+        self._sleep_from_ns = 0
+        self._stop = StopFlag()
+
+    def run(self, stop: StopFlag) -> Outcome:
+        """Run until the game's end, a reset or a stop."""
+        self._stop = stop
+        self._outputs.publish_documents(
+            self._epoch, self.simulation.scheduler.clock_offset_ns,
+            self._control.real_time_factor)
+        result = self.simulation.begin()
+        if self._epoch:
+            self._settle()
+        outcome = self._wait_for_companions(result)
+        if outcome is not None:
+            return outcome
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        try:
+            now_ns = time.monotonic_ns()
+            self._controller.start(now_ns)
+            self._controller.resume(now_ns, self._control.real_time_factor)
+            return self._loop()
+        finally:
+            gc.enable()
+            gc.unfreeze()
+            self._outputs.publish_rows()
+            self._diagnostics.publish(self.simulation.n)
+            self._outputs.wait_until_received()
+
+    def destroy(self) -> None:
+        """Release the endpoints."""
+        self._outputs.destroy()
+        self._inputs.destroy()
+
+    def _settle(self) -> None:
+        """Let everybody take the new documents in before the first message that needs them."""
+        until_ns = time.monotonic_ns() + SETTLE_NS
+        while time.monotonic_ns() < until_ns:
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def _wait_for_companions(self, result: StepResult) -> Outcome | None:
+        """Publish step 0 until every companion is connected and every planner has answered."""
+        deadline_ns = time.monotonic_ns() + int(self._control.planner_timeout_s * NS_PER_S)
+        unanswered = set(result.requests)
+        connected = False
+        resend_ns = 0
+        while not connected or unanswered or self._control.paused:
+            self._executor.spin_once(timeout_sec=0.005)
+            outcome = self._ordered_end()
+            if outcome is not None:
+                return outcome
+            now_ns = time.monotonic_ns()
+            if not connected and self._companions_connected():
+                connected = True
+                self._outputs.publish_step(self.simulation, result)
+                resend_ns = now_ns + int(RESEND_S * NS_PER_S)
+            if connected and now_ns >= resend_ns:
+                resend_ns = now_ns + int(RESEND_S * NS_PER_S)
+                for av_id in unanswered:
+                    self._outputs.resend(av_id, result)
+            unanswered -= {av_id for av_id in unanswered if self._take_plan(av_id)}
+            if now_ns > deadline_ns and (not connected or unanswered):
+                self._tell_who_is_missing(connected, unanswered)
+                if not connected:
+                    self._outputs.publish_step(self.simulation, result)
+                connected, unanswered = True, set()
+        return None
+
+    def _tell_who_is_missing(self, connected: bool, unanswered: set[str]) -> None:
+        missing = [] if connected else ['companion nodes ' + ', '.join(self._control.companions)]
+        missing += [f'the planner of {av_id}' for av_id in sorted(unanswered)]
+        self._node.get_logger().warning(
+            f'starting without {" and ".join(missing)}: '
+            f'no answer in {self._control.planner_timeout_s:g} s')
+
+    def _companions_connected(self) -> bool:
+        contract = load_contract()
+        for topic in WATCHED_TOPICS:
+            consumers = set(contract.topic(topic).consumers)
+            expected = sum(1 for node in self._control.companions if node in consumers)
+            if self._outputs.subscribers(topic) < expected:
+                return False
+        return True
+
+    def _ordered_end(self) -> Outcome | None:
+        control = self._control
+        if control.stop_wanted or self._stop.requested:
+            return Outcome.STOPPED
+        if control.reset_wanted:
+            return Outcome.RESET
+        return None
+
+    def _take_plan(self, av_id: str) -> bool:
+        """Offer an AV the plan that has come for it; tell whether it was accepted."""
+        try:
+            plan = self._inputs.take_plan(av_id)
+            if plan is None:
+                return False
+            reason = self.simulation.offer_plan(av_id, plan)
+        except InputError as error:
+            reason = str(error)
+        if reason is not None:
+            self._diagnostics.refusal(av_id, reason)
+        return reason is None
+
+    def _loop(self) -> Outcome:
+        while self.simulation.n != self._last_n:
+            if self._control.paused and not self._control.steps_wanted:
+                self._stay_paused()
+            outcome = self._ordered_end()
+            if outcome is not None:
+                return outcome
+            if self._control.real_time_factor != self._controller.real_time_factor:
+                self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
+            self._wait()
+            self._cycle()
+        return Outcome.FINISHED
+
+    def _stay_paused(self) -> None:
+        """Serve orders while everything else stands still."""
+        self._outputs.publish_rows()
+        control = self._control
+        while control.paused and not control.steps_wanted and self._ordered_end() is None:
+            self._executor.spin_once(timeout_sec=0.02)
+        now_ns = time.monotonic_ns()
+        self._controller.resume(now_ns)
+        for seat in self._inputs.seats:
+            seat.forgive(now_ns)
+
+    def _wait(self) -> None:
+        """Serve orders now and then, and wait until the next cycle is due (CRG 11)."""
+        deadline_ns = self._controller.deadline_ns()
+        self._sleep_from_ns = time.monotonic_ns()
+        left_ns = deadline_ns - self._sleep_from_ns
+        if left_ns > SERVICE_SLACK_NS and self.simulation.n % self._service_every == 0:
+            self._executor.spin_once(timeout_sec=0)
+            left_ns = deadline_ns - time.monotonic_ns()
+        if left_ns > WAKE_UP_NS:
+            time.sleep((left_ns - WAKE_UP_NS) / NS_PER_S)
+        while time.monotonic_ns() < deadline_ns:
+            pass
+
+    def _cycle(self) -> None:
+        """Do the work of one cycle, from reading the inputs to publishing the state."""
+        start_ns = time.monotonic_ns()
+        simulation, outputs, inputs = self.simulation, self._outputs, self._inputs
+        cycle = self._controller.begin_cycle(start_ns)
+        for av in simulation.avs:
+            self._take_plan(av.setup.id)
+        commands = [seat.command(start_ns, cycle.dt_eff_s, human.state.speed)
+                    for seat, human in zip(inputs.seats, simulation.humans, strict=True)]
+        result = simulation.step(cycle.dt_eff_s, commands)
+        outputs.publish_step(simulation, result)
+        if result.tick:
+            self._at_tick(result)
+        if outputs.rows.full:
+            outputs.publish_rows()
+        busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S
+        slept_s = (start_ns - self._sleep_from_ns) / NS_PER_S
+        factor = self._controller.real_time_factor
+        outputs.rows.add(self._epoch, result.k, cycle, busy_s * factor, slept_s * factor,
+                         simulation.commands)
+
+    def _at_tick(self, result: StepResult) -> None:
+        """Do what is due with the scenario's time."""
+        order = self._inputs.frame_skip_order()
+        if order is not None:
+            self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping
+        stop = self._inputs.stop_request()
+        if stop is not None:
+            vehicle_id, n = stop
+            self._outputs.publish_diagnostics(
+                'stop', DiagnosticStatus.ERROR, f'{vehicle_id} violates drivability',
+                {'violation_n': n, 'stop_n': result.n},
+                self.simulation.scheduler.stamp_ns(result.n))
+            self._node.get_logger().warning(
+                f'{vehicle_id} violates drivability (n = {n}): stopping at n = {result.n}')
+            self._control.stop_wanted = True
+        if self._control.steps_wanted:
+            self._control.steps_wanted -= 1
+        if result.n % self._second < self.simulation.scheduler.steps_per_tick:
+            self._diagnostics.publish(result.n)

@@ -1,0 +1,92 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The frame around every node: environment, start, clean end, one-line errors."""
+
+from collections.abc import Callable
+import ctypes
+import os
+import signal
+import sys
+from types import FrameType
+from typing import Protocol
+
+PARENT_VARIABLE = 'CRGAME_PARENT_PID'
+PR_SET_PDEATHSIG = 1
+
+
+class StopFlag:
+    """Raised by SIGINT and SIGTERM; a node's loop looks at it and ends in good order."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def listen(self) -> None:
+        """Take SIGINT and SIGTERM over from Python."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        self.requested = True
+
+
+class RunnableNode(Protocol):
+    """A node with a loop of its own."""
+
+    def run(self, stop: StopFlag) -> None:
+        """Work until asked to stop, or until the node is done."""
+
+    def destroy_node(self) -> None:
+        """Release the node's endpoints."""
+
+
+def die_with_parent() -> None:
+    """
+    Ask the kernel to end this process when the one that started the graph dies.
+
+    Only where that one asked for it (`CRGAME_PARENT_PID`): a node started by hand lives on.
+    """
+    parent = os.environ.get(PARENT_VARIABLE)
+    if parent is None:
+        return
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != int(parent):
+        sys.exit(f'the process {parent} that started the graph is gone')
+
+
+def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) -> None:
+    """
+    Run a node until it is done, interrupted or shut down.
+
+    Signals are ours, not rclpy's: its handlers invalidate the context at once, so that nothing
+    could be published or drained at the end. Exits with code 0 at the end or after a signal, 2 on
+    bad input and 1 on any other known error, always with one line that says why.
+
+    :param create: makes the node, once rclpy is up.
+    :param args: command line, the process's own where None.
+    """
+    die_with_parent()
+    from crgame_ros.ros.environment import prepare_environment
+    prepare_environment()
+
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+
+    from crgame_ros.errors import CrgameError
+
+    stop = StopFlag()
+    stop.listen()
+    code = 0
+    node = None
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = create()
+        node.run(stop)
+    except CrgameError as error:
+        print(f'error: {error}', file=sys.stderr, flush=True)
+        code = error.exit_code
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    sys.stdout.flush()
+    sys.exit(code)

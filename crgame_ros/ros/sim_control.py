@@ -1,0 +1,176 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The services and parameters by which people steer sim_node."""
+
+from pathlib import Path
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from crgame_ros.errors import InputError
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.scenario.game import Game
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+
+DEFAULT_GAME = 'cut_in.yaml'
+
+
+class SimControl:
+    """
+    Orders to the simulation, as flags that its loop reads between cycles.
+
+    :param node: owner of services and parameters.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.paused = False
+        self.steps_wanted = 0
+        self.reset_wanted = False
+        self.stop_wanted = False
+        self._declare()
+        node.add_on_set_parameters_callback(self._on_parameters)
+        endpoints = Endpoints(node)
+        for name, callback in (('/sim/start', self._on_start), ('/sim/pause', self._on_pause),
+                               ('/sim/step', self._on_step), ('/sim/reset', self._on_reset),
+                               ('/sim/stop', self._on_stop)):
+            endpoints.service(name, callback)
+        self._chosen = 'game' if self._value('game') or not self._value('scenario') else 'scenario'
+        # What the command line names is trusted; later orders may come from any DDS peer.
+        self._directories = [Path(item).resolve() for item in self._value('scenario_directories')
+                             if item] + [scenarios_directory().resolve()]
+        first = self._value(self._chosen)
+        if first:
+            self._directories.append(Path(first).resolve().parent)
+
+    def _declare(self) -> None:
+        declare = self._node.declare_parameter
+        declare('game', '', ParameterDescriptor(
+            description='game file; taken at the start and at a reset'))
+        declare('scenario', '', ParameterDescriptor(
+            description='CommonRoad file instead of a game; taken at the start and at a reset'))
+        declare('scenario_directories', [''], ParameterDescriptor(
+            description='directories from which a later game or scenario may come',
+            read_only=True))
+        declare('real_time_factor', 1.0, ParameterDescriptor(
+            description='simulated seconds per wall second',
+            floating_point_range=[FloatingPointRange(
+                from_value=MIN_REAL_TIME_FACTOR, to_value=MAX_REAL_TIME_FACTOR)]))
+        declare('duration', 0.0, ParameterDescriptor(
+            description='simulated seconds until the run ends; 0 takes the game\'s',
+            read_only=True))
+        declare('start_paused', False, ParameterDescriptor(
+            description='wait for /sim/start', read_only=True))
+        declare('realtime_priority', False, ParameterDescriptor(
+            description='run under SCHED_FIFO where the system allows it', read_only=True))
+        declare('wait_for', [''], ParameterDescriptor(
+            description='companion nodes that must be connected before the run starts',
+            read_only=True))
+        declare('planner_timeout', 10.0, ParameterDescriptor(
+            description='seconds to wait for planners and companions at the start',
+            read_only=True))
+
+    def _value(self, name: str) -> Any:
+        return self._node.get_parameter(name).value
+
+    @property
+    def duration_s(self) -> float:
+        """Duration from the command line [s]; 0 if none."""
+        return float(self._value('duration'))
+
+    @property
+    def starts_paused(self) -> bool:
+        """Whether the run waits for /sim/start."""
+        return bool(self._value('start_paused'))
+
+    @property
+    def wants_realtime_priority(self) -> bool:
+        """Whether the user asked for SCHED_FIFO."""
+        return bool(self._value('realtime_priority'))
+
+    @property
+    def companions(self) -> tuple[str, ...]:
+        """Nodes that must be connected before the run starts."""
+        return tuple(item for item in self._value('wait_for') if item)
+
+    @property
+    def planner_timeout_s(self) -> float:
+        """How long to wait for planners and companions [s]."""
+        return float(self._value('planner_timeout'))
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated seconds per wall second that are asked for."""
+        return float(self._value('real_time_factor'))
+
+    def first_game(self) -> Game:
+        """
+        Load the game that the command line names.
+
+        :raises InputError: if it cannot be used.
+        """
+        return self._game(self._value(self._chosen))
+
+    def next_game(self) -> Game:
+        """
+        Load the game that the parameters name now, for a reset.
+
+        :raises InputError: if it cannot be used or lies outside the configured directories.
+        """
+        name = self._value(self._chosen)
+        return self._game(str(self._allowed(name)) if name else '')
+
+    def _game(self, path: str) -> Game:
+        if not path:
+            return load_game(scenarios_directory() / DEFAULT_GAME)
+        return Game(Path(path)) if self._chosen == 'scenario' else load_game(Path(path))
+
+    def _allowed(self, name: str) -> Path:
+        """Find a file by a name relative to, or inside, one of the configured directories."""
+        for directory in self._directories:
+            path = (directory / name).resolve()
+            if path.is_relative_to(directory) and path.is_file():
+                return path
+        raise InputError(f'"{name[:200]}" is in none of the configured directories', 'sim_node',
+                         'name a file of the parameter scenario_directories')
+
+    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name in ('game', 'scenario') and parameter.value:
+                try:
+                    self._allowed(str(parameter.value))
+                except InputError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+                self._chosen = parameter.name
+        return SetParametersResult(successful=True)
+
+    def _on_start(self, _: Any, response: Any) -> Any:
+        self.paused = False
+        return _answer(response, True, 'running')
+
+    def _on_pause(self, _: Any, response: Any) -> Any:
+        self.paused = True
+        return _answer(response, True, 'paused')
+
+    def _on_step(self, _: Any, response: Any) -> Any:
+        if not self.paused:
+            return _answer(response, False, 'not paused: call /sim/pause first')
+        self.steps_wanted += 1
+        return _answer(response, True, 'advancing by one scenario step')
+
+    def _on_reset(self, _: Any, response: Any) -> Any:
+        self.reset_wanted = True
+        return _answer(response, True, 'resetting')
+
+    def _on_stop(self, _: Any, response: Any) -> Any:
+        self.stop_wanted = True
+        return _answer(response, True, 'stopping')
+
+
+def _answer(response: Any, success: bool, text: str) -> Any:
+    response.success, response.message = success, text
+    return response

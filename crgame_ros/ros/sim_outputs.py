@@ -1,0 +1,203 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What sim_node publishes: built once for a game, refilled at every step."""
+
+import json
+import math
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import AccelStamped
+from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, String
+
+from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import MAP, set_time, StateMessage, to_joint_trajectory, to_time
+from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.simulation.documents import game_document, objects_document
+from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.cycle_rows import CycleRows
+from crgame_ros.vehicle.state import VehicleState
+
+# Rate to which /clock and the states are thinned above it [Hz].
+PUBLISHING_RATE = 100.0
+ACKNOWLEDGE_S = 2.0
+
+
+class VehicleOutputs:
+    """Convenience topics of one driven vehicle, filled only while somebody subscribes."""
+
+    def __init__(self, endpoints: Endpoints, vehicle_id: str) -> None:
+        self.publishers = [endpoints.publisher(name, vehicle_id)
+                           for name in ('/<v>/odom', '/<v>/joint_states', '/<v>/accel')]
+        self.wanted = False
+        self._odom = Odometry(child_frame_id=f'{vehicle_id}/base_link')
+        self._odom.header.frame_id = MAP
+        self._joints = JointState(name=[f'{vehicle_id}/steering'])
+        self._accel = AccelStamped()
+        self._accel.header.frame_id = f'{vehicle_id}/base_link'
+
+    def look_for_subscribers(self) -> None:
+        """Find out whether anybody listens."""
+        self.wanted = any(item.get_subscription_count() for item in self.publishers)
+
+    def publish(self, state: VehicleState, stamp_ns: int) -> None:
+        """Publish the vehicle's state in the types that ROS tools expect."""
+        odom = self._odom
+        set_time(odom.header.stamp, stamp_ns)
+        odom.pose.pose.position.x, odom.pose.pose.position.y = state.x, state.y
+        odom.pose.pose.orientation.z = math.sin(0.5 * state.yaw)
+        odom.pose.pose.orientation.w = math.cos(0.5 * state.yaw)
+        odom.twist.twist.linear.x = state.speed
+        odom.twist.twist.angular.z = state.yaw_rate
+        self.publishers[0].publish(odom)
+        set_time(self._joints.header.stamp, stamp_ns)
+        self._joints.position = [state.steering_angle]
+        self._joints.velocity = [state.steering_rate]
+        self.publishers[1].publish(self._joints)
+        set_time(self._accel.header.stamp, stamp_ns)
+        self._accel.accel.linear.x = state.acceleration
+        self.publishers[2].publish(self._accel)
+
+
+class SimOutputs:
+    """
+    The publishers of sim_node for one game.
+
+    :param node: owner of the publishers.
+    :param setup: the run.
+    """
+
+    def __init__(self, node: Node, setup: Setup) -> None:
+        self._node = node
+        self._setup = setup
+        endpoints = Endpoints(node)
+        self.publish_every = max(1, math.ceil(setup.game.timing.rate / PUBLISHING_RATE))
+        self._clock = endpoints.publisher('/clock')
+        self._state = endpoints.publisher('/vehicles/state')
+        self._objects = endpoints.publisher('/traffic/objects')
+        self._cycle = endpoints.publisher('/timing/cycle')
+        self._latched = {name: endpoints.publisher(name) for name in (
+            '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/signals',
+            '/seats')}
+        self._diagnostics = endpoints.publisher('/diagnostics')
+        self._requests = {av.id: endpoints.publisher('/<av>/plan_request', av.id)
+                          for av in setup.avs}
+        self._vehicles = [VehicleOutputs(endpoints, vehicle) for vehicle in setup.vehicle_ids]
+        self.frames_skipped = False
+        self._lights = TrafficLights(setup.loaded.scenario)
+        self._light_states: dict[int, str] | None = None
+        self._build_messages()
+
+    def _build_messages(self) -> None:
+        setup = self._setup
+        self._clock_message = Clock()
+        self._state_message = StateMessage(
+            [name for vehicle in setup.vehicle_ids for name in vehicle_joint_names(vehicle)])
+        self._objects_message = StateMessage(
+            [name for item in setup.obstacles.descriptions
+             for name in object_joint_names(item.id)])
+        self._objects_message.accelerations[:] = math.nan
+        self.rows = CycleRows([human.id for human in setup.humans], self.publish_every)
+        width = len(self.rows.columns)
+        self._cycle_message = Float64MultiArray()
+        self._cycle_message.layout.dim = [
+            MultiArrayDimension(label='cycles'),
+            MultiArrayDimension(label=','.join(self.rows.columns), size=width, stride=width)]
+
+    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float) -> None:
+        """Publish what describes the run: scenario, game, objects and seats."""
+        setup = self._setup
+        seats = {human.id: {'source': f'/{human.id}/driver_command', 'driver': human.driver}
+                 for human in setup.humans}
+        texts = {'/scenario/xml': setup.loaded.xml_text,
+                 '/scenario/objects': objects_document(setup.descriptions),
+                 '/scenario/game': game_document(
+                     setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
+                     real_time_factor=factor),
+                 '/seats': json.dumps(seats)}
+        for name, text in texts.items():
+            self._latched[name].publish(String(data=text))
+
+    def publish_step(self, simulation: Simulation, result: StepResult) -> None:
+        """Publish a step: requests first, for planners have the least time to lose."""
+        for av_id, request in result.requests.items():
+            self._requests[av_id].publish(to_joint_trajectory(request))
+        due = result.n % self.publish_every == 0
+        if not due and not result.tick:
+            return
+        stamp_ns = simulation.scheduler.stamp_ns(result.n)
+        states = simulation.states
+        set_time(self._clock_message.clock, stamp_ns)
+        self._clock.publish(self._clock_message)
+        if result.objects is not None:
+            message = self._objects_message
+            message.positions[:] = result.objects.poses.ravel()
+            message.velocities[:] = result.objects.velocities.ravel()
+            self._objects.publish(message.stamp(stamp_ns))
+            self._publish_signals(result.k)
+            for vehicle in self._vehicles:
+                vehicle.look_for_subscribers()
+        self._publish_states(states, stamp_ns)
+        if not self.frames_skipped:
+            for vehicle, state in zip(self._vehicles, states, strict=True):
+                if vehicle.wanted:
+                    vehicle.publish(state, stamp_ns)
+
+    def resend(self, av_id: str, result: StepResult) -> None:
+        """Send a request again to a planner that may not have been there the first time."""
+        self._requests[av_id].publish(to_joint_trajectory(result.requests[av_id]))
+
+    def _publish_states(self, states: list[VehicleState], stamp_ns: int) -> None:
+        message = self._state_message
+        for index, state in enumerate(states):
+            place = slice(4 * index, 4 * index + 4)
+            (message.positions[place], message.velocities[place],
+             message.accelerations[place]) = vehicle_to_joints(state)
+        self._state.publish(message.stamp(stamp_ns))
+
+    def _publish_signals(self, k: int) -> None:
+        states = self._lights.states_at(k)
+        if states is not self._light_states:
+            self._light_states = states
+            self._latched['/scenario/signals'].publish(
+                String(data=json.dumps({'k': k, 'states': states})))
+
+    def publish_rows(self) -> None:
+        """Publish the cycles collected so far."""
+        if self.rows.count:
+            self._cycle_message.layout.dim[0].size = self.rows.count
+            self._cycle_message.layout.dim[0].stride = self.rows.count * len(self.rows.columns)
+            self._cycle_message.data = self.rows.taken()
+            self._cycle.publish(self._cycle_message)
+
+    def publish_diagnostics(self, name: str, level: bytes, text: str,
+                            values: dict[str, object], stamp_ns: int) -> None:
+        """Publish one status."""
+        status = DiagnosticStatus(level=level, name=f'sim_node: {name}', message=text)
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        header = Header(stamp=to_time(stamp_ns), frame_id=MAP)
+        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
+
+    def subscribers(self, topic: str) -> int:
+        """Count the matched subscriptions of /timing/cycle, /vehicles/state or /clock."""
+        return int({'/timing/cycle': self._cycle, '/vehicles/state': self._state,
+                    '/clock': self._clock}[topic].get_subscription_count())
+
+    def wait_until_received(self) -> None:
+        """Wait for the subscribers to acknowledge what was published, with a limit."""
+        for publisher in (self._cycle, self._state, self._objects, self._diagnostics):
+            publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_S))
+
+    def destroy(self) -> None:
+        """Release the publishers, for a game with other vehicles."""
+        publishers = [self._clock, self._state, self._objects, self._cycle, self._diagnostics,
+                      *self._latched.values(), *self._requests.values()]
+        publishers += [item for vehicle in self._vehicles for item in vehicle.publishers]
+        for publisher in publishers:
+            self._node.destroy_publisher(publisher)

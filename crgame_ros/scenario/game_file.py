@@ -1,0 +1,175 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading game files: YAML in, a checked `Game` or one clear error out."""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
+import math
+from pathlib import Path
+import re
+import types
+from typing import Any, get_args, get_origin, get_type_hints, Literal, TypeVar, Union
+
+import yaml
+
+from crgame_ros.errors import InputError
+from crgame_ros.scenario.game import (
+    AvSpec, DrivabilitySpec, Game, HumanSpec, LaneletSpawn, PoseSpawn, PredictionSpec, TimingSpec)
+
+T = TypeVar('T')
+MAX_BYTES = 1 << 20
+PREFIX = {'humans': 'hv', 'avs': 'av'}
+# Lower and upper bounds of numbers, by their name.
+BOUNDS: dict[str, tuple[float, float]] = {
+    'rate': (1.0, 10000.0), 'duration': (0.0, math.inf), 'horizon': (0.1, 60.0),
+    'dt_min': (0.0, 1.0), 'dt_max': (1e-4, 10.0), 'skip_threshold': (0.0, math.inf),
+    'reset_threshold': (0.0, math.inf), 'warm_up_steps': (0, 1e9),
+    'max_catch_up_steps': (1, 1e9), 'seed': (0, 2**63 - 1), 'speed': (-100.0, 100.0)}
+
+
+def read_yaml(path: Path, what: str) -> Any:
+    """
+    Read a small YAML file safely.
+
+    :param what: what the file is, for the message.
+    :raises InputError: if it is missing, too large or no YAML.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f'is a directory, not a {what}', str(path), 'name a file')
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f'is larger than 1 MiB, too large for a {what}', str(path))
+        return yaml.safe_load(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        raise InputError(f'cannot read the {what} ({error.strerror})', str(path),
+                         'check the name') from error
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        detail = str(error).splitlines()[0] if str(error) else type(error).__name__
+        mark = getattr(error, 'problem_mark', None)
+        line = f', line {mark.line + 1}' if mark is not None else ''
+        raise InputError(f'is no YAML ({detail}{line})', str(path), 'mend the file') from error
+
+
+def load_game(path: Path) -> Game:
+    """
+    Read a game file.
+
+    :raises InputError: naming the file, the key and the remedy.
+    """
+    values = read_yaml(path, 'game file')
+    return parse_game(values, str(path), path.parent)
+
+
+def parse_game(values: Any, where: str, base: Path) -> Game:
+    """
+    Check the content of a game file.
+
+    :param values: what YAML gave.
+    :param where: file name for messages.
+    :param base: directory against which its file names are resolved.
+    """
+    if not isinstance(values, Mapping):
+        raise InputError('is no mapping', where, 'see docs/games.md for the keys')
+    table = dict(values)
+    if not isinstance(table.get('scenario'), str):
+        raise InputError('"scenario" is missing', where, 'name a CommonRoad file')
+    table['scenario'] = base / table['scenario']
+    for group in ('humans', 'avs'):
+        if table.get(group) is not None:
+            table[group] = _vehicles(table[group], group, where)
+    for key, kind in (('prediction', PredictionSpec), ('drivability', DrivabilitySpec),
+                      ('timing', TimingSpec)):
+        if key in table:
+            table[key] = build(kind, table[key], f'{where}: {key}')
+    if 'rate' in table:
+        rate = table.pop('rate')
+        table['timing'] = build(TimingSpec, {**vars(table.get('timing', TimingSpec())),
+                                             'rate': rate}, where)
+    table['base'] = base
+    game = build(Game, table, where)
+    if not game.humans and game.avs == ():
+        raise InputError('has neither humans nor AVs', where, 'add one of them')
+    if game.timing.dt_min > game.timing.dt_max:
+        raise InputError('"dt_min" is larger than "dt_max"', f'{where}: timing')
+    return game
+
+
+def _vehicles(values: Any, group: str, where: str) -> tuple[HumanSpec | AvSpec, ...]:
+    if not isinstance(values, list):
+        raise InputError(f'"{group}" is no list', where, 'give one entry for each vehicle')
+    specs: list[HumanSpec | AvSpec] = []
+    for index, entry in enumerate(values):
+        place = f'{where}: {group}[{index}]'
+        if not isinstance(entry, Mapping):
+            raise InputError('is no mapping', place, 'see docs/games.md for the keys')
+        table = {'id': f'{PREFIX[group]}{index}', **entry}
+        if group == 'humans' and isinstance(table.get('spawn'), Mapping):
+            kind = LaneletSpawn if 'lanelet' in table['spawn'] else PoseSpawn
+            table['spawn'] = build(kind, table['spawn'], f'{place}: spawn')
+        elif table.get('spawn') == 'auto':
+            table.pop('spawn')
+        spec: HumanSpec | AvSpec = build(HumanSpec if group == 'humans' else AvSpec, table, place)
+        if not re.fullmatch(PREFIX[group] + r'\d{1,3}', spec.id):
+            raise InputError(f'"{spec.id}" is no id', place,
+                             f'use {PREFIX[group]}0, {PREFIX[group]}1, …')
+        specs.append(spec)
+    ids = [spec.id for spec in specs]
+    if len(set(ids)) != len(ids):
+        raise InputError('ids repeat', f'{where}: {group}', 'give each vehicle its own id')
+    return tuple(specs)
+
+
+def build(kind: type[T], values: Any, where: str) -> T:
+    """
+    Build a dataclass from a mapping, checking every key and type.
+
+    :raises InputError: for an unknown or missing key, a wrong type, a number out of bounds.
+    """
+    if not isinstance(values, Mapping):
+        raise InputError('is no mapping', where)
+    assert is_dataclass(kind)
+    hints = get_type_hints(kind)
+    known = [field.name for field in fields(kind)]
+    for key in values:
+        if key not in known:
+            raise InputError(f'"{key}" is unknown', where, 'known are ' + ', '.join(known))
+    checked: dict[str, Any] = {}
+    for field in fields(kind):
+        if field.name in values:
+            checked[field.name] = _checked(
+                values[field.name], hints[field.name], field.name, where)
+        elif field.default is MISSING and field.default_factory is MISSING:
+            raise InputError(f'"{field.name}" is missing', where)
+    return kind(**checked)
+
+
+def _checked(value: Any, hint: Any, name: str, where: str) -> Any:
+    options = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+    if value is None and type(None) in options:
+        return None
+    if hint is float or hint is int:
+        return _number(value, hint, name, where)
+    if int in options:
+        return _number(value, int, name, where)
+    for option in options:
+        origin = get_origin(option)
+        if origin is Literal:
+            if value in get_args(option):
+                return value
+            raise InputError(f'"{name}" is {value!r}', where,
+                             'use one of ' + ', '.join(map(str, get_args(option))))
+        plain = origin or option
+        if isinstance(plain, type) and isinstance(value, plain):
+            return value
+    names = ' or '.join(getattr(option, '__name__', str(option)) for option in options)
+    raise InputError(f'"{name}" is {value!r}', where, f'give a {names}')
+
+
+def _number(value: Any, kind: type, name: str, where: str) -> float | int:
+    allowed = int | float if kind is float else int
+    if isinstance(value, bool) or not isinstance(value, allowed) or value != value:
+        raise InputError(f'"{name}" is {value!r}', where, 'give a number')
+    low, high = BOUNDS.get(name, (-math.inf, math.inf))
+    if not low <= value <= high or (math.isinf(value) and name != 'duration'):
+        raise InputError(f'"{name}" is {value!r}', where, f'give a number from {low:g} to {high:g}')
+    return kind(value)

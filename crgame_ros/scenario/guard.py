@@ -1,0 +1,244 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The guard of untrusted scenario files: what it lets through can be read without harm."""
+
+from collections.abc import Iterable
+import math
+from pathlib import Path
+import re
+import stat
+
+from lxml import etree
+
+from crgame_ros.errors import InputError
+
+MAX_BYTES = 64 * 2 ** 20
+MAX_MAGNITUDE = 1e9
+MAX_TIME_STEP = 100_000
+MIN_STEP_S, MAX_STEP_S = 0.001, 10.0
+VERSIONS = ('2018b', '2020a')
+OBSTACLE_TAGS = ('obstacle', 'staticObstacle', 'dynamicObstacle', 'environmentObstacle',
+                 'phantomObstacle')
+
+_FLOAT_TAGS = frozenset({'x', 'y', 'z', 'length', 'width', 'radius', 'orientation', 'speedLimit'})
+_INTEGER_TAGS = frozenset({'duration', 'timeOffset'})
+_EITHER_TAGS = frozenset({'exact', 'intervalStart', 'intervalEnd'})
+_TOP_LEVEL_IDS = ('lanelet', 'trafficSign', 'trafficLight', 'intersection', *OBSTACLE_TAGS)
+_DECLARATION = re.compile(r'^\ufeff?\s*<\?xml[^>]*\?>')
+_ENCODING = re.compile(rb'^\s*<\?xml[^>]*?encoding\s*=\s*["\']([A-Za-z0-9._-]+)["\']')
+_DOWNLOAD = 'copy the file again'
+
+
+def read_text(path: Path) -> str:
+    """
+    Read a scenario file of at most 64 MiB; nothing but a regular file is opened.
+
+    :raises InputError: if it is missing, no regular file, unreadable, too large or no text.
+    """
+    name = str(path)
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError('is a directory', name, 'name a CommonRoad XML file')
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError('is no regular file', name, 'name a CommonRoad XML file')
+        if status.st_size > MAX_BYTES:
+            raise _too_large(status.st_size, name)
+        with path.open('rb') as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise InputError(f'cannot be read ({error.strerror})', name,
+                         'check the name and the permissions') from error
+    except ValueError as error:
+        raise InputError(f'is no file name ({error})', repr(name), 'name a file') from error
+    if len(data) > MAX_BYTES:
+        raise _too_large(len(data), name)
+    return _decode(data, name)
+
+
+def parse_hardened(text: str, source: str) -> etree._Element:
+    """
+    Parse XML without entities, document types, network access or oversized nodes.
+
+    :param text: the file's content, of any declared encoding
+    :param source: file name for messages
+    :return: the root element `commonRoad`
+    :raises InputError: if it is no XML, has another root, or declares a document type.
+    """
+    if len(text) > MAX_BYTES:
+        raise _too_large(len(text), source)
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False,
+                             huge_tree=False, remove_comments=True, remove_pis=True)
+    declaration = _DECLARATION.match(text)
+    if declaration is not None:
+        blank = re.sub(r'[^\n]', '', declaration.group())
+        text = blank + text[declaration.end():]
+    try:
+        root = etree.fromstring(text.encode('utf-8'), parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        if '<!ENTITY' in text:
+            raise _has_doctype(source) from error
+        raise InputError(f'is no well-formed XML ({error})', source, _DOWNLOAD) from error
+    if root.getroottree().docinfo.doctype:
+        raise _has_doctype(source)
+    if root.tag != 'commonRoad':
+        raise InputError(f'the root element is <{root.tag}>', source,
+                         'give a CommonRoad scenario, whose root is <commonRoad>')
+    return root
+
+
+def refuse_malformed(root: etree._Element, source: str) -> None:
+    """
+    Refuse what cannot be mended: header, numbers, ids and lanelet bounds.
+
+    :raises InputError: naming file, element and line.
+    """
+    _check_header(root, source)
+    _check_ids(root, source)
+    _check_numbers(root, source)
+    lanelets = root.findall('lanelet')
+    if not lanelets:
+        raise InputError('has no lanelets', source, 'give a scenario with a road network')
+    for lanelet in lanelets:
+        _check_bounds(lanelet, source)
+    for element in root.iterchildren(*OBSTACLE_TAGS, 'planningProblem'):
+        _check_states(element, source)
+    known = {lanelet.get('id') for lanelet in lanelets}
+    for reference in root.iterfind('planningProblem/goalState/position/lanelet'):
+        if reference.get('ref') not in known:
+            raise InputError(f'the goal names lanelet {reference.get("ref")}, which does not '
+                             'exist', where(reference, source), 'correct the goal')
+
+
+def where(element: etree._Element, source: str) -> str:
+    """Name file, line and the nearest enclosing element that has an id."""
+    named: etree._Element | None = element
+    while named is not None and named.get('id') is None:
+        named = named.getparent()
+    line = f'{source}, line {element.sourceline}'
+    return line if named is None else f'{line}, {named.tag} {named.get("id")}'
+
+
+def has_finite_numbers(elements: Iterable[etree._Element]) -> bool:
+    """Tell whether every leaf among the elements holds a finite number."""
+    try:
+        return all(math.isfinite(float(e.text or '')) for e in elements if not len(e))
+    except ValueError:
+        return False
+
+
+def _too_large(size: int, source: str) -> InputError:
+    return InputError(f'has {size / 2 ** 20:.0f} MiB, more than {MAX_BYTES // 2 ** 20}', source,
+                      'give a smaller scenario')
+
+
+def _has_doctype(source: str) -> InputError:
+    return InputError('declares a document type or entities, which are not allowed', source,
+                      'remove <!DOCTYPE …>')
+
+
+def _decode(data: bytes, source: str) -> str:
+    declared = _ENCODING.match(data[:200].removeprefix(b'\xef\xbb\xbf'))
+    encoding = declared.group(1).decode('ascii') if declared else 'utf-8'
+    if data.startswith((b'\xff\xfe', b'\xfe\xff')):
+        encoding = 'utf-16'
+    try:
+        return data.decode(encoding).removeprefix('\ufeff')
+    except (LookupError, ValueError) as error:
+        raise InputError(f'is no text of encoding {encoding}', source,
+                         'give a CommonRoad XML file') from error
+
+
+def _check_header(root: etree._Element, source: str) -> None:
+    version = root.get('commonRoadVersion')
+    if version not in VERSIONS:
+        raise InputError(f'commonRoadVersion is {version!r}', f'{source}, <commonRoad>',
+                         f'convert it to {" or ".join(VERSIONS)}')
+    text = root.get('timeStepSize')
+    if text is None:
+        raise InputError('timeStepSize is missing', f'{source}, <commonRoad>',
+                         'add the time step in seconds')
+    try:
+        step = float(text)
+    except ValueError:
+        step = math.nan
+    if not MIN_STEP_S <= step <= MAX_STEP_S:
+        raise InputError(f'timeStepSize is {text!r}', f'{source}, <commonRoad>',
+                         f'give seconds from {MIN_STEP_S} to {MAX_STEP_S:g}')
+
+
+def _check_ids(root: etree._Element, source: str) -> None:
+    seen: dict[int, str] = {}
+    problems: dict[int, str] = {}
+    for element in root.iterchildren(*_TOP_LEVEL_IDS, 'planningProblem'):
+        kind = problems if element.tag == 'planningProblem' else seen
+        text = element.get('id')
+        try:
+            number = int(text)
+        except (TypeError, ValueError):
+            raise InputError(f'<{element.tag}> has the id {text!r}', where(element, source),
+                             'give a whole number') from None
+        if number in kind:
+            raise InputError(f'the id {number} is used by a {kind[number]} too',
+                             where(element, source), 'give each element an id of its own')
+        kind[number] = element.tag
+        # References are compared as text afterwards: ' 07' and '7' are the same lanelet.
+        element.set('id', str(number))
+    for reference in root.iterfind('.//*[@ref]'):
+        try:
+            reference.set('ref', str(int(reference.get('ref'))))
+        except ValueError:
+            raise InputError(f'<{reference.tag}> refers to {reference.get("ref")!r}',
+                             where(reference, source), 'give the id of an element') from None
+
+
+def _check_numbers(root: etree._Element, source: str) -> None:
+    for element in root.iter(*_FLOAT_TAGS, *_INTEGER_TAGS, *_EITHER_TAGS):
+        if len(element):
+            continue
+        integer = element.tag in _INTEGER_TAGS or (
+            element.tag in _EITHER_TAGS and element.getparent().tag == 'time')
+        try:
+            value = int(element.text) if integer else float(element.text)
+        except (TypeError, ValueError):
+            value = math.nan
+        if not abs(value) <= MAX_MAGNITUDE:
+            raise InputError(
+                f'<{element.tag}> is {(element.text or "empty")[:40]!r}, no usable '
+                f'{"whole " if integer else ""}number', where(element, source),
+                'give a finite number')
+
+
+def _check_bounds(lanelet: etree._Element, source: str) -> None:
+    counts = []
+    for name in ('leftBound', 'rightBound'):
+        points = lanelet.findall(f'{name}/point')
+        if len(points) < 2:
+            raise InputError(f'<{name}> has {len(points)} points', where(lanelet, source),
+                             'give each bound at least 2')
+        for point in points:
+            if point.find('x') is None or point.find('y') is None:
+                raise InputError('a point has no x or no y', where(point, source),
+                                 'complete it')
+        counts.append(len(points))
+    if counts[0] != counts[1]:
+        raise InputError(f'the bounds have {counts[0]} and {counts[1]} points',
+                         where(lanelet, source), 'give both bounds equally many')
+
+
+def _check_states(element: etree._Element, source: str) -> None:
+    if element.tag in ('environmentObstacle', 'phantomObstacle'):
+        states: list[etree._Element] = []
+    else:
+        states = element.findall('initialState')
+        if not states:
+            raise InputError('has no initialState', where(element, source), 'add it')
+    states += element.findall('trajectory/state')
+    for state in states:
+        if state.find('position') is None:
+            raise InputError(f'a <{state.tag}> has no position', where(state, source), 'add it')
+    for timed in [*states, *element.findall('occupancySet/occupancy')]:
+        for step in timed.iterfind('time/*'):
+            if step.tag in _EITHER_TAGS and not 0 <= int(step.text) <= MAX_TIME_STEP:
+                raise InputError(f'the time step {step.text} lies outside 0 to {MAX_TIME_STEP}',
+                                 where(step, source), 'correct it')

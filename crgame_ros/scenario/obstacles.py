@@ -1,0 +1,227 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The obstacles of a scenario: what they look like, and where they are at each time step."""
+
+from dataclasses import dataclass
+import math
+
+from commonroad.common.util import Interval
+from commonroad.geometry.shape import Circle, Rectangle
+from commonroad.geometry.shape import Shape as CommonRoadShape
+from commonroad.geometry.shape import ShapeGroup
+from commonroad.prediction.prediction import SetBasedPrediction, TrajectoryPrediction
+from commonroad.scenario.obstacle import DynamicObstacle, Obstacle, PhantomObstacle
+from commonroad.scenario.state import State
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.loading import (
+    exact_position, exact_value, group_outline, LoadedScenario)
+from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
+
+FloatArray = NDArray[np.float64]
+
+_MAX_CELLS = 20_000_000
+
+
+@dataclass(frozen=True)
+class _Track:
+    """Poses (n, 3) of one obstacle's centre at time steps (n), which are none if it is static."""
+
+    steps: NDArray[np.int64]
+    poses: FloatArray
+    speed: float = 0.0
+
+
+class ScenarioObstacles:
+    """
+    Everything in a scenario that is not a driven vehicle, as arrays over time steps.
+
+    Poses are those of the shape's centre: a centre offset of a CommonRoad shape is fixed to the
+    body and turns with it. Uncertain states count as their centres, a set-based prediction as
+    the centres of its occupancies, and gaps inside a trajectory are interpolated. Before its
+    first and after its last state an obstacle is absent (NaN); static ones are always there.
+
+    :param loaded: the scenario.
+    :raises InputError: if a shape cannot be used, or there are too many states.
+    """
+
+    def __init__(self, loaded: LoadedScenario) -> None:
+        scenario = loaded.scenario
+        obstacles = [*scenario.static_obstacles, *scenario.environment_obstacle,
+                     *scenario.dynamic_obstacles, *scenario.phantom_obstacle]
+        self.time_step_s = loaded.time_step_s
+        described = [_describe(obstacle, loaded.source) for obstacle in obstacles]
+        self.descriptions: tuple[ObjectDescription, ...] = tuple(d for d, _ in described)
+        self.ids: tuple[str, ...] = tuple(d.id for d in self.descriptions)
+        tracks = [_track(o, offset) for o, (_, offset) in zip(obstacles, described, strict=True)]
+        moving = [t for t in tracks if len(t.steps)]
+        self.first_k: int = min((int(t.steps[0]) for t in moving), default=0)
+        self.last_k: int = max((int(t.steps[-1]) for t in moving), default=0)
+        count = self.last_k - self.first_k + 1
+        if count * len(tracks) > _MAX_CELLS:
+            raise InputError(f'{len(tracks)} obstacles over {count} time steps are too many',
+                             loaded.source, 'shorten the trajectories')
+        self._poses: FloatArray = np.full((count, len(tracks), 3), np.nan)
+        self._velocities: FloatArray = np.full((count, len(tracks), 3), np.nan)
+        for column, track in enumerate(tracks):
+            self._fill(column, track)
+        self._poses.flags.writeable = False
+        self._velocities.flags.writeable = False
+        self._static = ObjectStates(*self._only_static())
+
+    @property
+    def poses(self) -> FloatArray:
+        """All poses (last_k - first_k + 1, M, 3) from `first_k` on; NaN where absent."""
+        return self._poses
+
+    @property
+    def velocities(self) -> FloatArray:
+        """All velocities, shaped like `poses`."""
+        return self._velocities
+
+    def states_at(self, k: int) -> ObjectStates:
+        """
+        Give the poses and velocities of all obstacles at a time step.
+
+        A velocity leads to the pose at k + 1: pose + velocity * Delta t_c; at an obstacle's last
+        step it is the one before. The arrays are read-only.
+
+        :param k: scenario time step, any integer
+        """
+        if self.first_k <= k <= self.last_k:
+            row = k - self.first_k
+            return ObjectStates(self._poses[row], self._velocities[row])
+        return self._static
+
+    def _fill(self, column: int, track: _Track) -> None:
+        if len(track.steps):
+            rows = np.arange(track.steps[0], track.steps[-1] + 1)
+            yaw = np.unwrap(track.poses[:, 2])
+            poses = np.stack([np.interp(rows, track.steps, c) for c in
+                              (track.poses[:, 0], track.poses[:, 1], yaw)], axis=-1)
+            where = slice(rows[0] - self.first_k, rows[-1] + 1 - self.first_k)
+        else:
+            poses, where = track.poses, slice(None)
+        velocities = np.zeros_like(poses)
+        if len(poses) > 1:
+            velocities[:-1] = np.diff(poses, axis=0) / self.time_step_s
+            velocities[-1] = velocities[-2]
+        elif len(track.steps):
+            velocities[0, :2] = (track.speed * math.cos(poses[0, 2]),
+                                 track.speed * math.sin(poses[0, 2]))
+        poses[:, 2] = wrap_pi_array(poses[:, 2])
+        self._poses[where, column] = poses
+        self._velocities[where, column] = velocities
+
+    def _only_static(self) -> tuple[FloatArray, FloatArray]:
+        poses, velocities = self._poses[0].copy(), self._velocities[0].copy()
+        moving = [d.role is not Role.STATIC for d in self.descriptions]
+        poses[moving] = np.nan
+        velocities[moving] = np.nan
+        poses.flags.writeable = velocities.flags.writeable = False
+        return poses, velocities
+
+
+def _describe(obstacle: Obstacle, source: str) -> tuple[ObjectDescription, tuple[float, float]]:
+    role = Role.RECORDED if isinstance(obstacle, DynamicObstacle | PhantomObstacle) \
+        else Role.STATIC
+    where = f'{source}, obstacle {obstacle.obstacle_id}'
+    shape = getattr(obstacle, 'obstacle_shape', None)
+    if isinstance(obstacle, PhantomObstacle):
+        if obstacle.prediction is None:
+            raise InputError('a phantom obstacle has no occupancy set', where, 'remove it')
+        shape = obstacle.prediction.occupancy_set[0].shape
+    try:
+        footprint, offset = convert_shape(shape)
+    except InputError as error:
+        raise InputError(error.what, where, error.remedy) from error
+    kind = getattr(obstacle, 'obstacle_type', None)
+    name = 'unknown' if kind is None else str(kind.value)
+    return ObjectDescription(f'o{obstacle.obstacle_id}', name, role, footprint), offset
+
+
+def convert_shape(shape: CommonRoadShape) -> tuple[Shape, tuple[float, float]]:
+    """
+    Convert a CommonRoad shape; groups become their convex hull.
+
+    :return: the shape around its centre, and the centre relative to the reference point [m]
+    :raises InputError: if the shape has no positive, finite extent.
+    """
+    if isinstance(shape, Rectangle) and shape.orientation == 0.0:
+        return Shape.rectangle(shape.length, shape.width), _pair(shape.center)
+    if isinstance(shape, Circle):
+        return Shape.circle(shape.radius), _pair(shape.center)
+    outline = group_outline(shape).convex_hull if isinstance(shape, ShapeGroup) \
+        else shape.shapely_object
+    if outline.geom_type != 'Polygon' or not outline.area > 0.0:
+        raise InputError('the shape has no area', 'shape', 'correct it')
+    center = outline.centroid
+    corners = np.asarray(outline.exterior.coords)[:-1, :2] - (center.x, center.y)
+    return (Shape.polygon(tuple((float(x), float(y)) for x, y in corners)),
+            (float(center.x), float(center.y)))
+
+
+def _pair(center: FloatArray) -> tuple[float, float]:
+    return float(center[0]), float(center[1])
+
+
+def _track(obstacle: Obstacle, offset: tuple[float, float]) -> _Track:
+    if not isinstance(obstacle, DynamicObstacle | PhantomObstacle):
+        state = getattr(obstacle, 'initial_state', None)
+        pose = np.zeros(3) if state is None else _pose(state)
+        return _Track(np.empty(0, dtype=np.int64), _centers(pose[None, :], np.ones(1), offset))
+    # The last column says whether the position is the reference point (1) or the centre (0).
+    entries: dict[int, FloatArray] = {}
+    speed = 0.0
+    if isinstance(obstacle, DynamicObstacle):
+        state = obstacle.initial_state
+        entries[_step(state.time_step)] = np.array([*_pose(state), 1.0])
+        speed = exact_value(getattr(state, 'velocity', None))
+    prediction = obstacle.prediction
+    if isinstance(prediction, TrajectoryPrediction):
+        for state in prediction.trajectory.state_list:
+            entries.setdefault(_step(state.time_step), np.array([*_pose(state), 1.0]))
+    elif isinstance(prediction, SetBasedPrediction):
+        for occupancy in prediction.occupancy_set:
+            yaw = getattr(occupancy.shape, 'orientation', math.nan)
+            entries.setdefault(_step(occupancy.time_step),
+                               np.array([*exact_position(occupancy.shape), yaw, 0.0]))
+    steps = np.array(sorted(entries), dtype=np.int64)
+    rows = np.array([entries[int(k)] for k in steps])
+    return _Track(steps, _centers(_with_headings(rows[:, :3]), rows[:, 3], offset), speed)
+
+
+def _centers(poses: FloatArray, share: FloatArray, offset: tuple[float, float]) -> FloatArray:
+    """Move reference poses (n, 3) to the centre, by the share (n) of a body-fixed offset."""
+    cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    return np.stack((poses[:, 0] + share * (cos * offset[0] - sin * offset[1]),
+                     poses[:, 1] + share * (sin * offset[0] + cos * offset[1]),
+                     poses[:, 2]), axis=-1)
+
+
+def _step(time_step: int | Interval) -> int:
+    return math.floor(exact_value(time_step))
+
+
+def _pose(state: State) -> FloatArray:
+    position = exact_position(state.position)
+    if getattr(state, 'orientation', None) is not None:
+        yaw = exact_value(state.orientation)
+    elif getattr(state, 'velocity_y', None) is not None:
+        yaw = math.atan2(exact_value(state.velocity_y), exact_value(state.velocity))
+    else:
+        yaw = math.nan
+    return np.array([position[0], position[1], yaw])
+
+
+def _with_headings(poses: FloatArray) -> FloatArray:
+    """Fill in headings that the file does not give: keep the last known one."""
+    known = np.isfinite(poses[:, 2])
+    if not known.all():
+        source = np.maximum.accumulate(np.where(known, np.arange(len(poses)), -1))
+        poses[:, 2] = np.where(source >= 0, poses[source, 2], 0.0)
+    return poses

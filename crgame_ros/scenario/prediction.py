@@ -1,0 +1,181 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Predictions of others on the scenario grid.
+
+The human-vehicle scenario adapter (CRG III-A1c) predicts driven vehicles at constant speed and
+steering; recorded obstacles are predicted at constant speed along their lane.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.scenario.lane_line import LaneLine
+from crgame_ros.scenario.objects import Role
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.vehicle.state import StateColumn
+
+FloatArray = NDArray[np.float64]
+
+# Beyond this angle to its lane an obstacle crosses the lane, or drives the wrong way.
+_MAX_LANE_ANGLE = math.radians(45.0)
+_FREE_MOVERS = ('pedestrian', 'unknown')
+_SPACING = 0.5
+_BEHIND = 30.0
+_NO_LANE = -1
+
+
+def predict_constant_steering(states: FloatArray, wheelbases: FloatArray, steps: int,
+                              time_step_s: float) -> tuple[FloatArray, FloatArray]:
+    """
+    Predict driven vehicles at constant speed and steering angle (CRG III-A1c).
+
+    The kinematic model of CRG 2-4 without inputs has the closed solution of a circular arc of
+    yaw rate v tan(delta) / L.
+
+    :param states: (V, 8) rear-axle states, columns as in `StateColumn`
+    :param wheelbases: (V) wheelbases L [m]
+    :param steps: number of steps after the present
+    :param time_step_s: Delta t_c [s]
+    :return: rear-axle poses and velocities, both (steps + 1, V, 3); row 0 is the present
+    """
+    speed, yaw = states[:, StateColumn.SPEED], states[:, StateColumn.YAW]
+    yaw_rate = speed * np.tan(states[:, StateColumn.STEERING_ANGLE]) / wheelbases
+    time = np.arange(steps + 1)[:, None] * time_step_s
+    half_turn = 0.5 * yaw_rate * time
+    # A chord of an arc is v t sinc(half turn) long and points along the mean heading; sinc has
+    # no singularity for straight driving.
+    chord = speed * time * np.sinc(half_turn / np.pi)
+    heading = yaw + 2.0 * half_turn
+    poses = np.stack((states[:, StateColumn.X] + chord * np.cos(yaw + half_turn),
+                      states[:, StateColumn.Y] + chord * np.sin(yaw + half_turn),
+                      wrap_pi_array(heading)), axis=-1)
+    poses[0, :, 2] = yaw
+    velocities = np.stack((speed * np.cos(heading), speed * np.sin(heading),
+                           np.broadcast_to(yaw_rate, heading.shape)), axis=-1)
+    return poses, velocities
+
+
+def recorded_future(obstacles: ScenarioObstacles, k: int,
+                    steps: int) -> tuple[FloatArray, FloatArray]:
+    """
+    Give the true future of all obstacles (`prediction: recorded`, which leaks).
+
+    :return: poses and velocities, both (steps + 1, M, 3); NaN where absent
+    """
+    states = [obstacles.states_at(k + i) for i in range(steps + 1)]
+    return np.stack([s.poses for s in states]), np.stack([s.velocities for s in states])
+
+
+class LanePrediction:
+    """
+    Predict obstacles at constant speed along their lanes; nothing of their future is used.
+
+    An obstacle keeps its offset to the centre line and its speed along the lane, over the
+    straightest successors and straight on where the map ends. Pedestrians, and whatever is on
+    no lane or at more than 45 degrees to it, go straight on at constant velocity, static
+    obstacles stay, and absent ones are NaN.
+
+    All lanes are found at construction. Each lane line is tabulated at equal distances, so that
+    a prediction of all obstacles is a few array look-ups.
+
+    :param obstacles: the obstacles of the scenario.
+    :param network: its road network.
+    """
+
+    def __init__(self, obstacles: ScenarioObstacles, network: RoadNetwork) -> None:
+        self._obstacles = obstacles
+        self._network = network
+        self._roles = np.array([d.role is Role.RECORDED for d in obstacles.descriptions], bool)
+        shape = obstacles.poses.shape[:2]
+        self._lane: NDArray[np.int64] = np.full(shape, _NO_LANE, dtype=np.int64)
+        self._s: FloatArray = np.zeros(shape)
+        self._d: FloatArray = np.zeros(shape)
+        self._speed: FloatArray = np.einsum(
+            'kmi,kmi->km', obstacles.velocities[..., :2],
+            np.stack((np.cos(obstacles.poses[..., 2]), np.sin(obstacles.poses[..., 2])), -1))
+        self._reach = 0.0
+        self._assign_lanes()
+
+    def predict(self, k: int, steps: int) -> tuple[FloatArray, FloatArray]:
+        """
+        Predict all obstacles from their states at scenario time step k.
+
+        :return: poses and velocities, both (steps + 1, M, 3); row 0 is `states_at(k)`, in later
+            rows a velocity leads to the next pose
+        """
+        now = self._obstacles.states_at(k)
+        dt = self._obstacles.time_step_s
+        time = np.arange(steps + 2, dtype=np.float64) * dt
+        poses = now.poses + time[:, None, None] * now.velocities
+        poses[..., 2] = now.poses[:, 2]
+        row = k - self._obstacles.first_k
+        if 0 <= row < len(self._lane):
+            on_lane = np.flatnonzero(self._lane[row] != _NO_LANE)
+            if len(on_lane):
+                poses[1:, on_lane] = self._along_lanes(row, on_lane, time[1:])
+        velocities = np.empty((steps + 1, *now.poses.shape))
+        velocities[0] = now.velocities
+        velocities[1:] = np.diff(poses[1:], axis=0) * (1.0 / dt)
+        poses = poses[:-1]
+        poses[1:, :, 2] = wrap_pi_array(poses[1:, :, 2])
+        poses[0] = now.poses
+        return poses, velocities
+
+    def _along_lanes(self, row: int, columns: NDArray[np.int64], time: FloatArray) -> FloatArray:
+        speed = self._speed[row, columns]
+        travelled = time[:, None] * speed
+        self._ensure_reach(float(np.abs(travelled[-1]).max()))
+        lane = self._lane[row, columns]
+        index = (self._s[row, columns] + _BEHIND + travelled) / _SPACING
+        last = self._counts[lane] - 2
+        cell = np.clip(index.astype(np.int64), 0, last)
+        fraction = (index - cell)[..., None]
+        cell = cell + self._starts[lane]
+        before = self._table[cell]
+        poses: FloatArray = before + fraction * (self._table[cell + 1] - before)
+        # The direction must not turn on where a line ends and goes straight on.
+        yaw = before[..., 2] + np.clip(fraction[..., 0], 0.0, 1.0) * (
+            self._table[cell + 1, 2] - before[..., 2])
+        d = self._d[row, columns]
+        poses[..., 0] -= d * np.sin(yaw)
+        poses[..., 1] += d * np.cos(yaw)
+        poses[..., 2] = yaw
+        return poses
+
+    def _assign_lanes(self) -> None:
+        poses = self._obstacles.poses
+        free = [d.type in _FREE_MOVERS for d in self._obstacles.descriptions]
+        mask = np.isfinite(poses[..., 0]) & (self._roles & ~np.array(free, dtype=bool))
+        rows, columns = np.nonzero(mask)
+        found = self._network.lanelets_at(poses[rows, columns])
+        self._used = [int(lane) for lane in np.unique(found[found >= 0])]
+        for number, lane in enumerate(self._used):
+            mine = found == lane
+            where = rows[mine], columns[mine]
+            line = self._network.line(self._network.lanelet_ids[lane])
+            s, d = line.project(poses[where][:, :2])
+            yaw = np.interp(s, line.s, line.headings)
+            along = np.abs(wrap_pi_array(poses[where][:, 2] - yaw)) <= _MAX_LANE_ANGLE
+            where = where[0][along], where[1][along]
+            self._lane[where], self._s[where], self._d[where] = number, s[along], d[along]
+
+    def _ensure_reach(self, reach: float) -> None:
+        """Tabulate every used lane at least `reach` metres beyond its end."""
+        if reach <= self._reach:
+            return
+        self._reach = max(200.0, 1.5 * reach)
+        tables = []
+        for lane in self._used:
+            lanelet_id = self._network.lanelet_ids[lane]
+            line = LaneLine(self._network.lane_path(lanelet_id, self._reach))
+            end = self._network.line(lanelet_id).length + self._reach
+            s = np.arange(-_BEHIND, end + 2.0 * _SPACING, _SPACING)
+            tables.append(line.poses(s, np.zeros_like(s)))
+        self._counts = np.array([len(t) for t in tables])
+        self._starts = np.concatenate(([0], np.cumsum(self._counts)[:-1]))
+        self._table: FloatArray = np.concatenate(tables)

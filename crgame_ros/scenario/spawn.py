@@ -1,0 +1,287 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where driven vehicles start."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import math
+
+from commonroad.planning.planning_problem import PlanningProblem
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.game import HumanSpec, LaneletSpawn, PoseSpawn
+from crgame_ros.scenario.lane_line import LaneLine
+from crgame_ros.scenario.loading import exact_position, exact_value
+from crgame_ros.scenario.objects import ObjectDescription, ObjectStates
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+
+# Margin around the footprint [m], headway behind the AV [s], and what a driver is taken to
+# brake with and to react in when a gap is judged [m/s^2], [s].
+_MARGIN = 0.5
+_HEADWAY_S = 2.0
+_BRAKING = 4.0
+_REACTION_S = 1.0
+_SIGHT = 120.0
+_NEAR = 250.0
+_MAX_NEAR = 600
+# Below this speed a yaw rate says nothing about the steering angle.
+_MIN_STEERING_SPEED = 0.5
+
+
+def problem_pose(problem: PlanningProblem, rear_to_center: float,
+                 wheelbase: float | None = None) -> VehicleState:
+    """
+    Give the initial state of a planning problem as a rear-axle state.
+
+    The position of a CommonRoad state is the centre of the vehicle (so documented by the state
+    classes of the KS model, and read so by the reactive planner, which shifts it to the rear
+    axle); it is moved back along the heading.
+
+    :param problem: its initial state is exact (`LoadedScenario.planning_problems`)
+    :param rear_to_center: distance l_r from the rear axle to the centre [m]
+    :param wheelbase: L [m], with which a given yaw rate becomes the steering angle
+        atan(L yaw_rate / v) of the KS model; None starts with straight wheels
+    """
+    state = problem.initial_state
+    x, y = exact_position(state.position)
+    yaw, speed = wrap_pi(exact_value(state.orientation)), exact_value(state.velocity)
+    yaw_rate = exact_value(getattr(state, 'yaw_rate', None))
+    steering = 0.0
+    if wheelbase is None or abs(speed) < _MIN_STEERING_SPEED:
+        yaw_rate = 0.0
+    else:
+        steering = math.atan(wheelbase * yaw_rate / speed)
+    return VehicleState(float(x) - rear_to_center * math.cos(yaw),
+                        float(y) - rear_to_center * math.sin(yaw), yaw, speed, steering,
+                        exact_value(getattr(state, 'acceleration', None)), yaw_rate)
+
+
+def lanelet_pose(network: RoadNetwork, state: VehicleState) -> VehicleState:
+    """
+    Give the simulator-side initial pose of an AV from lanelet geometry (CRG III-A1).
+
+    :param network: the road network
+    :param state: the planner-side state of the rear axle
+    :return: the same at the nearest point of the centre line, with the lane's heading
+    """
+    lanelet = network.nearest_lanelet(state.x, state.y, state.yaw)
+    s, _ = network.locate(lanelet, state.x, state.y)
+    x, y, yaw = network.pose_on(lanelet, min(max(s, 0.0), network.line(lanelet).length))
+    return state._replace(x=x, y=y, yaw=yaw)
+
+
+def place_human(network: RoadNetwork, spec: HumanSpec, parameters: VehicleParameters,
+                avs: Sequence[VehicleState], obstacles: Sequence[ObjectDescription],
+                obstacle_states: ObjectStates, others: Sequence[VehicleState] = (),
+                vehicles: Sequence[VehicleParameters] | None = None) -> VehicleState:
+    """
+    Place a human's vehicle at the start.
+
+    Exactly where `spec.spawn` says; without it on the lane beside the first AV and slightly
+    behind, or behind it in its lane by 2 s, or ahead of it, or elsewhere on a lane near it;
+    without an AV at the start of a long road. A place that was searched for lies on the road, in
+    the lane's heading, at least 0.5 m from everything, and its speed is the AV's, at most one
+    from which it can brake behind its leader.
+
+    :param spec: the human of the game file
+    :param parameters: of the human's vehicle
+    :param avs: rear-axle states of the AVs
+    :param obstacles: (M) descriptions of the obstacles
+    :param obstacle_states: (M) where they are at k0
+    :param others: rear-axle states of humans already placed
+    :param vehicles: parameters of `avs`, then of `others`; None: as the human's
+    :raises InputError: if the spawn names no place on the map, or no free place exists.
+    """
+    if isinstance(spec.spawn, PoseSpawn):
+        return VehicleState(spec.spawn.x, spec.spawn.y, spec.spawn.yaw, spec.spawn.speed)
+    if isinstance(spec.spawn, LaneletSpawn):
+        return _on_lanelet(network, spec.spawn, spec.id)
+    states = [*avs, *others]
+    known = [parameters] * len(states) if vehicles is None else list(vehicles)
+    scene = _Scene.of(states, known, obstacles, obstacle_states)
+    places = _near_av(network, parameters, avs[0]) if avs else _road_starts(network, parameters)
+    wanted = avs[0].speed if avs else 0.0
+    second_best: VehicleState | None = None
+    for lanelet, s in places:
+        state = _try(network, parameters, scene, lanelet, s)
+        if state is None:
+            continue
+        speed, safe_behind = _fit_speed(network, parameters, scene, lanelet, s, wanted)
+        state = state._replace(speed=speed)
+        if safe_behind:
+            return state
+        second_best = second_best or state
+    if second_best is None:
+        raise InputError('there is no free place on the road', f'spawn of {spec.id}',
+                         'give its spawn in the game file')
+    return second_best
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """Everything that stands or drives at k0: outlines, centres (n, 2), velocities, sizes."""
+
+    outlines: NDArray[np.object_]
+    centers: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+    widths: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, states: Sequence[VehicleState], vehicles: Sequence[VehicleParameters],
+           obstacles: Sequence[ObjectDescription], at_k0: ObjectStates) -> '_Scene':
+        shapes: list[Shape] = []
+        rows: list[tuple[float, ...]] = []
+        for state, vehicle in zip(states, vehicles, strict=True):
+            shapes.append(vehicle.shape)
+            rows.append((*state.center(vehicle.rear_to_center), state.yaw,
+                         state.speed * math.cos(state.yaw), state.speed * math.sin(state.yaw)))
+        for description, pose, velocity in zip(obstacles, at_k0.poses, at_k0.velocities,
+                                               strict=True):
+            if np.isfinite(pose).all():
+                shapes.append(description.shape)
+                rows.append((*pose, *velocity[:2]))
+        table = np.array(rows, dtype=np.float64).reshape(-1, 5)
+        outlines = [outline(s, *row[:3]) for s, row in zip(shapes, rows, strict=True)]
+        return cls(np.array(outlines, dtype=object), table[:, :2], table[:, 3:],
+                   np.array([s.length for s in shapes]), np.array([s.width for s in shapes]))
+
+
+def outline(shape: Shape, x: float, y: float, yaw: float, margin: float = 0.0) -> shapely.Polygon:
+    """
+    Give the outline of a shape at a pose of its centre.
+
+    :param margin: grows a rectangle on each side, a circle or polygon all around [m]
+    """
+    if shape.kind == 'circle':
+        return shapely.Point(x, y).buffer(0.5 * shape.length + margin, quad_segs=32)
+    if shape.kind == 'polygon':
+        corners = np.array(shape.vertices)
+    else:
+        half = np.array([0.5 * shape.length + margin, 0.5 * shape.width + margin])
+        corners = half * ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    polygon = shapely.Polygon(corners @ np.array([[cos, sin], [-sin, cos]]) + (x, y))
+    return polygon.buffer(margin) if margin and shape.kind == 'polygon' else polygon
+
+
+def _on_lanelet(network: RoadNetwork, spawn: LaneletSpawn, vehicle_id: str) -> VehicleState:
+    where = f'spawn of {vehicle_id}'
+    if spawn.lanelet not in network.lanelet_ids:
+        raise InputError(f'there is no lanelet {spawn.lanelet}', where,
+                         'name a lanelet of the scenario')
+    length = network.line(spawn.lanelet).length
+    if not 0.0 <= spawn.s <= length:
+        raise InputError(f's = {spawn.s} m is not on lanelet {spawn.lanelet}', where,
+                         f'give 0 to {length:.1f} m')
+    return VehicleState(*network.pose_on(spawn.lanelet, spawn.s, spawn.d), spawn.speed)
+
+
+def _near_av(network: RoadNetwork, parameters: VehicleParameters,
+             av: VehicleState) -> Iterator[tuple[int, float]]:
+    """Propose places in the order of preference: beside, behind, ahead, anywhere near."""
+    lane = network.nearest_lanelet(av.x, av.y, av.yaw)
+    s_av, _ = network.locate(lane, av.x, av.y)
+    length = parameters.length
+    for neighbour in (network.left_of(lane), network.right_of(lane)):
+        if neighbour is None or neighbour not in network.lanelet_ids:
+            continue
+        s, d = network.locate(neighbour, av.x, av.y)
+        if abs(d) > network.width_at(neighbour, s) + network.width_at(lane, s_av):
+            continue
+        for back in (1.2, 1.6, 2.0, 3.0, 4.0):
+            place = network.advance(neighbour, s, -back * length)
+            if place is not None:
+                yield place
+    gap = _HEADWAY_S * abs(av.speed) + 2.0 * length
+    for direction in (-1.0, 1.0):
+        for extra in (0.0, 5.0, 10.0, 20.0, 40.0):
+            place = network.advance(lane, s_av, direction * (gap + extra))
+            if place is not None:
+                yield place
+    everywhere = [(math.dist((x, y), (av.x, av.y)), lanelet, s)
+                  for lanelet in network.lanelet_ids
+                  for s, (x, y) in _grid(network, lanelet)]
+    near = sorted(place for place in everywhere if place[0] <= _NEAR)
+    for _, lanelet, s in near[:_MAX_NEAR]:
+        yield lanelet, s
+
+
+def _road_starts(network: RoadNetwork,
+                 parameters: VehicleParameters) -> Iterator[tuple[int, float]]:
+    """Propose places without an AV: starts of roads, the longest first, then everywhere."""
+    reach: list[tuple[float, int]] = []
+    for lanelet in network.lanelet_ids:
+        if network.is_for_cars(lanelet) and network.straightest_predecessor(lanelet) is None:
+            reach.append((-LaneLine(network.lane_path(lanelet, 1000.0)).length, lanelet))
+    for _, lanelet in sorted(reach):
+        yield from ((lanelet, s) for s in np.arange(0.5 * parameters.length + _MARGIN, min(
+            50.0, network.line(lanelet).length), 5.0).tolist())
+    longest = sorted(network.lanelet_ids, key=lambda x: -network.line(x).length)
+    for lanelet in longest[:_MAX_NEAR]:
+        yield from ((lanelet, s) for s, _ in _grid(network, lanelet))
+
+
+def _grid(network: RoadNetwork, lanelet: int) -> list[tuple[float, NDArray[np.float64]]]:
+    line = network.line(lanelet)
+    if not network.is_for_cars(lanelet):
+        return []
+    s = np.arange(0.0, line.length, 5.0)
+    return list(zip(s.tolist(), line.poses(s, np.zeros_like(s))[:, :2], strict=True))
+
+
+def _try(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,
+         s: float) -> VehicleState | None:
+    """Stand on the centre line at s; None off the road or too close to something."""
+    if not network.is_for_cars(lanelet):
+        return None
+    state = VehicleState(*network.pose_on(lanelet, s), 0.0)
+    pose = (*state.center(parameters.rear_to_center), state.yaw)
+    if not network.covers(outline(parameters.shape, *pose)):
+        return None
+    guarded = outline(parameters.shape, *pose, margin=_MARGIN)
+    return None if shapely.intersects(guarded, scene.outlines).any() else state
+
+
+def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,
+               s: float, wanted: float) -> tuple[float, bool]:
+    """
+    Limit a speed to what leader, lane and vehicle allow, and judge the followers.
+
+    :return: speed [m/s], and whether each follower is slower or can brake behind it
+    """
+    back, parts = 0.0, [network.lane_path(lanelet, _SIGHT)]
+    before = network.straightest_predecessor(lanelet)
+    while before is not None and back < _SIGHT:
+        parts.insert(0, network.line(before).points)
+        back += network.line(before).length
+        before = network.straightest_predecessor(before)
+    line = LaneLine(np.concatenate(parts))
+    s_obj, d_obj = line.project(scene.centers)
+    yaw = np.interp(s_obj, line.s, line.headings)
+    along = scene.velocities[:, 0] * np.cos(yaw) + scene.velocities[:, 1] * np.sin(yaw)
+    ahead = s_obj - (s + back + parameters.rear_to_center)
+    gaps = np.abs(ahead) - 0.5 * (scene.lengths + parameters.length)
+    on_lane = (np.abs(d_obj) < 0.5 * (scene.widths + parameters.width) + 0.3) & (gaps < _SIGHT)
+    speed = min(max(wanted, 0.0), parameters.max_speed,
+                network.speed_limit(lanelet) or math.inf)
+    for leader in np.flatnonzero(on_lane & (ahead > 0.0)):
+        speed = min(speed, _safe_speed(gaps[leader], along[leader]))
+    followers = np.flatnonzero(on_lane & (ahead <= 0.0))
+    # A recorded follower does not react: slower ones are harmless however close they are.
+    return speed, all(along[f] <= max(speed, _safe_speed(gaps[f], speed)) for f in followers)
+
+
+def _safe_speed(gap: float, leader_speed: float) -> float:
+    """Give the speed from which a driver can stop behind a braking leader (Krauss' model)."""
+    reaction = _BRAKING * _REACTION_S
+    root = math.sqrt(reaction ** 2 + max(leader_speed, 0.0) ** 2
+                     + 2.0 * _BRAKING * max(float(gap), 0.0))
+    return root - reaction

@@ -1,0 +1,177 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""An autonomous vehicle between its planner's answers (CRG III-A1d, III-B; algorithm 2)."""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.planner.interface import Plan
+from crgame_ros.planner.joints import JointSeries, plan_from_joints
+from crgame_ros.planner.plan_check import check_plan
+from crgame_ros.scenario.game import TimingSpec
+from crgame_ros.simulation.setup import AvSetup
+from crgame_ros.timing.progress_tracker import ProgressTracker
+from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.state import VehicleState
+
+# Braking of an AV whose plan is used up [m/s^2]: firm, well within a dry road's friction.
+EXHAUSTED_DECELERATION = 4.0
+# A planner that is silent for so long is asked again [s] (semantics of the busy flag).
+BUSY_TIMEOUT_S = 1.0
+# Requests remembered, so that an overdue plan can still be checked and used.
+REMEMBERED_REQUESTS = 64
+
+
+@dataclass
+class AvCounters:
+    """What became of an AV's requests and plans so far."""
+
+    requests: int = 0
+    skipped: int = 0
+    timed_out: int = 0
+    accepted: int = 0
+    refused: int = 0
+    realigned: int = 0
+    steps_without_plan: int = 0
+    last_refusal: str = ''
+    last_latency_steps: int = 0
+
+
+class AutonomousVehicle:
+    """Follows the latest accepted plan; owns the busy flag of algorithm 2."""
+
+    def __init__(self, setup: AvSetup, scheduler: ScenarioScheduler, timing: TimingSpec) -> None:
+        self.setup = setup
+        self.state = setup.state
+        self.counters = AvCounters()
+        self.plan: Plan | None = None
+        self._scheduler = scheduler
+        self._tracker = ProgressTracker(scheduler.steps_per_tick, timing.realign, timing.sample)
+        self._asked: OrderedDict[int, VehicleState] = OrderedDict()
+        self._busy_since: int | None = None
+        self._followed_request_n = -1
+        self._without_plan = False
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether a request is out that has not been answered."""
+        return self._busy_since is not None
+
+    @property
+    def uses_no_plan(self) -> bool:
+        """Tell whether the vehicle brakes because its plan is used up or never came."""
+        return self._without_plan
+
+    def plan_age_steps(self, n: int) -> int | None:
+        """Count the steps since the followed plan was asked for; None without a plan."""
+        return None if self._followed_request_n < 0 else n - self._followed_request_n
+
+    def wants_request(self, n: int) -> bool:
+        """Decide at a tick whether to ask the planner (algorithm 2, line 6)."""
+        if self._busy_since is not None:
+            if (n - self._busy_since) * self._scheduler.dt_s < BUSY_TIMEOUT_S:
+                self.counters.skipped += 1
+                return False
+            self.counters.timed_out += 1
+        return True
+
+    def request_sent(self, n: int, stamp_ns: int, ego: VehicleState) -> None:
+        """Remember what the planner was asked (algorithm 2, line 8)."""
+        self._busy_since = n
+        self._asked[stamp_ns] = ego
+        if len(self._asked) > REMEMBERED_REQUESTS:
+            self._asked.popitem(last=False)
+        self.counters.requests += 1
+
+    def offer(self, series: JointSeries, n: int) -> str | None:
+        """
+        Take a planner's answer, to be followed from step n on (algorithm 2, lines 2-3).
+
+        :return: None if accepted, else the reason for refusing it; the last plan then stays.
+        """
+        reason = self._refusal(series, n)
+        if reason is not None:
+            self.counters.refused += 1
+            self.counters.last_refusal = reason
+        return reason
+
+    def _refusal(self, series: JointSeries, n: int) -> str | None:
+        asked = self._asked.get(series.stamp_ns)
+        request_n = self._scheduler.tick_of_stamp(series.stamp_ns)
+        if asked is None or request_n is None:
+            return f'stamp {series.stamp_ns} ns answers no request'
+        if request_n == self._followed_request_n:
+            # An answer to a request that was sent twice says nothing new.
+            return None
+        if request_n < self._followed_request_n:
+            return f'stamp {series.stamp_ns} ns is older than the followed plan'
+        if self._busy_since == request_n:
+            self._busy_since = None
+        try:
+            plan = plan_from_joints(series, self.setup.id, self._scheduler.time_step_ns)
+        except InputError as error:
+            return str(error)
+        reason = check_plan(plan, asked, series.stamp_ns, self.setup.vehicle,
+                            self._scheduler.time_step_s)
+        if reason is not None:
+            return reason
+        self.plan = plan
+        self._followed_request_n = request_n
+        self.counters.accepted += 1
+        self.counters.last_latency_steps = n - request_n
+        self.counters.realigned += self._tracker.adopt(
+            self._in_simulation(plan.states), request_n, n, self.state)
+        return None
+
+    def _in_simulation(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self.setup.transform.is_identity:
+            return states
+        mapped = states.copy()
+        mapped[:, :3] = self.setup.transform.to_simulation(states[:, :3])
+        return mapped
+
+    def planned_state(self, n: int) -> VehicleState | None:
+        """Give the followed plan's state at step n; None beyond its end or without one."""
+        return self._tracker.sample(n)
+
+    def advance(self, n: int) -> VehicleState:
+        """Move to step n along the plan (algorithm 1, line 13), or brake where it is used up."""
+        planned = self._tracker.sample(n)
+        self._without_plan = planned is None
+        if planned is None:
+            self.counters.steps_without_plan += 1
+            self.state = self._braking()
+        else:
+            self.state = self._never_back(planned)
+        return self.state
+
+    def _never_back(self, planned: VehicleState) -> VehicleState:
+        """Hold still where a late plan, braking harder than the last, lies behind the vehicle."""
+        state = self.state
+        along = (planned.x - state.x) * math.cos(state.yaw) \
+            + (planned.y - state.y) * math.sin(state.yaw)
+        if along < 0.0 <= planned.speed and state.speed >= 0.0:
+            return planned._replace(x=state.x, y=state.y, yaw=state.yaw)
+        return planned
+
+    def _braking(self) -> VehicleState:
+        state, dt_s = self.state, self._scheduler.dt_s
+        if state.speed == 0.0:
+            return state._replace(acceleration=0.0, yaw_rate=0.0, steering_rate=0.0)
+        direction = math.copysign(1.0, state.speed)
+        driven_s = min(dt_s, abs(state.speed) / EXHAUSTED_DECELERATION)
+        wheelbase = self.setup.vehicle.wheelbase
+        x, y, yaw, speed, angle = integrate(
+            state.x, state.y, state.yaw, state.speed, state.steering_angle,
+            -direction * EXHAUSTED_DECELERATION, 0.0, wheelbase, driven_s)
+        if driven_s < dt_s:
+            speed = 0.0
+        return VehicleState(x, y, wrap_pi(yaw), speed, angle, -direction * EXHAUSTED_DECELERATION,
+                            speed * math.tan(angle) / wheelbase, 0.0)

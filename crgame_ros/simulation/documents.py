@@ -1,0 +1,133 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The run described as JSON text: `/scenario/game` and `/scenario/objects`.
+
+Written by the engine's side, read by planners, monitor, recorder and conversion, so that nobody
+needs the game's files.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+import json
+import math
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.game import DrivabilitySpec
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+
+GAME_TOPIC = '/scenario/game'
+OBJECTS_TOPIC = '/scenario/objects'
+
+
+def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
+                  real_time_factor: float) -> str:
+    """
+    Write the resolved game (fields as in the contract, `/scenario/game`).
+
+    :param epoch: counts resets.
+    :param clock_offset_ns: simulation time of n = 0 [ns]
+    :param real_time_factor: simulated seconds per wall second.
+    """
+    scheduler, game = setup.scheduler, setup.game
+    duration = game.duration if math.isfinite(game.duration) else None
+    document = {
+        'epoch': epoch, 'title': game.title, 'benchmark_id': setup.loaded.benchmark_id,
+        'scenario_sha256': setup.loaded.sha256, 'dt_ns': round(scheduler.dt_s * 1e9),
+        'dt_c_ns': scheduler.time_step_ns, 'steps_per_tick': scheduler.steps_per_tick,
+        'k0': scheduler.k0, 'clock_offset_ns': clock_offset_ns,
+        'real_time_factor': real_time_factor, 'seed': game.seed, 'duration': duration,
+        'humans': [
+            {'id': human.id, 'vehicle': asdict(human.vehicle) | {'steering_ratio': ''},
+             'state': list(human.state), 'driver': human.driver, 'timeline': human.timeline}
+            for human in setup.humans],
+        'avs': [
+            {'id': av.id, 'vehicle': asdict(av.vehicle) | {'steering_ratio': ''},
+             'state': list(av.state), 'planner': av.spec.planner, 'options': av.spec.options,
+             'planning_problem': av.planning_problem.planning_problem_id,
+             'transform': [av.transform.yaw_offset, av.transform.offset_x,
+                           av.transform.offset_y]}
+            for av in setup.avs],
+        'prediction': asdict(game.prediction), 'drivability': asdict(game.drivability),
+        'timing': asdict(game.timing)}
+    return json.dumps(document, allow_nan=False)
+
+
+@dataclass(frozen=True)
+class GameDocument:
+    """
+    What others need of `/scenario/game`.
+
+    :param epoch: counts resets.
+    :param scenario_sha256: of the text on `/scenario/xml`.
+    :param scheduler: time grids with the clock offset.
+    :param humans: entries of the humans, as written.
+    :param avs: entries of the AVs, as written.
+    :param content: the whole document.
+    """
+
+    epoch: int
+    scenario_sha256: str
+    scheduler: ScenarioScheduler
+    humans: tuple[dict[str, Any], ...]
+    avs: tuple[dict[str, Any], ...]
+    drivability: DrivabilitySpec
+    content: dict[str, Any]
+
+    def vehicle(self, vehicle_id: str) -> dict[str, Any] | None:
+        """Give the entry of a driven vehicle, None if it takes no part."""
+        for entry in (*self.humans, *self.avs):
+            if entry['id'] == vehicle_id:
+                return entry
+        return None
+
+
+def parse_game_document(text: str) -> GameDocument:
+    """
+    Read `/scenario/game`.
+
+    :raises InputError: if it is not what `game_document` writes.
+    """
+    try:
+        content = json.loads(text)
+        return GameDocument(
+            int(content['epoch']), str(content['scenario_sha256']),
+            ScenarioScheduler(int(content['dt_c_ns']), int(content['steps_per_tick']),
+                              int(content['k0']), int(content['clock_offset_ns'])),
+            tuple(content['humans']), tuple(content['avs']),
+            DrivabilitySpec(**content['drivability']), content)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f'is no game document ({type(error).__name__}: {error})',
+                         GAME_TOPIC) from error
+
+
+def objects_document(descriptions: Sequence[ObjectDescription]) -> str:
+    """Write what can appear (fields as in the contract, `/scenario/objects`)."""
+    return json.dumps([
+        {'id': item.id, 'type': item.type, 'role': item.role.value, 'shape': asdict(item.shape),
+         'reference_point': item.reference_point, 'rear_to_center': item.rear_to_center}
+        for item in descriptions], allow_nan=False)
+
+
+def parse_objects_document(text: str) -> tuple[ObjectDescription, ...]:
+    """
+    Read `/scenario/objects`.
+
+    :raises InputError: if it is not what `objects_document` writes.
+    """
+    try:
+        return tuple(
+            ObjectDescription(
+                str(item['id']), str(item['type']), Role(item['role']),
+                Shape(item['shape']['kind'], float(item['shape']['length']),
+                      float(item['shape']['width']),
+                      tuple((float(x), float(y)) for x, y in item['shape']['vertices'])),
+                float(item['rear_to_center']))
+            for item in json.loads(text))
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f'is no list of objects ({type(error).__name__}: {error})',
+                         OBJECTS_TOPIC) from error

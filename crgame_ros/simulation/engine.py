@@ -1,0 +1,123 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The simulation engine that both runners drive (CRG algorithms 1 and 2)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+import hashlib
+
+import numpy as np
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.planner.joints import JointSeries, vehicles_from_joints
+from crgame_ros.scenario.objects import ObjectStates
+from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
+from crgame_ros.simulation.plan_requests import PlanRequests
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.vehicle.human_vehicle import HumanVehicle
+from crgame_ros.vehicle.state import VehicleState
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """
+    What one step brought about.
+
+    :param n: simulation step that the state now belongs to.
+    :param k: scenario time step that n belongs to.
+    :param tick: True where k has just advanced; only then are objects and requests given.
+    :param requests: the plan requests to send, by AV id.
+    :param objects: poses of everything that is no driven vehicle.
+    """
+
+    n: int
+    k: int
+    tick: bool
+    requests: Mapping[str, JointSeries]
+    objects: ObjectStates | None
+
+
+class Simulation:
+    """
+    Humans, AVs and objects on one integer time line.
+
+    State n is the state at n dt. A step consumes plans and commands, moves the humans over the
+    measured interval and the AVs along their plans to n + 1, and at each tick of the scenario
+    takes the snapshot that the planners are asked with.
+
+    :param setup: the run.
+    :param clock_offset_ns: simulation time of step 0 [ns]
+    """
+
+    def __init__(self, setup: Setup, clock_offset_ns: int = 0) -> None:
+        self.setup = setup
+        self.scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
+        self.n = 0
+        self.humans = [HumanVehicle(human.vehicle, human.state) for human in setup.humans]
+        self.avs = [AutonomousVehicle(av, self.scheduler, setup.game.timing) for av in setup.avs]
+        self.commands: list[DriverCommand] = [DriverCommand()] * len(self.humans)
+        self.objects = setup.obstacles.states_at(self.scheduler.k0)
+        self._requests = PlanRequests(setup)
+        self._av_by_id = {av.setup.id: av for av in self.avs}
+        self._hash = hashlib.sha256()
+
+    @property
+    def states(self) -> list[VehicleState]:
+        """States of the driven vehicles at n: humans, then AVs; simulation coordinates."""
+        return [*(human.state for human in self.humans), *(av.state for av in self.avs)]
+
+    def begin(self) -> StepResult:
+        """Give the requests and objects of step 0, before anything has moved."""
+        self._add_to_hash()
+        return self._result()
+
+    def offer_plan(self, av_id: str, plan: JointSeries) -> str | None:
+        """
+        Hand a planner's answer to its AV, to be followed from the next step on.
+
+        :return: None if accepted, else the reason for refusing it.
+        """
+        return self._av_by_id[av_id].offer(plan, self.n + 1)
+
+    def step(self, dt_eff_s: float, commands: Sequence[DriverCommand]) -> StepResult:
+        """
+        Advance from n to n + 1.
+
+        :param dt_eff_s: interval that the humans are integrated over (CRG 13) [s]
+        :param commands: one for each human, in their order
+        """
+        self.n += 1
+        self.commands = [command.rounded() for command in commands]
+        for human, command in zip(self.humans, self.commands, strict=True):
+            human.step(command, dt_eff_s)
+        for av in self.avs:
+            av.advance(self.n)
+        result = self._result()
+        self._add_to_hash()
+        return result
+
+    def _result(self) -> StepResult:
+        k = self.scheduler.k(self.n)
+        if not self.scheduler.is_tick(self.n):
+            return StepResult(self.n, k, False, {}, None)
+        self.objects = self.setup.obstacles.states_at(k)
+        asking = [av for av in self.avs if av.wants_request(self.n)]
+        requests: dict[str, JointSeries] = {}
+        if asking:
+            states = self.states
+            forecast = self._requests.forecast(k, self.n, states, self.avs)
+            stamp_ns = self.scheduler.stamp_ns(self.n)
+            for av in asking:
+                request = self._requests.build(av.setup, stamp_ns, states, forecast)
+                ego = vehicles_from_joints(request.positions[0, :4], request.velocities[0, :4],
+                                           request.accelerations[0, :4])
+                av.request_sent(self.n, stamp_ns, VehicleState(*ego.tolist()))
+                requests[av.setup.id] = request
+        return StepResult(self.n, k, True, requests, self.objects)
+
+    def _add_to_hash(self) -> None:
+        self._hash.update(np.array(self.states, dtype=np.float64).tobytes())
+
+    def state_hash(self) -> str:
+        """Give the SHA-256 over every driven vehicle's state at every step so far."""
+        return self._hash.hexdigest()

@@ -1,0 +1,186 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The offline runner: the same engine on a virtual clock, planners in lockstep."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.drivability.monitor import changes, DrivabilityMonitor, VehicleDrivability
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.errors import InputError
+from crgame_ros.planner.adapter import PlannerAdapter, PlannerStatistics
+from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.joints import JointSeries, plan_to_joints
+from crgame_ros.planner.registry import create_planner
+from crgame_ros.planner.request_reader import RequestReader
+from crgame_ros.simulation.autonomous_vehicle import AvCounters
+from crgame_ros.simulation.drivers import offline_driver
+from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.setup import Setup
+
+DEFAULT_DURATION_S = 20.0
+
+
+@dataclass(frozen=True)
+class PlannerRecord:
+    """
+    What an AV's planner did.
+
+    :param counters: requests and plans as the engine saw them.
+    :param statistics: answers, braking plans and times of the planner itself.
+    """
+
+    counters: AvCounters
+    statistics: PlannerStatistics
+
+    @property
+    def accepted_ratio(self) -> float:
+        """Share of the requests answered by an accepted plan that is no fallback."""
+        good = self.counters.accepted - self.statistics.fallbacks
+        return max(0, good) / max(1, self.counters.requests)
+
+
+@dataclass(frozen=True)
+class OfflineResult:
+    """
+    A finished offline run.
+
+    :param setup: the run.
+    :param state_hash: SHA-256 over all states; equal for equal inputs.
+    :param vehicle_states: (n + 1, V, 8) states of humans, then AVs, at every step.
+    :param object_poses: (ticks, M, 3) centre poses at every tick.
+    :param commands: (n, H, 4) consumed throttle, brake, steering, reverse.
+    :param planners: what each AV's planner did.
+    :param violations: changes of the vehicles' drivability, in order.
+    """
+
+    setup: Setup
+    state_hash: str
+    vehicle_states: NDArray[np.float64]
+    object_poses: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    planners: Mapping[str, PlannerRecord]
+    violations: tuple[VehicleDrivability, ...] = field(default=())
+
+    def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
+        """Give the states (n + 1, 8) of one driven vehicle."""
+        return self.vehicle_states[:, self.setup.vehicle_ids.index(vehicle_id)]
+
+
+class PlannerSeat:
+    """One AV's planner in process, answering a stated number of steps late."""
+
+    def __init__(self, setup: Setup, av_index: int, simulation: Simulation, latency_steps: int,
+                 clock_s: Callable[[], float] | None) -> None:
+        av = setup.avs[av_index]
+        self.id = av.id
+        self._latency = latency_steps
+        self._simulation = simulation
+        self._due: list[tuple[int, JointSeries]] = []
+        objects = {item.id: item for item in setup.descriptions}
+        self._reader = RequestReader(av.id, objects, simulation.scheduler)
+        self.adapter = PlannerAdapter(create_planner(av.spec.planner, av.spec.options), clock_s)
+        self.adapter.setup(PlannerContext(
+            av.id, setup.loaded.scenario, av.planning_problem, av.vehicle, objects,
+            setup.scheduler.time_step_s, setup.scheduler.k0, setup.game.seed))
+
+    def ask(self, request: JointSeries) -> None:
+        """Plan now; the answer is due after the latency (at once for the first request)."""
+        plan = self.adapter.plan(self._reader.read(request))
+        series = plan_to_joints(plan, self.id, self._simulation.scheduler.time_step_ns)
+        n = self._simulation.n
+        self._due.append((n + (self._latency if n else 0), series))
+
+    def deliver(self) -> None:
+        """Hand over the answers that are due before the next step."""
+        while self._due and self._due[0][0] <= self._simulation.n:
+            self._simulation.offer_plan(self.id, self._due.pop(0)[1])
+
+    def record(self) -> PlannerRecord:
+        """Sum up what the planner did."""
+        counters = next(av.counters for av in self._simulation.avs if av.setup.id == self.id)
+        return PlannerRecord(counters, self.adapter.statistics)
+
+
+def run_offline(
+    setup: Setup, *, duration_s: float | None = None, latency_steps: int = 0,
+    drivers: Mapping[str, DriverSource] | None = None,
+    intervals_s: NDArray[np.float64] | None = None, check_drivability: bool = True,
+    clock_s: Callable[[], float] | None = None,
+) -> OfflineResult:
+    """
+    Run a game as fast as it can.
+
+    :param duration_s: simulated time; the game's own where None [s]
+    :param latency_steps: simulation steps between a request and its plan.
+    :param drivers: drivers of humans by id, instead of the game's own.
+    :param intervals_s: Delta t_eff of each step, as recorded; the nominal step where None [s]
+    :param check_drivability: run the monitor in lockstep.
+    :param clock_s: clock that times the planners, which the result doesn't depend on.
+    :raises InputError: if a human's driver needs a person or a device.
+    """
+    simulation = Simulation(setup)
+    steps = simulation.scheduler.steps_for(_duration(setup, duration_s))
+    drivers = drivers or {}
+    hands = [drivers.get(human.id) or offline_driver(human) for human in setup.humans]
+    seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s)
+             for index in range(len(setup.avs))]
+    trace = _Trace(setup, steps, check_drivability)
+    dt_s = simulation.scheduler.dt_s
+    result = simulation.begin()
+    for _ in range(steps):
+        for seat in seats:
+            if seat.id in result.requests:
+                seat.ask(result.requests[seat.id])
+            seat.deliver()
+        trace.add(simulation, result)
+        commands = [hand.command(simulation.n, dt_s) for hand in hands]
+        effective_s = dt_s if intervals_s is None else float(intervals_s[simulation.n])
+        result = simulation.step(effective_s, commands)
+    trace.add(simulation, result)
+    return OfflineResult(
+        setup, simulation.state_hash(), trace.vehicles, np.array(trace.objects), trace.commands,
+        {seat.id: seat.record() for seat in seats}, tuple(trace.violations))
+
+
+def _duration(setup: Setup, duration_s: float | None) -> float:
+    chosen = setup.game.duration if duration_s is None else duration_s
+    if chosen == float('inf'):
+        return DEFAULT_DURATION_S
+    if not chosen > 0.0:
+        raise InputError(f'is {chosen} s', 'duration', 'give a positive number of seconds')
+    return chosen
+
+
+class _Trace:
+    """Collects a run's states and violations."""
+
+    def __init__(self, setup: Setup, steps: int, check: bool) -> None:
+        self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), 8))
+        self.commands = np.zeros((steps + 1, len(setup.humans), 4))
+        self.objects: list[NDArray[np.float64]] = []
+        self.violations: list[VehicleDrivability] = []
+        self._tick_n = 0
+        self._previous: tuple[VehicleDrivability, ...] = ()
+        self._monitor = DrivabilityMonitor(
+            setup.vehicle_descriptions, setup.obstacles.descriptions,
+            setup.loaded.scenario.lanelet_network, setup.game.drivability) if check else None
+
+    def add(self, simulation: Simulation, result: StepResult) -> None:
+        n = simulation.n
+        self.vehicles[n] = simulation.states
+        for index, command in enumerate(simulation.commands):
+            self.commands[n, index] = command
+        if result.objects is not None:
+            self.objects.append(result.objects.poses)
+            self._tick_n = n
+            if self._monitor is not None:
+                self._monitor.set_objects(n, result.objects)
+        if self._monitor is not None:
+            since_s = (n - self._tick_n) * simulation.scheduler.dt_s
+            current = self._monitor.check(n, since_s, self.vehicles[n])
+            self.violations.extend(changes(self._previous, current))
+            self._previous = current

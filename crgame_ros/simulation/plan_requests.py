@@ -1,0 +1,131 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Building plan requests: one atomic snapshot with predictions (CRG III-A1c and d)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.planner.joints import (
+    JointSeries, object_joint_names, vehicle_joint_names, vehicle_to_joints)
+from crgame_ros.scenario.prediction import (
+    LanePrediction, predict_constant_steering, recorded_future)
+from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
+from crgame_ros.simulation.setup import AvSetup, Setup
+from crgame_ros.vehicle.state import StateColumn, VehicleState
+
+Poses = NDArray[np.float64]
+
+
+class Forecast:
+    """
+    Where everybody is and is taken to go, at one tick and in simulation coordinates.
+
+    :param vehicle_poses: (P, V, 3) rear-axle poses
+    :param vehicle_velocities: (P, V, 3)
+    :param object_poses: (P, M, 3) centre poses
+    :param object_velocities: (P, M, 3)
+    """
+
+    def __init__(self, vehicle_poses: Poses, vehicle_velocities: Poses,
+                 object_poses: Poses, object_velocities: Poses) -> None:
+        self.vehicle_poses = vehicle_poses
+        self.vehicle_velocities = vehicle_velocities
+        self.object_poses = object_poses
+        self.object_velocities = object_velocities
+
+
+class PlanRequests:
+    """Predicts once a tick and packs the request of each AV."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._mode = setup.game.prediction.mode
+        self._time_step_s = setup.scheduler.time_step_s
+        self.points = max(1, round(setup.game.prediction.horizon / self._time_step_s)) + 1
+        self._times_ns = np.arange(self.points, dtype=np.int64) * setup.scheduler.time_step_ns
+        vehicles = (*setup.humans, *setup.avs)
+        self._wheelbases = np.array([vehicle.vehicle.wheelbase for vehicle in vehicles])
+        self._lane_prediction = LanePrediction(setup.obstacles, setup.network)
+        object_names = [name for description in setup.obstacles.descriptions
+                        for name in object_joint_names(description.id)]
+        ids = setup.vehicle_ids
+        self._order: dict[str, tuple[int, ...]] = {}
+        self._names: dict[str, tuple[str, ...]] = {}
+        for av in setup.avs:
+            own = ids.index(av.id)
+            order = (own, *(index for index in range(len(ids)) if index != own))
+            self._order[av.id] = order
+            names = [name for index in order for name in vehicle_joint_names(ids[index])]
+            self._names[av.id] = (*names, *object_names)
+
+    def forecast(self, k: int, n: int, states: list[VehicleState],
+                 avs: list[AutonomousVehicle]) -> Forecast:
+        """Predict everybody's motion from scenario step k (simulation step n) on."""
+        steps = self.points - 1
+        poses, velocities = predict_constant_steering(
+            np.array(states), self._wheelbases, steps, self._time_step_s)
+        if self._mode == 'plans':
+            first_av = len(states) - len(avs)
+            for index, av in enumerate(avs):
+                self._follow_plan(av, n, poses[:, first_av + index],
+                                  velocities[:, first_av + index])
+        if self._mode == 'recorded':
+            objects = recorded_future(self._setup.obstacles, k, steps)
+        else:
+            objects = self._lane_prediction.predict(k, steps)
+        return Forecast(poses, velocities, *objects)
+
+    def _follow_plan(self, av: AutonomousVehicle, n: int, poses: Poses, velocities: Poses) -> None:
+        """Overwrite a prediction with what the AV's plan says, as far as it reaches."""
+        for index in range(1, self.points):
+            state = av.planned_state(n + index * self._setup.scheduler.steps_per_tick)
+            if state is None:
+                return
+            poses[index] = state[:3]
+            velocities[index] = (state.speed * np.cos(state.yaw), state.speed * np.sin(state.yaw),
+                                 state.yaw_rate)
+
+    def build(self, av: AvSetup, stamp_ns: int, states: list[VehicleState],
+              forecast: Forecast) -> JointSeries:
+        """
+        Pack the request of one AV, in its scenario coordinates.
+
+        Point 0 is now; the AV itself is present in point 0 only. Accelerations are known of
+        driven vehicles in point 0, elsewhere they are NaN.
+        """
+        order = self._order[av.id]
+        vehicles = len(order)
+        width = 4 * vehicles
+        count = forecast.object_poses.shape[1]
+        shape = (self.points, width + 3 * count)
+        positions, velocities = np.full(shape, np.nan), np.full(shape, np.nan)
+        accelerations = np.full(shape, np.nan)
+        for column, index in enumerate(order):
+            place = slice(4 * column, 4 * column + 3)
+            positions[:, place] = forecast.vehicle_poses[:, index]
+            velocities[:, place] = forecast.vehicle_velocities[:, index]
+            positions[:, 4 * column + 3] = states[index][StateColumn.STEERING_ANGLE]
+            velocities[:, 4 * column + 3] = 0.0
+            (positions[0, 4 * column:4 * column + 4], velocities[0, 4 * column:4 * column + 4],
+             accelerations[0, 4 * column:4 * column + 4]) = vehicle_to_joints(states[index])
+        positions[1:, :4] = np.nan
+        velocities[1:, :4] = np.nan
+        positions[:, width:] = forecast.object_poses.reshape(self.points, 3 * count)
+        velocities[:, width:] = forecast.object_velocities.reshape(self.points, 3 * count)
+        if not av.transform.is_identity:
+            _to_scenario(av, vehicles, positions, velocities, accelerations)
+        return JointSeries(stamp_ns, self._names[av.id], self._times_ns,
+                           positions, velocities, accelerations)
+
+
+def _to_scenario(av: AvSetup, vehicles: int, positions: Poses, velocities: Poses,
+                 accelerations: Poses) -> None:
+    """Map the driven vehicles' columns to the AV's scenario coordinates (CRG 9)."""
+    cos, sin = np.cos(av.transform.yaw_offset), np.sin(av.transform.yaw_offset)
+    for column in range(0, 4 * vehicles, 4):
+        positions[:, column:column + 3] = av.transform.to_scenario(
+            positions[:, column:column + 3])
+        for vectors in (velocities, accelerations):
+            x, y = vectors[:, column].copy(), vectors[:, column + 1].copy()
+            vectors[:, column] = cos * x - sin * y
+            vectors[:, column + 1] = sin * x + cos * y

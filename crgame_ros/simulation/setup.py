@@ -1,0 +1,168 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that a run needs, resolved: a game with its scenario loaded and vehicles placed."""
+
+from dataclasses import dataclass, replace
+import hashlib
+
+from commonroad.planning.planning_problem import PlanningProblem
+
+from crgame_ros.driver.source import load_timeline, parse_source
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.scenario.game import AvSpec, Game
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
+from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+
+
+@dataclass(frozen=True)
+class HumanSetup:
+    """
+    One human's vehicle, placed.
+
+    :param id: hv0, …
+    :param vehicle: its parameters.
+    :param state: its state at n = 0, rear axle, simulation coordinates.
+    :param driver: the driver source that the game names.
+    :param timeline: text of the scripted timeline, empty for any other source.
+    """
+
+    id: str
+    vehicle: VehicleParameters
+    state: VehicleState
+    driver: str
+    timeline: str = ''
+
+
+@dataclass(frozen=True)
+class AvSetup:
+    """
+    One autonomous vehicle, placed.
+
+    :param spec: what the game says of it.
+    :param vehicle: its parameters.
+    :param state: its state at n = 0, rear axle, simulation coordinates.
+    :param transform: from simulation to scenario coordinates (CRG 6-8).
+    :param planning_problem: its CommonRoad planning problem.
+    """
+
+    spec: AvSpec
+    vehicle: VehicleParameters
+    state: VehicleState
+    transform: RigidTransform
+    planning_problem: PlanningProblem
+
+    @property
+    def id(self) -> str:
+        """Id of the vehicle: av0, …"""
+        return self.spec.id
+
+
+@dataclass(frozen=True)
+class Setup:
+    """
+    A run before its first step.
+
+    :param game: the game as its file says it.
+    :param loaded: the scenario.
+    :param network: its roads.
+    :param obstacles: its obstacles.
+    :param humans: the humans' vehicles.
+    :param avs: the AVs.
+    :param scheduler: time grids, with a clock offset of zero.
+    """
+
+    game: Game
+    loaded: LoadedScenario
+    network: RoadNetwork
+    obstacles: ScenarioObstacles
+    humans: tuple[HumanSetup, ...]
+    avs: tuple[AvSetup, ...]
+    scheduler: ScenarioScheduler
+
+    @property
+    def vehicle_ids(self) -> tuple[str, ...]:
+        """Ids of the driven vehicles: humans, then AVs."""
+        return tuple(vehicle.id for vehicle in (*self.humans, *self.avs))
+
+    @property
+    def vehicle_descriptions(self) -> tuple[ObjectDescription, ...]:
+        """Descriptions of the driven vehicles: humans, then AVs."""
+        return tuple(
+            ObjectDescription(vehicle.id, 'car', role, vehicle.vehicle.shape,
+                              vehicle.vehicle.rear_to_center)
+            for role, group in ((Role.HUMAN, self.humans), (Role.AUTONOMOUS, self.avs))
+            for vehicle in group)
+
+    @property
+    def descriptions(self) -> tuple[ObjectDescription, ...]:
+        """Descriptions of everything that can appear: driven vehicles, then other objects."""
+        return (*self.vehicle_descriptions, *self.obstacles.descriptions)
+
+
+def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
+    """
+    Load the scenario of a game and place its vehicles.
+
+    :param loaded: the scenario, if it has been loaded already.
+    :raises InputError: if the scenario or the game cannot be used.
+    """
+    loaded = load_scenario(game.scenario) if loaded is None else loaded
+    network = RoadNetwork(loaded.scenario.lanelet_network)
+    obstacles = ScenarioObstacles(loaded)
+    avs = _place_avs(game, loaded, network)
+    k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
+    humans: list[HumanSetup] = []
+    for spec in game.humans:
+        parameters = load_vehicle_parameters(spec.vehicle)
+        taken = [human.state for human in humans]
+        state = place_human(network, spec, parameters, [av.state for av in avs],
+                            obstacles.descriptions, obstacles.states_at(k0), taken)
+        source = parse_source(spec.driver)
+        timeline = load_timeline(source, game.base).to_text() if source.has_timeline else ''
+        humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline))
+    scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
+    return Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler)
+
+
+def _place_avs(
+    game: Game, loaded: LoadedScenario, network: RoadNetwork,
+) -> tuple[AvSetup, ...]:
+    problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    specs = game.avs
+    if specs is None:
+        specs = tuple(AvSpec(f'av{index}') for index in range(len(problems)))
+    named = {spec.planning_problem for spec in specs}
+    free = [number for number in problems if number not in named]
+    avs = []
+    for spec in specs:
+        where = f'{loaded.source}: {spec.id}'
+        number = spec.planning_problem
+        if number is None:
+            if not free:
+                raise InputError('no planning problem is left for it', where,
+                                 f'the scenario has {len(problems)}: remove the AV from the game')
+            number = free.pop(0)
+        if number not in problems:
+            raise InputError(f'planning problem {number} does not exist', where,
+                             'use one of ' + ', '.join(map(str, problems)))
+        parameters = load_vehicle_parameters(spec.vehicle)
+        declared = problem_pose(problems[number], parameters.rear_to_center)
+        state = declared
+        if spec.spawn == 'lanelet':
+            state = lanelet_pose(network, declared)
+        transform = RigidTransform.between(state[:3], declared[:3])
+        avs.append(AvSetup(replace(spec, planning_problem=number), parameters, state, transform,
+                           problems[number]))
+    return tuple(avs)
+
+
+def scenario_digest(xml_text: str) -> str:
+    """Give the SHA-256 by which a game names its scenario's text."""
+    return hashlib.sha256(xml_text.encode('utf-8')).hexdigest()

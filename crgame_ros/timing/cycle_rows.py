@@ -1,0 +1,115 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The rows of `/timing/cycle`: what each cycle measured and consumed."""
+
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.errors import InputError
+from crgame_ros.timing.time_controller import Cycle
+
+TIMING_COLUMNS = (
+    'epoch', 'n', 'k', 'ideal_s', 'actual_s', 'step_error_s', 'cumulative_error_s', 'busy_s',
+    'sleep_s', 'dt_eff_s', 'resets', 'dropped_s')
+COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse')
+
+
+class CycleRows:
+    """
+    A fixed buffer of rows, filled cycle by cycle and emptied together.
+
+    :param human_ids: whose consumed commands follow the timing columns.
+    :param capacity: rows held before they have to be taken.
+    """
+
+    def __init__(self, human_ids: Sequence[str], capacity: int) -> None:
+        self.columns = TIMING_COLUMNS + tuple(
+            f'{human}/{name}' for human in human_ids for name in COMMAND_COLUMNS)
+        self._data = array('d', bytes(8 * capacity * len(self.columns)))
+        self._rows = np.frombuffer(self._data).reshape(capacity, len(self.columns))
+        self.capacity = capacity
+        self.count = 0
+
+    @property
+    def full(self) -> bool:
+        """Tell whether the rows have to be taken before another is added."""
+        return self.count == self.capacity
+
+    def add(self, epoch: int, k: int, cycle: Cycle, busy_s: float, sleep_s: float,
+            commands: Sequence[DriverCommand]) -> None:
+        """Add one cycle, with the time it worked and slept [s]."""
+        row = self._rows[self.count]
+        row[:12] = (epoch, cycle.n, k, cycle.ideal_s, cycle.actual_s, cycle.step_error_s,
+                    cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s, cycle.resets,
+                    cycle.dropped_s)
+        place = len(TIMING_COLUMNS)
+        for command in commands:
+            row[place:place + 4] = command
+            place += len(COMMAND_COLUMNS)
+        self.count += 1
+
+    def taken(self) -> array[float]:
+        """Empty the buffer and give its rows, flattened."""
+        used = self._data[:self.count * len(self.columns)]
+        self.count = 0
+        return used
+
+
+class CycleTable:
+    """
+    Rows of `/timing/cycle`, read.
+
+    :param columns: names of the columns.
+    :param rows: (R, columns) one row a cycle.
+    """
+
+    def __init__(self, columns: Sequence[str], rows: NDArray[np.float64]) -> None:
+        self._place = {name: index for index, name in enumerate(columns)}
+        self.columns = tuple(columns)
+        self.rows = rows
+
+    @classmethod
+    def from_message(cls, label: str, data: Sequence[float]) -> 'CycleTable':
+        """
+        Read one message.
+
+        :param label: of the second dimension: the columns, separated by commas.
+        :param data: the flattened rows.
+        :raises InputError: if columns that everybody needs are missing, or rows are not whole.
+        """
+        columns = label.split(',')
+        missing = [name for name in TIMING_COLUMNS if name not in columns]
+        if missing or len(data) % len(columns):
+            raise InputError('has other columns: ' + ', '.join(columns)[:200], '/timing/cycle',
+                             'record with this version')
+        return cls(columns, np.array(data, dtype=np.float64).reshape(-1, len(columns)))
+
+    @property
+    def epoch(self) -> int:
+        """Epoch of the rows."""
+        return int(self.column('epoch')[0])
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Give a column by its name."""
+        return self.rows[:, self._place[name]]
+
+    def timing_rows(self) -> NDArray[np.float64]:
+        """Give (R, 4) rows as `TimingMetrics.add_rows` takes them."""
+        return self.rows[:, [self._place[name] for name in
+                             ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')]]
+
+    def commands(self, human_id: str) -> NDArray[np.float64]:
+        """
+        Give (R, 4) consumed throttle, brake, steering and reverse of a human.
+
+        :raises InputError: if the human took no part.
+        """
+        names = [f'{human_id}/{name}' for name in COMMAND_COLUMNS]
+        if names[0] not in self._place:
+            raise InputError(f'{human_id} took no part', '/timing/cycle',
+                             'choose one of the humans of this recording')
+        return self.rows[:, [self._place[name] for name in names]]

@@ -1,0 +1,141 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The global time controller: simulation time against the wall clock (CRG III-A2a)."""
+
+from dataclasses import dataclass
+
+from crgame_ros.errors import InputError
+from crgame_ros.scenario.game import TimingSpec
+
+MIN_REAL_TIME_FACTOR = 0.1
+MAX_REAL_TIME_FACTOR = 10.0
+NS = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """
+    What the controller measured at the start of one cycle; all times on the run's own time line.
+
+    The time line starts with the run, leaves pauses out and is scaled by the real-time factor.
+
+    :param n: simulation step.
+    :param ideal_s: scheduled start, tau*_n (CRG 11), on the present anchor [s]
+    :param actual_s: measured start, tau_n [s]
+    :param step_error_s: e_n (CRG 12) [s]
+    :param cumulative_error_s: E_n (CRG 12), zeroed by a reset [s]
+    :param dt_eff_s: Delta t_eff (CRG 13) [s]
+    :param resets: drift resets so far.
+    :param dropped_s: wall time by which resets moved the anchor so far [s]
+    """
+
+    n: int
+    ideal_s: float
+    actual_s: float
+    step_error_s: float
+    cumulative_error_s: float
+    dt_eff_s: float
+    resets: int
+    dropped_s: float
+
+
+class TimeController:
+    """
+    Schedules cycles on the wall clock and measures what became of the schedule (CRG 11-13).
+
+    The clock is passed in: every method takes the present time of a monotonic clock [ns].
+
+    :param spec: thresholds and switches of the mechanisms.
+    :param dt_s: nominal step Delta t [s]
+    """
+
+    def __init__(self, spec: TimingSpec, dt_s: float) -> None:
+        self._spec = spec
+        self._dt_s = dt_s
+        self._factor = 1.0
+        self._anchor_ns = 0.0
+        self._start_ns = 0
+        self._error_s = 0.0
+        self._carry_s = 0.0
+        self._late = 0
+        self.n = 0
+        self.resets = 0
+        self.dropped_s = 0.0
+        self.catch_up_steps = 0
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated seconds per wall second."""
+        return self._factor
+
+    def start(self, now_ns: int) -> None:
+        """Anchor the schedule: t0 is now and step 0 has begun."""
+        self._anchor_ns = float(now_ns)
+        self._start_ns = now_ns
+
+    def resume(self, now_ns: int, real_time_factor: float | None = None) -> None:
+        """
+        Continue after a pause, or at another rate; the wall time in between doesn't count.
+
+        The cycle n is taken to have begun now, with the lag it had.
+
+        :raises InputError: if the real-time factor is out of its bounds.
+        """
+        if real_time_factor is not None:
+            if not MIN_REAL_TIME_FACTOR <= real_time_factor <= MAX_REAL_TIME_FACTOR:
+                raise InputError(
+                    f'is {real_time_factor}', 'real_time_factor',
+                    f'give {MIN_REAL_TIME_FACTOR} to {MAX_REAL_TIME_FACTOR}')
+            self._factor = real_time_factor
+        elapsed_s = self.n * self._dt_s + self._error_s
+        self._anchor_ns = now_ns - elapsed_s / self._factor / NS
+        self._start_ns = now_ns
+
+    def deadline_ns(self) -> int:
+        """Give the wall time at which the next cycle is due (CRG 11) [ns]."""
+        step_ns = self._dt_s / self._factor / NS
+        if not self._spec.pacing:
+            # The naive loop waits for its step to pass, whatever the schedule says.
+            return int(self._start_ns + step_ns)
+        return int(self._anchor_ns + (self.n + 1) * step_ns)
+
+    def begin_cycle(self, now_ns: int) -> Cycle:
+        """Begin the next cycle: measure its interval and decide on what it integrates."""
+        self.n += 1
+        measured_s = (now_ns - self._start_ns) * NS * self._factor
+        self._start_ns = now_ns
+        ideal_s = self.n * self._dt_s
+        self._error_s = (now_ns - self._anchor_ns) * NS * self._factor - ideal_s
+        self._late = self._late + 1 if self._error_s > self._dt_s else 0
+        self.catch_up_steps += self._late > 0
+        moved_s = self._reset_if_due()
+        return Cycle(self.n, ideal_s + self.dropped_s, ideal_s + self.dropped_s + self._error_s,
+                     measured_s - self._dt_s, self._error_s,
+                     self._effective(measured_s - moved_s), self.resets, self.dropped_s)
+
+    def _reset_if_due(self) -> float:
+        """Re-anchor after too large a lag; return the time dropped [s]."""
+        spec = self._spec
+        too_late = abs(self._error_s) > spec.reset_threshold \
+            or self._late >= spec.max_catch_up_steps
+        if not (spec.drift_reset and too_late and self.n > spec.warm_up_steps):
+            return 0.0
+        dropped = self._error_s
+        self._anchor_ns += dropped / self._factor / NS
+        self.dropped_s += dropped
+        self.resets += 1
+        self._error_s, self._late = 0.0, 0
+        return dropped
+
+    def _effective(self, measured_s: float) -> float:
+        """Clip the measured interval (CRG 13); what is cut off comes back in later steps."""
+        spec = self._spec
+        if not spec.measured_interval:
+            return self._dt_s
+        wanted = measured_s + self._carry_s
+        # A bound that excludes the nominal step itself would never let the sum return to n dt.
+        shortest = min(spec.dt_min, 0.5 * self._dt_s)
+        effective = min(max(spec.dt_max, 2.0 * self._dt_s), max(shortest, wanted))
+        if spec.clip == 'carry':
+            self._carry_s = wanted - effective
+        return effective

@@ -1,0 +1,254 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Every metric of CRG table I, computed cycle by cycle; `docs/timing.md` defines each of them.
+
+The table of the paper contradicts itself, so the definitions are the project's own. All errors
+refer to the original anchor t_0: what a drift reset forgave is added back.
+"""
+
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.timing.quantiles import LogHistogram
+
+ROW_COLUMNS = ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')
+
+
+@dataclass(frozen=True)
+class RealTimeRatio:
+    """
+    Simulated over wall-clock time (R_RT of CRG table I) [-].
+
+    :param final: over the whole run.
+    :param mean: mean over all steps of the ratio since the start of the run.
+    :param min: smallest ratio of a single step.
+    """
+
+    final: float
+    mean: float
+    min: float
+
+
+@dataclass(frozen=True)
+class TimingSummary:
+    """
+    The metrics of CRG table I and what explains them; symbols as in `docs/timing.md`.
+
+    :param final_error_ms: E_f [ms]
+    :param mean_step_error_ms: mean of |e_n| [ms]
+    :param max_cumulative_error_ms: E_max [ms]
+    :param timeout_ratio: share of cycles whose busy time exceeds the step [0..1]
+    :param real_time_ratio: R_RT [-]
+    :param time_efficiency: eta_t as a fraction (the paper gives it in percent) [-]
+    :param precision_ratio: P_r [-]
+    :param cycles: cycles seen
+    :param duration_s: tau_K - tau_0 [s]
+    :param rate_hz: steps per second over the run [Hz]
+    :param resets: drift resets
+    :param dropped_ms: time by which all resets moved the schedule [ms]
+    :param worst_lag_ms: largest lag behind the schedule in force when the cycle began [ms]
+    :param step_error_p50_ms: median of |e_n| [ms]
+    :param step_error_p99_ms: 99th percentile of |e_n| [ms]
+    :param busy_p50_ms: median busy time [ms]
+    :param busy_p99_ms: 99th percentile of the busy time [ms]
+    """
+
+    final_error_ms: float
+    mean_step_error_ms: float
+    max_cumulative_error_ms: float
+    timeout_ratio: float
+    real_time_ratio: RealTimeRatio
+    time_efficiency: float
+    precision_ratio: float
+    cycles: int
+    duration_s: float
+    rate_hz: float
+    resets: int
+    dropped_ms: float
+    worst_lag_ms: float
+    step_error_p50_ms: float
+    step_error_p99_ms: float
+    busy_p50_ms: float
+    busy_p99_ms: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give the keys of `timing.json`: those of table I first, in its order."""
+        values: dict[str, Any] = dict(vars(self))
+        values['real_time_ratio'] = dict(vars(self.real_time_ratio))
+        return values
+
+
+class TimingMetrics:
+    """
+    Accumulate the metrics of one run (one epoch) in constant memory.
+
+    All times of a cycle, `busy_s` among them, are seconds on the run's own time line: it starts
+    with the run, leaves pauses out and is scaled by the real-time factor.
+
+    :param dt_s: nominal step, which is also the budget of a cycle [s].
+    :raises InputError: if `dt_s` is no positive number.
+    """
+
+    def __init__(self, dt_s: float) -> None:
+        if not (math.isfinite(dt_s) and dt_s > 0.0):
+            raise InputError(f'the step {dt_s} is no positive number', 'timing metrics',
+                             'give the simulation step in seconds')
+        self.dt_s = dt_s
+        self._cycles = 0
+        self._timeouts = 0
+        self._resets = 0
+        self._first = (0.0, 0.0)
+        self._last = (0.0, 0.0, 0.0)
+        self._step_error_sum = 0.0
+        self._ratio_sum = 0.0
+        self._ratio_count = 0
+        self._ratio_min = math.inf
+        self._max_error = 0.0
+        self._worst_lag = 0.0
+        self._step_errors = LogHistogram()
+        self._busy = LogHistogram()
+
+    @property
+    def cycles(self) -> int:
+        """Count the cycles seen so far."""
+        return self._cycles
+
+    def add(self, ideal_s: float, actual_s: float, busy_s: float, dropped_s: float) -> None:
+        """
+        Take one cycle, in O(1).
+
+        :param ideal_s: tau*_n, start by the schedule in force, after all resets so far [s]
+        :param actual_s: tau_n, start as it happened [s]
+        :param busy_s: computing time of the cycle, without waiting in the executor [s]
+        :param dropped_s: D_n, time by which all resets so far moved the schedule [s]
+        :raises InputError: if a value is no number or time runs backwards.
+        """
+        if not math.isfinite(ideal_s + actual_s + busy_s + dropped_s):
+            raise InputError('a time is no finite number', 'timing cycle', 'drop the row')
+        scheduled = ideal_s - dropped_s
+        if self._cycles:
+            self._add_step(scheduled, actual_s, dropped_s)
+        else:
+            self._first = (scheduled, actual_s)
+            self._worst_lag = max(0.0, actual_s - ideal_s)
+        self._cycles += 1
+        self._timeouts += busy_s > self.dt_s
+        self._max_error = max(self._max_error, abs(actual_s - scheduled))
+        self._busy.add(busy_s)
+        self._last = (scheduled, actual_s, dropped_s)
+
+    def _add_step(self, scheduled: float, actual_s: float, dropped_s: float) -> None:
+        last_scheduled, last_actual, last_dropped = self._last
+        interval = actual_s - last_actual
+        if interval < 0.0:
+            raise InputError(f'time runs backwards at {actual_s} s', 'timing cycle',
+                             'begin new metrics at each reset of the simulation')
+        step = scheduled - last_scheduled
+        error = abs(interval - step)
+        self._resets += dropped_s != last_dropped
+        self._worst_lag = max(self._worst_lag, actual_s - scheduled - last_dropped)
+        self._step_error_sum += error
+        self._step_errors.add(error)
+        if interval > 0.0:
+            self._ratio_min = min(self._ratio_min, step / interval)
+        elapsed = actual_s - self._first[1]
+        if elapsed > 0.0:
+            self._ratio_sum += (scheduled - self._first[0]) / elapsed
+            self._ratio_count += 1
+
+    def add_rows(self, rows: NDArray[np.float64]) -> None:
+        """
+        Take many cycles at once, with the result that `add` would give one by one.
+
+        :param rows: (R, 4) columns as in `ROW_COLUMNS` [s], in the order of time.
+        :raises InputError: as `add`, and for an array of another shape.
+        """
+        if rows.ndim != 2 or rows.shape[1] != len(ROW_COLUMNS):
+            raise InputError(f'timing rows have shape {rows.shape}', 'timing metrics',
+                             f'give the columns {", ".join(ROW_COLUMNS)}')
+        if not len(rows):
+            return
+        if not np.isfinite(rows).all():
+            raise InputError('a time is no finite number', 'timing cycle', 'drop the row')
+        ideal, actual, busy, dropped = rows.T
+        scheduled = ideal - dropped
+        if self._cycles:
+            before = np.array(self._last)[:, np.newaxis]
+        else:
+            self._first = (float(scheduled[0]), float(actual[0]))
+            self._worst_lag = max(0.0, float(actual[0] - ideal[0]))
+            before = np.empty((3, 0))
+        self._add_steps(np.hstack((before, np.stack((scheduled, actual, dropped)))))
+        self._cycles += len(rows)
+        self._timeouts += int(np.count_nonzero(busy > self.dt_s))
+        self._max_error = max(self._max_error, float(np.abs(actual - scheduled).max()))
+        self._busy.add_all(busy)
+        self._last = (float(scheduled[-1]), float(actual[-1]), float(dropped[-1]))
+
+    def _add_steps(self, columns: NDArray[np.float64]) -> None:
+        if columns.shape[1] < 2:
+            return
+        steps, intervals, drops = np.diff(columns)
+        if (intervals < 0.0).any():
+            raise InputError('time runs backwards between two rows', 'timing cycle',
+                             'begin new metrics at each reset of the simulation')
+        errors = np.abs(intervals - steps)
+        self._resets += int(np.count_nonzero(drops))
+        lags = columns[1, 1:] - columns[0, 1:] - columns[2, :-1]
+        self._worst_lag = max(self._worst_lag, float(lags.max()))
+        self._step_error_sum = _running_sum(self._step_error_sum, errors)
+        self._step_errors.add_all(errors)
+        moved = intervals > 0.0
+        if moved.any():
+            self._ratio_min = min(self._ratio_min, float((steps[moved] / intervals[moved]).min()))
+        elapsed = columns[1, 1:] - self._first[1]
+        started = elapsed > 0.0
+        ratios = (columns[0, 1:] - self._first[0])[started] / elapsed[started]
+        self._ratio_sum = _running_sum(self._ratio_sum, ratios)
+        self._ratio_count += len(ratios)
+
+    def summary(self) -> TimingSummary:
+        """
+        Compute the metrics over all cycles so far.
+
+        :raises CrgameError: while there are fewer than two cycles, so no step to measure.
+        """
+        steps = self._cycles - 1
+        duration = self._last[1] - self._first[1]
+        if steps < 1 or duration <= 0.0:
+            raise CrgameError(f'timing metrics: {self._cycles} cycles over {duration} s are too '
+                              'few to measure; let the run take two steps or more')
+        scheduled = self._last[0] - self._first[0]
+        final_error = abs(self._last[1] - self._last[0])
+        efficiency = scheduled / duration
+        return TimingSummary(
+            final_error_ms=1e3 * final_error,
+            mean_step_error_ms=1e3 * self._step_error_sum / steps,
+            max_cumulative_error_ms=1e3 * self._max_error,
+            timeout_ratio=self._timeouts / self._cycles,
+            real_time_ratio=RealTimeRatio(efficiency, self._ratio_sum / self._ratio_count,
+                                          self._ratio_min),
+            time_efficiency=efficiency,
+            precision_ratio=final_error / duration,
+            cycles=self._cycles,
+            duration_s=duration,
+            rate_hz=steps / duration,
+            resets=self._resets,
+            dropped_ms=1e3 * self._last[2],
+            worst_lag_ms=1e3 * self._worst_lag,
+            step_error_p50_ms=1e3 * self._step_errors.quantile(0.5),
+            step_error_p99_ms=1e3 * self._step_errors.quantile(0.99),
+            busy_p50_ms=1e3 * self._busy.quantile(0.5),
+            busy_p99_ms=1e3 * self._busy.quantile(0.99))
+
+
+def _running_sum(start: float, values: NDArray[np.float64]) -> float:
+    # Added one after the other: numpy's own sum groups them, and its last bits then differ
+    # from those of single additions.
+    return float(np.cumsum(np.concatenate(([start], values)))[-1])

@@ -1,0 +1,110 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Steering wheel to front wheels: CRG equations 26-27 with the ratio table R(v, theta_sw)."""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+import functools
+import math
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from crgame_ros.errors import InputError
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+
+@dataclass(frozen=True)
+class SteeringRatioTable:
+    """
+    The steering ratio R(v, theta_sw), bilinear between its grid points and held beyond them.
+
+    :param speeds: grid of absolute speeds, ascending [m/s]
+    :param wheel_angles: grid of absolute steering-wheel angles, ascending [rad]
+    :param ratios: R at each speed and steering-wheel angle [-]
+    """
+
+    speeds: tuple[float, ...]
+    wheel_angles: tuple[float, ...]
+    ratios: tuple[tuple[float, ...], ...]
+
+    def ratio(self, speed: float, wheel_angle: float) -> float:
+        """Look the ratio up at a signed speed [m/s] and steering-wheel angle [rad]."""
+        row, row_share = _cell(self.speeds, abs(speed))
+        column, column_share = _cell(self.wheel_angles, abs(wheel_angle))
+        low, high = self.ratios[row], self.ratios[row + 1]
+        at_low = low[column] + column_share * (low[column + 1] - low[column])
+        at_high = high[column] + column_share * (high[column + 1] - high[column])
+        return at_low + row_share * (at_high - at_low)
+
+
+def _cell(grid: tuple[float, ...], value: float) -> tuple[int, float]:
+    index = min(max(bisect_right(grid, value) - 1, 0), len(grid) - 2)
+    share = (value - grid[index]) / (grid[index + 1] - grid[index])
+    return index, min(1.0, max(0.0, share))
+
+
+@functools.cache
+def load_steering_ratio(path: str) -> SteeringRatioTable:
+    """
+    Read a ratio table.
+
+    :raises InputError: if the file is missing or is no ascending grid of positive ratios.
+    """
+    try:
+        values = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f'cannot read the steering ratios ({error})', path) from error
+    table = SteeringRatioTable(
+        _numbers(values, 'speed', path), _numbers(values, 'steering_wheel_angle', path),
+        tuple(tuple(float(value) for value in row) for row in values.get('ratio', ())))
+    for name, grid in (('speed', table.speeds), ('steering_wheel_angle', table.wheel_angles)):
+        if len(grid) < 2 or any(b <= a for a, b in zip(grid, grid[1:], strict=False)):
+            raise InputError(f'"{name}" does not ascend', path, 'give at least two grid points')
+    if len(table.ratios) != len(table.speeds) or any(
+            len(row) != len(table.wheel_angles) for row in table.ratios):
+        raise InputError('"ratio" does not fit the grid', path,
+                         'give one row for each speed, one column for each angle')
+    if not all(math.isfinite(value) and value > 0.0 for row in table.ratios for value in row):
+        raise InputError('"ratio" holds a value that is not positive', path)
+    return table
+
+
+def _numbers(values: Any, key: str, path: str) -> tuple[float, ...]:
+    if not isinstance(values, dict) or not isinstance(values.get(key), list):
+        raise InputError(f'"{key}" is missing', path, 'give a list of numbers')
+    return tuple(float(value) for value in values[key])
+
+
+class Steering:
+    """Lateral control of a human's vehicle."""
+
+    def __init__(self, vehicle: VehicleParameters) -> None:
+        self._vehicle = vehicle
+        self._table = load_steering_ratio(vehicle.steering_ratio)
+
+    def target_angle(self, steering: float, speed: float) -> float:
+        """
+        Find the target front-wheel angle delta* (CRG 26).
+
+        :param steering: normalised steering s in [-1, 1], positive to the left
+        :param speed: signed speed [m/s]
+        :return: delta* [rad]
+        """
+        wheel_angle = steering * self._vehicle.max_steering_wheel_angle
+        limit = self._vehicle.max_steering_angle
+        angle = wheel_angle / self._table.ratio(speed, wheel_angle)
+        return min(limit, max(-limit, angle))
+
+    def rate(self, target_angle: float, angle: float, dt_s: float) -> float:
+        """
+        Find the steering rate that reaches the target within the step (CRG 27), within limits.
+
+        :param target_angle: delta* [rad]
+        :param angle: delta [rad]
+        :param dt_s: Delta t_eff [s]
+        :return: steering rate [rad/s]
+        """
+        limit = self._vehicle.max_steering_rate
+        return min(limit, max(-limit, (target_angle - angle) / dt_s))

@@ -1,0 +1,111 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Build crgame_ros with colcon or pip; the metadata is here, tool settings in pyproject.toml."""
+
+from pathlib import Path
+import re
+import sys
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'crgame_ros'
+NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'timesync_node',
+         'recorder_node')
+DATA_DIRECTORIES = ('launch', 'config', 'scenarios', 'msg_defs')
+# Relative paths only: setuptools refuses absolute ones in data_files.
+ROOT = Path(__file__).resolve().parent
+
+
+def version() -> str:
+    """Read the version from the package, without importing it."""
+    text = (ROOT / PACKAGE / '__init__.py').read_text(encoding='utf-8')
+    match = re.search(r"^__version__ = '(.+)'$", text, re.MULTILINE)
+    if match is None:
+        raise SystemExit(f'{PACKAGE}/__init__.py: no __version__')
+    return match.group(1)
+
+
+def data_files() -> list[tuple[str, list[str]]]:
+    """List what goes into the prefix: the ament marker, the manifest and the data directories."""
+    share = f'share/{PACKAGE}'
+    files = [
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (share, ['package.xml', 'requirements.txt']),
+    ]
+    for top in DATA_DIRECTORIES:
+        for directory in sorted({path.parent for path in (ROOT / top).rglob('*')
+                                 if path.is_file() and '__pycache__' not in path.parts}):
+            where = directory.relative_to(ROOT).as_posix()
+            names = sorted(path.name for path in directory.iterdir() if path.is_file())
+            files.append((f'{share}/{where}', [f'{where}/{name}' for name in names]))
+    if 'bdist_wheel' in sys.argv:
+        files.append((f'lib/{PACKAGE}', wrappers()))
+    return files
+
+
+def wrappers() -> list[str]:
+    """
+    Write executables for lib/crgame_ros, where `ros2 run` looks.
+
+    pip installs console scripts into bin/ only; colcon needs none of this (setup.cfg).
+    """
+    directory = Path('build') / 'wrappers'
+    (ROOT / directory).mkdir(parents=True, exist_ok=True)
+    for name in (*NODES, 'crgame'):
+        file = ROOT / directory / name
+        file.write_text(f'#!/bin/sh\nexec "$(dirname "$0")/../../bin/{name}" "$@"\n')
+        file.chmod(0o755)
+    return [(directory / name).as_posix() for name in (*NODES, 'crgame')]
+
+
+setup(
+    name=PACKAGE,
+    version=version(),
+    description='Real-time, human-in-the-loop driving simulation on CommonRoad and ROS 2',
+    author='The crgame_ros authors',
+    license='Apache-2.0',
+    python_requires='>=3.11,<3.13',
+    packages=find_packages(exclude=['test', 'test.*']),
+    package_data={PACKAGE: ['py.typed']},
+    data_files=data_files(),
+    zip_safe=False,
+    # What is imported, at the versions of requirements.txt. Those that other packages need in turn
+    # are in requirements.txt only: it is the way to a set of versions known to work.
+    install_requires=[
+        'commonroad-clcs==2025.2.0',
+        'commonroad-drivability-checker==2025.4.0',
+        'commonroad-idm-planner==0.2.1',
+        'commonroad-io==2024.3',
+        'commonroad-reactive-planner==2025.1',
+        'commonroad-route-planner==2025.1.0',
+        'commonroad-vehicle-models==3.0.2',
+        'evdev-binary>=2.0,<3',
+        'lxml>=6.1,<7',
+        'matplotlib>=3.9,<4',
+        'mcap>=1.6,<2',
+        'mcap-ros2-support>=0.6,<1',
+        'numpy>=2.4,<2.5',
+        'pyyaml>=6.0.3,<7',
+        'ros-jazzy-common-interfaces==5.3.6',
+        'ros-jazzy-rclpy[fastrtps]==7.1.6',
+        'rosbags>=0.11.9,<0.12',
+        'scipy>=1.17,<2',
+        'shapely>=2.2,<3',
+        'zstandard>=0.25,<1',
+    ],
+    extras_require={'test': [
+        'mypy>=2.4,<3', 'pytest>=7.4,<8', 'ruff>=0.17.5,<0.18', 'types-PyYAML>=6.0.12,<7',
+    ]},
+    entry_points={
+        'console_scripts': [
+            *(f'{name} = {PACKAGE}.nodes.{name}:main' for name in NODES),
+            f'crgame = {PACKAGE}.cli:main',
+        ],
+        'crgame_ros.planners': [
+            f'idm = {PACKAGE}.planner.idm:IdmPlanner',
+            f'idm-package = {PACKAGE}.planner.idm_package:IdmPackagePlanner',
+            f'reactive = {PACKAGE}.planner.reactive:ReactivePlanner',
+            f'constant-velocity = {PACKAGE}.planner.constant_velocity:ConstantVelocityPlanner',
+        ],
+    },
+)

@@ -1,0 +1,44 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Fixtures of all tests; ROS traffic of every test stays on this machine and in its own domain."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from crgame_ros.ros.environment import free_domain_id, prepare_environment
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def pytest_configure() -> None:
+    """Prepare the environment before any test imports rclpy, and inherit it to processes."""
+    prepare_environment()
+    os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
+    paths = os.environ.get('PYTHONPATH', '').split(os.pathsep)
+    if str(ROOT) not in paths:
+        os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(ROOT), *paths]))
+
+
+@pytest.fixture(scope='session')
+def project_root() -> Path:
+    """Return the root of the source tree."""
+    return ROOT
+
+
+@pytest.fixture(scope='session')
+def shared_scenarios() -> Path:
+    """Return the directory of published scenarios beside the project, or skip."""
+    directory = ROOT.parent / 'shared' / 'scenarios'
+    if not directory.is_dir():
+        pytest.skip(f'no published scenarios at {directory}')
+    return directory
+
+
+@pytest.fixture
+def ros_domain(monkeypatch: pytest.MonkeyPatch) -> int:
+    """Give the test, and the processes it starts, a ROS domain that nobody else uses."""
+    domain = free_domain_id()
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+    return domain

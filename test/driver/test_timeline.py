@@ -1,0 +1,198 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Timelines: what they hold when, and which files are refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from crgame_ros.driver.keyboard import KeyState
+from crgame_ros.driver.timeline import (
+    JoyTimeline,
+    KeyTimeline,
+    MAX_BYTES,
+    parse_timeline,
+    read_timeline,
+    SCRIPTED_LAYOUT,
+)
+from crgame_ros.driver.wheel import normalize
+from crgame_ros.errors import InputError
+
+KEYS = '''
+keys:
+  - {from: 0.0, to: 3.0, hold: [throttle]}
+  - {from: 2.0, to: 2.4, hold: left}
+  - {from: 2.2, to: 2.6, hold: [left, right]}
+  - {from: 6, to: 8, hold: [throttle, reverse]}
+'''
+JOY = '''
+joy:
+  axes: [throttle, brake, steering]
+  points:
+    - [1.0, 0.4, 0.0, -0.2]
+    - [3.0, 0.8, 0.0, 0.2]
+    - [3.5, 0.0, 1.0, 0.0]
+  reverse:
+    - {from: 2.0, to: 2.5}
+'''
+
+
+def keys() -> KeyTimeline:
+    """Read the example of keys."""
+    timeline = parse_timeline(KEYS, 'drive.yaml')
+    assert isinstance(timeline, KeyTimeline)
+    return timeline
+
+
+def joy(text: str = JOY) -> JoyTimeline:
+    """Read an example of axes."""
+    timeline = parse_timeline(text, 'drive.yaml')
+    assert isinstance(timeline, JoyTimeline)
+    return timeline
+
+
+@pytest.mark.parametrize(('t_s', 'held'), [
+    (0.0, {'throttle'}), (1.999999, {'throttle'}), (2.0, {'throttle', 'left'}),
+    (2.2, {'throttle', 'left', 'right'}), (2.4, {'throttle', 'left', 'right'}),
+    (2.6, {'throttle'}), (3.0, set()), (7.0, {'throttle', 'reverse'}), (8.0, set()),
+    (1e9, set()), (-1.0, set())])
+def test_keys_are_held_from_start_until_just_before_the_end(t_s: float, held: set[str]) -> None:
+    """Intervals are half-open and add up where they overlap."""
+    assert keys().keys_at(t_s) == KeyState(**dict.fromkeys(held, True))
+
+
+@pytest.mark.parametrize('rate', [10, 30, 100, 125, 1000])
+def test_edges_are_met_at_every_rate(rate: int) -> None:
+    """For n * dt on an edge, however it rounds, the new keys hold: 0.1, 0.7, 1.1, 5.7 s…"""
+    lines = [f'  - {{from: {i / 10}, to: {(i + 1) / 10}, hold: [left]}}'
+             for i in range(1, 100, 2)]
+    timeline = parse_timeline('\n'.join(['keys:', *lines]), 'edges')
+    assert isinstance(timeline, KeyTimeline)
+    for n in range(10 * rate):
+        tenth = n * 10 // rate  # in integers, so without rounding
+        assert timeline.keys_at(n * (1.0 / rate)).left == (tenth % 2 == 1)
+
+
+def test_axes_are_linear_between_points_and_constant_outside() -> None:
+    """Half-way between the points every axis is half-way."""
+    at = [normalize(joy().raw_at(t), SCRIPTED_LAYOUT)[:3] for t in (0.0, 1.0, 2.0, 3.0, 3.25, 99)]
+    assert at[0] == at[1] == (0.4, 0.0, -0.2)
+    assert at[2] == pytest.approx((0.6, 0.0, 0.0))
+    assert at[3] == (0.8, 0.0, 0.2)
+    assert at[4] == pytest.approx((0.4, 0.5, 0.1))
+    assert at[5] == (0.0, 1.0, 0.0)
+
+
+def test_axes_may_be_few() -> None:
+    """Axes that are not listed rest, in whatever order the others stand."""
+    timeline = joy('joy: {axes: [steering, throttle], points: [[0, -0.5, 1], [2, 0.5, 0]]}')
+    assert normalize(timeline.raw_at(0.5), SCRIPTED_LAYOUT)[:3] == (0.75, 0.0, -0.25)
+
+
+def test_reverse_lasts_for_its_intervals() -> None:
+    """The gear button is held in [2, 2.5)."""
+    assert [bool(joy().raw_at(t).pressed) for t in (1.99, 2.0, 2.49, 2.5)] == [
+        False, True, True, False]
+
+
+def test_ends() -> None:
+    """A run can be made as long as its script."""
+    assert (keys().end_s, joy().end_s) == (8.0, 3.5)
+
+
+@pytest.mark.parametrize('text', [
+    KEYS, JOY, 'keys: []', 'joy: {points: [[0.000001, 1.0e-7, 0.1, 0.2]]}',
+    'keys: [{from: 0.123456789, to: 1.0e-6, hold: left}]'.replace('1.0e-6', '12345.678901234')])
+def test_text_round_trip(text: str) -> None:
+    """The text that the resolved game carries, in JSON too, gives an equal timeline."""
+    timeline = parse_timeline(text, 'here')
+    carried = json.loads(json.dumps(timeline.to_text()))
+    assert parse_timeline(carried, 'there') == timeline
+
+
+def test_json_is_read() -> None:
+    """JSON is YAML."""
+    text = json.dumps({'keys': [{'from': 0.0, 'to': 1.5, 'hold': ['brake']}]})
+    timeline = parse_timeline(text, 'here')
+    assert isinstance(timeline, KeyTimeline) and timeline.keys_at(1.0) == KeyState(brake=True)
+
+
+@pytest.mark.parametrize(('text', 'message'), [
+    ('keys: [{from: 0, to: 1, hold: [thrust]}]', "drive.yaml: keys: entry 1: hold: .*'thrust'"),
+    ('keys: [{from: 0, to: 1, hold: [[left]]}]', 'knows no key'),
+    ('keys: [{from: 0, to: 1}]', 'entry 1: .* exactly from, hold, to'),
+    ('keys: [{from: 0, to: 1, hold: left, tap: x}]', 'entry 1'),
+    ('keys: [{from: -0.1, to: 1, hold: left}]', 'entry 1: from: is -0.1'),
+    ('keys: [{from: 0, to: 1, hold: left}, {from: 2, to: 2, hold: left}]',
+     'entry 2: ends at 2 s, not after its start at 2 s'),
+    ('keys: [{from: 3, to: 2, hold: left}]', 'not after its start'),
+    ('keys: [{from: .nan, to: 2, hold: left}]', 'from: is nan'),
+    ('keys: [{from: 0, to: .inf, hold: left}]', 'to: is inf'),
+    ('keys: [{from: 0, to: true, hold: left}]', 'to: is True'),
+    ('keys: [{from: 0, to: 1e1, hold: left}]', "to: is '1e1'.* 1.0e-3, not 1e-3"),
+    ('keys: {from: 0}', 'keys: is .*no list'),
+    ('keys: [5]', 'entry 1: is 5'),
+    ('doors: []', "has .'doors'. at its top"),
+    ('{keys: [], joy: {points: [[0, 0, 0, 0]]}}', 'at its top'),
+    ('', 'is no mapping'),
+    ('[1, 2]', 'is no mapping'),
+    ('keys: [', 'is no YAML'),
+    ('\x00', 'is no YAML'),
+    ('keys: !!python/object/apply:os.getcwd []', 'is no YAML'),
+    ('x: 2025-99-99', 'is no YAML'),
+    ('a: &a [x]\nb: [*a, *a]', 'alias'),
+    ('[' * 100000, 'nested too deeply'),
+    ('#' * (MAX_BYTES + 1), 'is longer than'),
+    ('joy: 3', 'joy: is 3'),
+    ('joy: {points: []}', 'points: is empty'),
+    ('joy: {points: [[0, 0, 0]]}', r'point 1: is .*give .t, throttle, brake, steering'),
+    ('joy: {axes: [clutch], points: [[0, 0]]}', "'clutch' is unknown"),
+    ('joy: {axes: [brake, brake], points: [[0, 0, 0]]}', "'brake' is unknown or doubled"),
+    ('joy: {points: [[0, 1.5, 0, 0]]}', 'point 1: throttle: is 1.5'),
+    ('joy: {points: [[0, 0, -0.5, 0]]}', 'point 1: brake: is -0.5'),
+    ('joy: {points: [[0, 0, 0, -1.5]]}', 'point 1: steering: is -1.5'),
+    ('joy: {points: [[0, 0, 0, .nan]]}', 'steering: is nan'),
+    ('joy: {points: [[-1, 0, 0, 0]]}', 'point 1: t: is -1'),
+    ('joy: {points: [[1, 0, 0, 0], [1, 1, 0, 0]]}', 'point 2: is at 1.0 s, not after 1.0 s'),
+    ('joy: {points: [[0, 0, 0, 0]], reverse: [{from: 1}]}', 'reverse: entry 1'),
+])
+def test_wrong_timelines_name_file_and_line(text: str, message: str) -> None:
+    """One message each, with the file and the entry."""
+    with pytest.raises(InputError, match=message) as caught:
+        parse_timeline(text, 'drive.yaml')
+    assert str(caught.value).startswith('drive.yaml')
+    assert len(str(caught.value)) < 500
+
+
+def test_a_yaml_bomb_is_refused_before_it_expands() -> None:
+    """Merge keys that double at each of 60 levels would need 2^60 entries."""
+    lines = ['a0: &a0 {k: 1}']
+    lines += [f'a{i}: &a{i} {{<<: [*a{i - 1}, *a{i - 1}]}}' for i in range(1, 61)]
+    with pytest.raises(InputError, match='alias'):
+        parse_timeline('\n'.join(lines), 'bomb.yaml')
+
+
+@pytest.mark.parametrize(('content', 'message'), [
+    (None, 'No such file'), (b'\xff\xfe\x00\x01', 'is no text'),
+    (b' ' * (3 * MAX_BYTES), 'is longer than')])
+def test_wrong_files_are_refused(tmp_path: Path, content: bytes | None, message: str) -> None:
+    """Missing, binary and huge files; no more than the limit is read."""
+    path = tmp_path / 'drive.yaml'
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        read_timeline(path)
+
+
+def test_a_directory_is_no_timeline(tmp_path: Path) -> None:
+    """The message names it."""
+    with pytest.raises(InputError, match='Is a directory'):
+        read_timeline(tmp_path)
+
+
+def test_a_file_is_read(tmp_path: Path) -> None:
+    """A file gives what its text gives."""
+    path = tmp_path / 'drive.yaml'
+    path.write_text(KEYS, encoding='utf-8')
+    assert read_timeline(path) == keys()

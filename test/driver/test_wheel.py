@@ -1,0 +1,133 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Normalisation of raw axes against CRG 17."""
+
+import math
+
+import pytest
+
+from crgame_ros.driver.wheel import (
+    AxisBinding,
+    AxisRange,
+    ControlLayout,
+    GearButtons,
+    joy_state,
+    normalize,
+    RawInput,
+    reported,
+)
+from crgame_ros.errors import InputError
+
+STEERING = AxisRange(0, 0.0, 65535.0, 32767.5, inverted=True)
+THROTTLE = AxisRange(2, 0.0, 255.0, 255.0, inverted=True)
+BRAKE = AxisRange(5, 0.0, 255.0, 255.0, inverted=True)
+WHEEL = ControlLayout(STEERING, THROTTLE, BRAKE)
+
+
+def raw(steering: float = 32767.5, throttle: float = 255, brake: float = 255) -> RawInput:
+    """Give the raw axes of a Logitech wheel."""
+    return RawInput({0: steering, 2: throttle, 5: brake})
+
+
+def test_ends_are_exact() -> None:
+    """Full left, full right, pressed and released pedals are exactly 1, -1, 1 and 0."""
+    assert normalize(raw(0, 0, 255), WHEEL) == (1.0, 0.0, 1.0, False)
+    assert normalize(raw(65535, 255, 0), WHEEL) == (0.0, 1.0, -1.0, False)
+    assert normalize(raw(), WHEEL) == (0.0, 0.0, 0.0, False)
+
+
+@pytest.mark.parametrize('value', range(0, 256, 5))
+def test_pedals_are_linear(value: int) -> None:
+    """p = l / l_max with l = 255 - raw, for the pedals rest at 255."""
+    command = normalize(raw(throttle=value, brake=255 - value), WHEEL)
+    assert command.throttle == pytest.approx((255 - value) / 255)
+    assert command.brake == pytest.approx(value / 255)
+
+
+@pytest.mark.parametrize('degrees', [-450, -225, -90, 0, 45, 180, 450])
+def test_steering_is_linear_in_the_wheel_angle(degrees: float) -> None:
+    """900 degrees over 65535 steps: s * 7.85 rad (CRG III-C2) is the angle of the wheel."""
+    command = normalize(raw(steering=32767.5 - degrees / 900 * 65535), WHEEL)
+    assert command.steering * 7.85 == pytest.approx(math.radians(degrees), abs=4.1e-3)
+    assert command.steering == pytest.approx(degrees / 450, abs=1e-12)
+
+
+def test_values_beyond_the_range_are_clipped() -> None:
+    """A calibration narrower than the device clips; so does a value that no range holds."""
+    assert normalize(raw(-500, -3, 300), WHEEL) == (1.0, 0.0, 1.0, False)
+    assert normalize(raw(70000), WHEEL).steering == -1.0
+
+
+def test_values_that_are_no_numbers_count_as_rest() -> None:
+    """NaN and infinity must not press a pedal."""
+    assert normalize(raw(math.nan, math.inf, -math.inf), WHEEL) == (0.0, 0.0, 0.0, False)
+
+
+def test_each_side_of_an_uneven_rest_reaches_its_end() -> None:
+    """A stick that rests at 140 of 0..255 still gives 1, 0 and -1."""
+    stick = AxisRange(0, 0.0, 255.0, 140.0, inverted=True)
+    given = [stick.deflection(RawInput({0: value})) for value in (0, 70, 140, 255)]
+    assert given == [1.0, 0.5, 0.0, -1.0]
+
+
+def test_deadzone_is_silent_inside_and_continuous_outside() -> None:
+    """With a deadzone d the output is (|x| - d) / (1 - d): 0 at d, 1 at the end, no jump."""
+    stick = AxisRange(0, -1.0, 1.0, 0.0, deadzone=0.2)
+    given = [stick.deflection(RawInput({0: x})) for x in (0.1, 0.2, 0.6, 1.0, -0.6, -1.0)]
+    assert given == pytest.approx([0.0, 0.0, 0.5, 1.0, -0.5, -1.0])
+
+
+def test_combined_pedals_share_an_axis() -> None:
+    """Throttle on the positive side, brake on the negative one, never both."""
+    layout = ControlLayout(STEERING, pedals=AxisRange(1, -100.0, 100.0, 0.0))
+    assert [normalize(RawInput({1: v}), layout)[:2] for v in (-100, -25, 0, 50, 100)] == [
+        (0.0, 1.0), (0.0, 0.25), (0.0, 0.0), (0.5, 0.0), (1.0, 0.0)]
+
+
+def test_silent_axes_are_at_rest() -> None:
+    """Drivers show 0 before an axis first moves; on these pedals 0 would be full throttle."""
+    fresh = reported({0: 40000, 2: 0, 5: 0}, WHEEL)
+    assert normalize(RawInput(fresh), WHEEL)[:2] == (0.0, 0.0)
+    later = reported({0: 40000, 2: 0, 5: 0}, WHEEL, known={2: 130.0})
+    assert normalize(RawInput(later), WHEEL)[:2] == (1.0, 0.0)
+
+
+def test_gear_buttons() -> None:
+    """Paddles select, a toggle flips at presses only, a shifter's gate lasts while it is held."""
+    gear = GearButtons(on=frozenset({1}), off=frozenset({2}), toggle=frozenset({3}),
+                       held=frozenset({4}))
+    reverse, seen = False, []
+    for button, pressed in [(1, True), (1, False), (1, True), (2, True), (2, False), (3, True),
+                            (3, False), (3, True), (9, True), (4, True), (9, False), (4, False)]:
+        reverse = gear.after(reverse, button, pressed)
+        seen.append(reverse)
+    assert seen == [True, True, True, False, False, True, True, False, False, True, True, False]
+
+
+def test_joy_is_ordered_and_signed_like_the_joy_node() -> None:
+    """Axes by code without hats, left and up positive; joystick buttons before the others."""
+    state = joy_state({0: 0, 2: 255}, {292, 30}, {5: (0, 255), 2: (0, 255), 0: (0, 65535),
+                                                  16: (-1, 1)}, [30, 288, 292])
+    assert state.axes == (1.0, -1.0, 0.0)
+    assert state.buttons == (0, 1, 1)
+
+
+@pytest.mark.parametrize(('binding', 'reported_range', 'message'), [
+    (AxisBinding(2, 0.0, 255.0, None, True, False, 0.0), (0.0, 1023.0), 'reports 0 to 1023'),
+    (AxisBinding(2, 0.0, 255.0, None, True, False, 0.0), (0.0, 127.0), 'reports 0 to 127'),
+    (AxisBinding(2, None, None, None, True, False, 0.0), None, 'has the range None to None'),
+    (AxisBinding(2, None, None, 300.0, True, False, 0.0), (0.0, 255.0), 'rests at 300'),
+])
+def test_a_map_that_does_not_fit_the_device_is_refused(
+        binding: AxisBinding, reported_range: tuple[float, float] | None, message: str) -> None:
+    """A pedal of 0..1023 read as 0..255 would be wrong everywhere: say so instead."""
+    with pytest.raises(InputError, match=message):
+        binding.range(reported_range)
+
+
+def test_a_binding_takes_the_devices_range() -> None:
+    """Where the map gives no limits, those of the device hold, and the rest follows from them."""
+    pedal = AxisBinding(2, None, None, None, True, False, 0.0).range((0.0, 1023.0))
+    stick = AxisBinding(0, None, None, None, True, True, 0.0).range((-32768.0, 32767.0))
+    assert (pedal.minimum, pedal.maximum, pedal.rest) == (0.0, 1023.0, 1023.0)
+    assert stick.rest == -0.5

@@ -1,0 +1,168 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Loading: real scenarios, what is mended with a notice, uncertain initial states."""
+
+import hashlib
+import math
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+from crgame_ros.scenario.loading import load_scenario, parse_scenario
+
+SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
+LANELET = """<lanelet id="{id}">
+<leftBound><point><x>{x0}</x><y>2</y></point><point><x>{x1}</x><y>2</y></point></leftBound>
+<rightBound><point><x>{x0}</x><y>-2</y></point><point><x>{x1}</x><y>-2</y></point></rightBound>
+{links}</lanelet>"""
+PROBLEM = """<planningProblem id="{id}"><initialState>
+<position>{position}</position>
+<orientation><intervalStart>-0.2</intervalStart><intervalEnd>0.6</intervalEnd></orientation>
+<time><exact>3</exact></time>
+<velocity><intervalStart>8</intervalStart><intervalEnd>10</intervalEnd></velocity>
+<yawRate><exact>0</exact></yawRate><slipAngle><exact>0</exact></slipAngle></initialState>
+<goalState><time><intervalStart>10</intervalStart><intervalEnd>20</intervalEnd></time></goalState>
+</planningProblem>"""
+RECTANGLE = ('<rectangle><length>2</length><width>1</width><orientation>0.3</orientation>'
+             '<center><x>12</x><y>0.5</y></center></rectangle>')
+
+
+def write(links: str = '', rest: str = '', benchmark: str = 'ZAM_Mini-1_1_T-1',
+          tags: str = '<scenarioTags/>') -> str:
+    """Write a scenario of two lanelets in a row; `links` go into the first."""
+    return (f'<commonRoad timeStepSize="0.04" commonRoadVersion="2020a" benchmarkID="{benchmark}" '
+            f'author="a" affiliation="b" source="c" date="2026-01-01">{tags}'
+            + LANELET.format(id=1, x0=0, x1=50, links='<successor ref="2"/>' + links)
+            + LANELET.format(id=2, x0=50, x1=99, links='<predecessor ref="1"/>')
+            + rest + '</commonRoad>')
+
+
+def shared(name: str = '') -> Path:
+    """Find a real scenario, or skip."""
+    if not (SHARED / name).exists():
+        pytest.skip('the real scenarios (../shared/scenarios) are not on this machine')
+    return SHARED / name
+
+
+def test_all_real_scenarios_load_as_published() -> None:
+    """The eleven files' numbers of lanelets, obstacles and problems are those counted in XML."""
+    files = sorted(shared().glob('*.xml'))
+    assert len(files) >= 11
+    for path in files:
+        text = path.read_text(encoding='utf-8')
+        loaded = load_scenario(path)
+        assert len(loaded.scenario.lanelet_network.lanelets) == text.count('<lanelet id=')
+        assert len(loaded.scenario.obstacles) == (
+            text.count('<dynamicObstacle ') + text.count('<staticObstacle ')
+            + text.count('<obstacle '))
+        assert len(loaded.planning_problems) == text.count('<planningProblem ')
+        assert loaded.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+        assert loaded.time_step_s == 0.1
+
+
+def test_malformed_benchmark_id_is_renamed_and_said() -> None:
+    """The published ZAM-Ramp-1_1-T-1 becomes the id that was meant."""
+    loaded = load_scenario(shared('ZAM-Ramp-1_1-T-1.xml'))
+    assert loaded.benchmark_id == 'ZAM_Ramp-1_1_T-1'
+    assert len(loaded.notices) == 1 and 'ZAM_Ramp-1_1_T-1' in loaded.notices[0]
+
+
+@pytest.mark.parametrize(('given', 'valid'), [
+    ('C-USA_US101-33_2_T-1', 'C-USA_US101-33_2_T-1'), ('XYZ_Town-1', 'ZAM_XYZTown1-1'),
+    ('../../etc/passwd', 'ZAM_etcpasswd-1'), ('', 'ZAM_Unnamed-1'), ('DEU_A-0', 'ZAM_DEUA0-1')])
+def test_benchmark_ids_are_safe_file_names(given: str, valid: str) -> None:
+    """Whatever the file says, the id matches the documented pattern (it names output files)."""
+    assert parse_scenario(write(benchmark=given), 'x').benchmark_id == valid
+
+
+def test_uncertain_initial_state_is_reduced_to_its_centre() -> None:
+    """Rectangle and intervals become their middles, with one notice."""
+    loaded = parse_scenario(write(rest=PROBLEM.format(id=9, position=RECTANGLE)), 'x.xml')
+    state = loaded.planning_problems[0].initial_state
+    assert state.position.tolist() == [12.0, 0.5]
+    assert state.orientation == pytest.approx(0.2)
+    assert (state.velocity, state.time_step) == (9.0, 3)
+    assert 'planning problem 9' in loaded.notices[0] and len(loaded.notices) == 1
+
+
+def test_problems_keep_the_order_of_the_file() -> None:
+    """The AVs av0, av1, … take the problems in file order, not in id order."""
+    point = '<point><x>5</x><y>0</y></point>'
+    text = write(rest=''.join(PROBLEM.format(id=i, position=point) for i in (30, 10, 20)))
+    problems = parse_scenario(text, 'x').planning_problems
+    assert [p.planning_problem_id for p in problems] == [30, 10, 20]
+
+
+def test_scenario_without_problem_is_said_in_one_line() -> None:
+    """A map alone is fine: the human drives alone."""
+    loaded = parse_scenario(write(), 'map.xml')
+    assert loaded.planning_problems == () and loaded.time_step_s == 0.04
+    assert loaded.notices == (
+        'map.xml: the scenario has no planning problem: the human drives alone',)
+
+
+@pytest.mark.parametrize(('links', 'rest', 'notice'), [
+    ('<successor ref="77"/>', '', 'the missing lanelet 77'),
+    ('<adjacentLeft ref="77" drivingDir="same"/>', '', 'the missing lanelet 77'),
+    ('<trafficSignRef ref="78"/>', '', 'the missing trafficSign 78'),
+    ('<adjacentRight ref="1" drivingDir="same"/>', '', 'closes a circle'),
+    ('', '<trafficSign id="5"><trafficSignElement><trafficSignID>274</trafficSignID>'
+     '</trafficSignElement></trafficSign>', 'trafficSign 5 belongs to no lanelet'),
+    ('<trafficLightRef ref="6"/>', '<trafficLight id="6"/>', 'has no cycle'),
+    ('', '<location><geoNameId>-999</geoNameId><gpsLatitude>NaN</gpsLatitude>'
+     '<gpsLongitude>1</gpsLongitude></location>', 'location'),
+    ('', '<dynamicObstacle id="7"><type>car</type><shape><circle><radius>1</radius></circle>'
+     '</shape><initialState><position><point><x>1</x><y>0</y></point></position><time><exact>0'
+     '</exact></time></initialState><trajectory/></dynamicObstacle>', 'empty trajectory'),
+])
+def test_mendable_faults_load_with_a_notice(links: str, rest: str, notice: str) -> None:
+    """Each of these stops or traps commonroad-io itself; here it loads and is said."""
+    loaded = parse_scenario(write(links, rest), 'x')
+    assert len(loaded.scenario.lanelet_network.lanelets) == 2
+    assert loaded.scenario.lanelet_network.find_lanelet_by_id(1).successor == [2]
+    assert sum(notice in n for n in loaded.notices) == 1
+
+
+def test_sign_on_a_circle_of_neighbours_ends() -> None:
+    """A sign without a position makes commonroad-io walk along neighbours, for ever if it can."""
+    loaded = parse_scenario(write(
+        '<adjacentRight ref="1" drivingDir="same"/><trafficSignRef ref="5"/>',
+        '<trafficSign id="5"><trafficSignElement><trafficSignID>274</trafficSignID>'
+        '<additionalValue>10</additionalValue></trafficSignElement></trafficSign>'), 'x')
+    assert loaded.scenario.lanelet_network.find_lanelet_by_id(1).adj_right is None
+
+
+def test_missing_tags_and_heights_are_tolerated() -> None:
+    """2020a files without scenarioTags and with z coordinates are in circulation."""
+    text = write(tags='').replace('<y>2</y>', '<y>2</y><z>412.5</z>')
+    loaded = parse_scenario(text, 'x')
+    assert loaded.scenario.lanelet_network.find_lanelet_by_id(1).left_vertices.shape == (2, 2)
+    assert any('heights of 4 points' in n for n in loaded.notices)
+
+
+def test_format_2018b_has_its_speed_limit_as_a_sign() -> None:
+    """The old format loads, and its speedLimit element survives."""
+    text = write(links='<speedLimit>12.5</speedLimit>').replace('2020a', '2018b')
+    loaded = parse_scenario(text, 'x')
+    signs = loaded.scenario.lanelet_network.traffic_signs
+    assert [s.traffic_sign_elements[0].additional_values for s in signs] == [['12.5']]
+
+
+def test_import_leaves_pyplot_and_clcs_alone() -> None:
+    """Start-up must not pay for plotting and curvilinear coordinates."""
+    code = ('import sys, crgame_ros.scenario.loading; '
+            'print([m for m in sys.modules if "pyplot" in m or "clcs" in m])')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          cwd=Path(__file__).resolve().parents[2], check=True)
+    assert done.stdout.strip() == '[]'
+
+
+def test_missing_orientation_does_not_become_nan() -> None:
+    """A circle needs no heading; commonroad-io's default of 0 is kept finite."""
+    text = write(rest='<staticObstacle id="7"><type>pillar</type><shape><circle><radius>1</radius>'
+                 '</circle></shape><initialState><position><point><x>1</x><y>0</y></point>'
+                 '</position><time><exact>0</exact></time></initialState></staticObstacle>')
+    state = parse_scenario(text, 'x').scenario.obstacle_by_id(7).initial_state
+    assert math.isfinite(state.orientation)

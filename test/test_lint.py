@@ -1,0 +1,124 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Style, types, licence headers, sizes, and that the core needs no ROS."""
+
+import ast
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / 'crgame_ros'
+HEADER = ('# Copyright 2026 The crgame_ros authors', '# SPDX-License-Identifier: Apache-2.0')
+MAX_FILE_LINES = 350
+MAX_FUNCTION_LINES = 60
+# These may import ROS; everything else is the core.
+ROS_FOLDERS = {'ros', 'nodes'}
+ROS_FILES = {'cli.py', 'doctor.py', 'launcher.py'}
+BLOCKED_IMPORTS = """
+import importlib, sys
+
+class NoRos:
+    def find_spec(self, name, path=None, target=None):
+        top = name.partition('.')[0]
+        if top in ('rclpy', 'std_srvs', 'builtin_interfaces', 'rcl_interfaces', 'launch',
+                   'launch_ros', 'ament_index_python') or top.endswith('_msgs'):
+            raise ImportError(f'the core imports {name}')
+
+sys.meta_path.insert(0, NoRos())
+failed = 0
+for name in sys.argv[1:]:
+    try:
+        importlib.import_module(name)
+    except ImportError as error:
+        failed += 1
+        print(f'{name}: {error}')
+sys.exit(failed)
+"""
+
+
+def _sources() -> list[Path]:
+    """List every Python file that is ours."""
+    folders = ('crgame_ros', 'test', 'launch', 'scripts', 'benchmarks', 'examples')
+    files = [file for folder in folders for file in (ROOT / folder).rglob('*.py')]
+    return sorted([*files, ROOT / 'setup.py'])
+
+
+def _run(*command: str) -> None:
+    """Run a tool of this interpreter at the root and fail with its output."""
+    done = subprocess.run([sys.executable, *command], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def _functions(file: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """Walk over the functions and methods of a file."""
+    for node in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node
+
+
+def test_ruff() -> None:
+    """Line length, quotes, import order, docstrings, annotations (pyproject.toml)."""
+    _run('-m', 'ruff', 'check', '--no-cache', *(str(file) for file in _sources()))
+
+
+def test_mypy() -> None:
+    """Everything in the package is annotated, and consistently so (pyproject.toml)."""
+    _run('-m', 'mypy', '--cache-dir', str(ROOT / 'build' / '.mypy_cache'))
+
+
+@pytest.mark.parametrize('linter', ['ament_flake8', 'ament_pep257'])
+def test_ament_linter(linter: str) -> None:
+    """Keep the rules of ROS 2 where its linters are installed; ruff has them elsewhere."""
+    if find_spec(linter) is None:
+        pytest.skip(f'{linter} is not installed')
+    _run('-m', f'{linter}.main', 'crgame_ros', 'test', 'setup.py')
+
+
+def test_every_file_starts_with_the_licence_header() -> None:
+    """Copyright and licence are the first two lines, after `#!` where there is one."""
+    wrong = []
+    for file in _sources():
+        lines = file.read_text(encoding='utf-8').splitlines()
+        start = 1 if lines and lines[0].startswith('#!') else 0
+        if tuple(lines[start:start + 2]) != HEADER:
+            wrong.append(str(file.relative_to(ROOT)))
+    assert not wrong
+
+
+def test_core_imports_no_ros() -> None:
+    """The core runs where there is no ROS: it imports with rclpy and the messages blocked."""
+    modules = []
+    for file in sorted(PACKAGE.rglob('*.py')):
+        path = file.relative_to(PACKAGE)
+        if path.parts[0] not in ROS_FOLDERS and path.name not in ROS_FILES:
+            parts = ('crgame_ros', *path.with_suffix('').parts)
+            modules.append('.'.join(parts).removesuffix('.__init__'))
+    assert len(modules) > 20
+    _run('-c', BLOCKED_IMPORTS, *modules)
+
+
+def test_the_import_block_blocks() -> None:
+    """The check above does see an import of ROS."""
+    done = subprocess.run([sys.executable, '-c', BLOCKED_IMPORTS, 'rclpy', 'sensor_msgs.msg'],
+                          cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 2
+
+
+def test_files_and_functions_are_short() -> None:
+    """A file has one subject and a function fits a screen."""
+    wrong = []
+    for file in sorted(PACKAGE.rglob('*.py')):
+        name = str(file.relative_to(ROOT))
+        lines = len(file.read_text(encoding='utf-8').splitlines())
+        if lines > MAX_FILE_LINES:
+            wrong.append(f'{name}: {lines} lines')
+        for function in _functions(file):
+            length = (function.end_lineno or 0) - function.lineno + 1
+            if length > MAX_FUNCTION_LINES:
+                wrong.append(f'{name}:{function.lineno}: {function.name} has {length} lines')
+    assert not wrong, '\n'.join(wrong)
