@@ -30,11 +30,12 @@ done
 echo "== colcon test (ROS_DOMAIN_ID=$ROS_DOMAIN_ID)"
 output=log/pytest.txt
 : >"$output"
-# A word now and then while one long test prints nothing.
+# A word now and then while one long test prints nothing. (A `sleep` would outlive this script.)
+exec {never}<> <(:)
 (
     trap - EXIT
     seen=0
-    while sleep 5; do
+    until read -r -t 5 -u "$never"; do
         size=$(stat -c %s "$output")
         ((size != seen)) || echo "   still in the test above, $(date +%T)"
         seen=$size

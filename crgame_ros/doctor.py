@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is missing on this machine, and the remedy for each: the checks of `crgame doctor`."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -65,19 +66,12 @@ class Check:
 
 
 def run_checks(runs: Path | None = None) -> list[Check]:
-    """
-    Check everything; takes some seconds.
-
-    :param runs: the directory that recordings go to, `runs` where None.
-    :return: the checks in the order of the report.
-    """
+    """Check everything, in some seconds; recordings go to `runs`, by default ./runs."""
     prepare_environment()
-    checks = [check_python()]
-    checks += check_packages(share_directory() / 'requirements.txt')
-    checks += [check_imports(), check_ros(), check_profile(), check_devices(), check_priority()]
-    checks += check_discovery()
-    checks += [check_disk(runs or Path('runs')), check_processors(), check_clock()]
-    return checks
+    return [check_python(), *check_packages(share_directory() / 'requirements.txt'),
+            check_imports(), check_ros(), check_profile(), check_devices(), check_priority(),
+            *check_discovery(), check_disk(runs or Path('runs')), check_processors(),
+            check_clock()]
 
 
 def format_checks(checks: list[Check]) -> str:
@@ -88,9 +82,8 @@ def format_checks(checks: list[Check]) -> str:
         lines.append(f'{check.status:<4}  {check.name:<{width}}  {check.detail}')
         if check.remedy:
             lines.append(f'{"":<4}  {"":<{width}}  -> {check.remedy}')
-    failed = sum(check.status == 'fail' for check in checks)
-    warned = sum(check.status == 'warn' for check in checks)
-    lines.append(f'{len(checks)} checks: {failed} failed, {warned} warnings')
+    counts = Counter(check.status for check in checks)
+    lines.append(f'{len(checks)} checks: {counts["fail"]} failed, {counts["warn"]} warnings')
     return '\n'.join(lines)
 
 
@@ -242,13 +235,13 @@ def check_discovery() -> list[Check]:
     found = json.loads(listener.stdout.splitlines()[-1])
     detail = (f'first message after {found["first_s"]:.2f} s, '
               f'then {found["median_us"]:.0f} us a message')
-    checks = [Check('discovery', 'ok', detail)]
-    if network_is_open() or not found['beyond_loopback']:
-        where = 'on every interface' if found['beyond_loopback'] else 'on loopback only'
-        return [*checks, Check('ports', 'ok', f'DDS listens {where}')]
-    return [*checks, Check('ports', 'fail',
-                           f'DDS listens at {", ".join(found["beyond_loopback"])}',
-                           f'unset {" ".join(PROFILE_VARIABLES)}')]
+    beyond = ', '.join(found['beyond_loopback'])
+    if beyond and not network_is_open():
+        ports = Check('ports', 'fail', f'DDS listens at {beyond}',
+                      f'unset {" ".join(PROFILE_VARIABLES)}')
+    else:
+        ports = Check('ports', 'ok', f'DDS listens at {beyond or "loopback only"}')
+    return [Check('discovery', 'ok', detail), ports]
 
 
 def check_disk(runs: Path) -> Check:

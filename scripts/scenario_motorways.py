@@ -59,7 +59,7 @@ def merge() -> ScenarioFile:
     roads.chain(51, 52, 53, 41)
     roads.speed_limit(60 * KMH, 51)
     roads.speed_limit(100 * KMH, 52, 53)
-    problem = Problem(PLANNING_PROBLEM_ID, (-195.0, -0.5 * WIDTH, 0.0), 24.0, (41,))
+    problem = Problem(PLANNING_PROBLEM_ID, (-188.0, -0.5 * WIDTH, 0.0), 24.0, (41,))
     return ScenarioFile('ZAM_Merge-1_1_T-1', roads, (problem,),
                         ('interstate', 'slip_road', 'merging_lanes', 'multi_lane', 'simulated'))
 

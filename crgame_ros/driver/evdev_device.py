@@ -280,10 +280,9 @@ def _nothing_found(maps: tuple[DeviceMap, ...], others: list[str], unreadable: l
                    directory: Path) -> InputError:
     wanted = ', '.join(device_map.name for device_map in maps)
     if unreadable:
-        return InputError(f'no readable device fits {wanted}; not readable: '
-                          + ', '.join(unreadable), str(directory),
-                          'add yourself to the group input (sudo usermod -aG input $USER) and log '
-                          'in again')
+        return InputError(
+            f'no readable device fits {wanted}; not readable: {", ".join(unreadable)}',
+            str(directory), 'join the group input (sudo usermod -aG input $USER), log in again')
     return InputError(f'no device fits {wanted}; found: {", ".join(others) or "none"}',
                       str(directory), 'plug it in, or add a device map (docs/driving.md)')
 

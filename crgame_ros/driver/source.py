@@ -263,6 +263,7 @@ class EvdevDriver(DriverSource):
     def __init__(self, device: 'EvdevDevice', parameters: KeyboardParameters | None = None,
                  ) -> None:
         self.device = device
+        self.problem = device.problem
         self._cycles = KeyboardCycles(parameters)
 
     @property

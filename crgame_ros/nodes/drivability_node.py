@@ -43,7 +43,7 @@ class DrivabilityNode(Node):
         self._ready_for: tuple[str, ...] = ()
         self._game: GameDocument | None = None
         self._monitor: DrivabilityMonitor | None = None
-        self._publishers: dict[str, Publisher] = {}
+        self._reports: dict[str, Publisher] = {}
         self._waiting_objects: deque[tuple[int, ObjectStates]] = deque()
         self._tick_ns = 0
         self._reported: tuple[VehicleDrivability, ...] = ()
@@ -95,8 +95,8 @@ class DrivabilityNode(Node):
         monitor = DrivabilityMonitor(driven, others, network, game.drivability)
         monitor.prepare(np.array([entry['state'] for entry in (*game.humans, *game.avs)]))
         for item in driven:
-            if item.id not in self._publishers:
-                self._publishers[item.id] = self._endpoints.publisher('/<v>/drivability', item.id)
+            if item.id not in self._reports:
+                self._reports[item.id] = self._endpoints.publisher('/<v>/drivability', item.id)
         self._monitor, self._game, self._reported = monitor, game, ()
 
     def _check(self, message: JointTrajectory) -> None:
@@ -144,7 +144,7 @@ class DrivabilityNode(Node):
                 ('stop', str(verdict.stop_requested).lower()))]
             array = DiagnosticArray(status=[status])
             array.header.stamp = to_time(stamp_ns)
-            self._publishers[verdict.vehicle_id].publish(array)
+            self._reports[verdict.vehicle_id].publish(array)
 
 
 def main(args: list[str] | None = None) -> None:

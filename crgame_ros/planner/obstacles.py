@@ -95,7 +95,7 @@ class ObstacleProjector:
         :raises PlanningError: if an obstacle was never described.
         """
         self._describe(request.obstacle_ids)
-        poses, velocities = _prolong(request, steps)
+        poses, velocities = prolong(request, steps)
         near = self._near(path, corridor, poses)
         poses, velocities = poses[:, near], velocities[:, near]
         if not len(near):
@@ -161,7 +161,12 @@ def outline(shape: Shape) -> Array:
                            [-shape.length, -shape.width], [-shape.length, shape.width]])
 
 
-def _prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
+def prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
+    """
+    Give predicted poses and velocities (steps, M, 3).
+
+    Beyond the request's P points objects keep their last velocity.
+    """
     poses, velocities = request.obstacle_poses, request.obstacle_velocities
     given = len(poses)
     if given >= steps:

@@ -75,7 +75,7 @@ class McapFile:
     :ivar complete: whether the file has its closing records.
     :ivar segments: where the messages are, in file order.
     :ivar kept: offset and size of each metadata and attachment record.
-    :ivar useless_bytes: size of what is cut off or damaged, as far as a walk over the records shows.
+    :ivar useless_bytes: size of what is cut off or damaged, as far as the walk shows.
     :ivar channels: by id; in a file without summary only after its messages were read.
     :raises InputError: if it is no MCAP file or cannot be read.
     """

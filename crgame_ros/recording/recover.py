@@ -137,7 +137,7 @@ def _copy(source: McapFile, target: BinaryIO) -> tuple[int, int]:
                 _register(source, message.channel_id, writer, schemas, channels)
             _write(writer, channels[message.channel_id], message)
             count += 1
-    for number in source.channels.keys() - channels.keys():
+    for number in sorted(source.channels.keys() - channels.keys()):
         _register(source, number, writer, schemas, channels)
     for offset, size in source.kept:
         _copy_record(source.path, offset, size, writer)

@@ -10,7 +10,6 @@ from crgame_ros.driver.replay import ReplayDriver
 from crgame_ros.driver.source import (
     DriverSource, EvdevDriver, IdleDriver, JoyDriver, load_timeline, parse_source, ScriptedDriver)
 from crgame_ros.errors import InputError
-from crgame_ros.recording.run_log import read_cycles
 
 
 def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str) -> DriverSource:
@@ -29,7 +28,13 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str) -> Driv
             return ScriptedDriver.from_text(timeline, f'{vehicle_id}: {text}')
         return ScriptedDriver(load_timeline(source, Path('.')))
     if source.kind == 'replay':
-        return ReplayDriver(read_cycles(Path(source.argument)).commands(vehicle_id))
+        # Imported here, for reading bags takes time that no other driver has to spend.
+        from crgame_ros.recording.run_log import replay_inputs
+        commands, _ = replay_inputs(Path(source.argument))
+        if vehicle_id not in commands:
+            raise InputError(f'{vehicle_id} took no part', source.argument,
+                             'it has ' + ', '.join(commands))
+        return ReplayDriver(commands[vehicle_id])
     if source.kind == 'joy':
         return JoyDriver(load_device_map(joy_map))
     if source.kind == 'idle':

@@ -11,7 +11,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from crgame_ros.errors import InputError
-from crgame_ros.ros.contract import load_contract
 from crgame_ros.ros.live_diagnostics import LiveDiagnostics
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.sim_control import SimControl
@@ -29,7 +28,6 @@ RESEND_S = 0.5
 # The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
 WAKE_UP_NS = 120_000
 SETTLE_NS = 200_000_000
-WATCHED_TOPICS = ('/clock', '/vehicles/state', '/timing/cycle')
 
 
 class Outcome(Enum):
@@ -123,7 +121,7 @@ class LiveRun:
             if outcome is not None:
                 return outcome
             now_ns = time.monotonic_ns()
-            if not connected and self._companions_connected():
+            if not connected and self._outputs.subscribed_by(self._control.companions):
                 connected = True
                 self._outputs.publish_step(self.simulation, result)
                 resend_ns = now_ns + int(RESEND_S * NS_PER_S)
@@ -145,15 +143,6 @@ class LiveRun:
         self._node.get_logger().warning(
             f'starting without {" and ".join(missing)}: '
             f'no answer in {self._control.planner_timeout_s:g} s')
-
-    def _companions_connected(self) -> bool:
-        contract = load_contract()
-        for topic in WATCHED_TOPICS:
-            consumers = set(contract.topic(topic).consumers)
-            expected = sum(1 for node in self._control.companions if node in consumers)
-            if self._outputs.subscribers(topic) < expected:
-                return False
-        return True
 
     def _ordered_end(self) -> Outcome | None:
         control = self._control

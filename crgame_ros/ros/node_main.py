@@ -11,6 +11,7 @@ from types import FrameType
 from typing import Protocol
 
 PARENT_VARIABLE = 'CRGAME_PARENT_PID'
+NICE_VARIABLE = 'CRGAME_NICE'
 PR_SET_PDEATHSIG = 1
 
 
@@ -65,6 +66,8 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     :param args: command line, the process's own where None.
     """
     die_with_parent()
+    # Planners and recorder give way to the simulation and the driver.
+    os.nice(int(os.environ.get(NICE_VARIABLE, '0')))
     from crgame_ros.ros.environment import prepare_environment
     prepare_environment()
 

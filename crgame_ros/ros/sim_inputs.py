@@ -35,6 +35,11 @@ class Seat:
         """How often the driver has fallen silent."""
         return self._watchdog.losses
 
+    @property
+    def lost(self) -> bool:
+        """Whether the driver is silent now."""
+        return self._watchdog.lost
+
     def forgive(self, now_ns: int) -> None:
         """Count silence from now on: a pause is no loss."""
         if self._heard_ns is not None:

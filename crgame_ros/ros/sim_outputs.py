@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What sim_node publishes: built once for a game, refilled at every step."""
 
+from collections.abc import Sequence
 import json
 import math
 
@@ -15,6 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, String
 
 from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
+from crgame_ros.ros.contract import load_contract
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import MAP, set_time, StateMessage, to_joint_trajectory, to_time
 from crgame_ros.scenario.signals import TrafficLights
@@ -184,10 +186,19 @@ class SimOutputs:
         header = Header(stamp=to_time(stamp_ns), frame_id=MAP)
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
-    def subscribers(self, topic: str) -> int:
-        """Count the matched subscriptions of /timing/cycle, /vehicles/state or /clock."""
-        return int({'/timing/cycle': self._cycle, '/vehicles/state': self._state,
-                    '/clock': self._clock}[topic].get_subscription_count())
+    def subscribed_by(self, companions: Sequence[str]) -> bool:
+        """Tell whether every companion that consumes a topic of each step is connected to it."""
+        watched = {'/clock': [self._clock], '/vehicles/state': [self._state],
+                   '/traffic/objects': [self._objects], '/timing/cycle': [self._cycle],
+                   '/<av>/plan_request': list(self._requests.values())}
+        for name, publishers in watched.items():
+            # There is a driver node for each human; of all others a topic has one each.
+            expected = sum(len(self._setup.humans) if item == 'driver_node' else 1
+                           for item in load_contract().topic(name).consumers
+                           if item in companions)
+            if any(item.get_subscription_count() < expected for item in publishers):
+                return False
+        return True
 
     def wait_until_received(self) -> None:
         """Wait for the subscribers to acknowledge what was published, with a limit."""

@@ -3,7 +3,7 @@
 """Reading game files: YAML in, a checked `Game` or one clear error out."""
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass, MISSING
 import math
 from pathlib import Path
 import re
@@ -173,3 +173,33 @@ def _number(value: Any, kind: type, name: str, where: str) -> float | int:
     if not low <= value <= high or (math.isinf(value) and name != 'duration'):
         raise InputError(f'"{name}" is {value!r}', where, f'give a number from {low:g} to {high:g}')
     return kind(value)
+
+
+def dump_game(game: Game) -> str:
+    """
+    Write a game file that gives the same game from anywhere: its file names are absolute.
+
+    :return: YAML text.
+    """
+    values: dict[str, Any] = {'title': game.title, 'scenario': str(game.scenario.resolve())}
+    if math.isfinite(game.duration):
+        values['duration'] = game.duration
+    values['seed'] = game.seed
+    values['humans'] = [_without_empty(asdict(human)) | {
+        'driver': _absolute_driver(human.driver, game.base)} for human in game.humans]
+    if game.avs is not None:
+        values['avs'] = [_without_empty(asdict(av)) for av in game.avs]
+    for key in ('prediction', 'drivability', 'timing'):
+        values[key] = asdict(getattr(game, key))
+    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def _without_empty(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _absolute_driver(driver: str, base: Path) -> str:
+    kind, colon, argument = driver.partition(':')
+    if not colon or kind == 'evdev':
+        return driver
+    return f'{kind}:{(base / Path(argument).expanduser()).resolve()}'

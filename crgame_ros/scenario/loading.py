@@ -29,6 +29,8 @@ from crgame_ros.scenario import guard
 
 _LENIENT_ID = re.compile(
     r'(C-)?([A-Z]{3})[-_]([A-Za-z0-9]+)[-_](\d+)(?:[-_](\d+)(?:[-_]([STPI])((?:[-_]\d+)+))?)?')
+# Lanes are tabulated along their length: one of a million kilometres would fill the memory [m].
+_MAX_LANELET_LENGTH = 1e5
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,9 @@ def parse_scenario(xml_text: str, source: str) -> LoadedScenario:
     notices += remarks
     exact = tuple(_exact_problem(problem, notices) for problem in problems)
     for lanelet in scenario.lanelet_network.lanelets:
-        if not lanelet.distance[-1] > 1e-3:
-            raise InputError('the centre line has no length', f'{source}, lanelet '
-                             f'{lanelet.lanelet_id}', 'correct its bounds')
+        if not 1e-3 < lanelet.distance[-1] < _MAX_LANELET_LENGTH:
+            raise InputError(f'the centre line is {lanelet.distance[-1]:g} m long',
+                             f'{source}, lanelet {lanelet.lanelet_id}', 'correct its bounds')
     if not exact:
         notices.append('the scenario has no planning problem: the human drives alone')
     digest = hashlib.sha256(xml_text.encode('utf-8')).hexdigest()

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import math
 
 from commonroad.common.util import Interval
-from commonroad.geometry.shape import Circle, Rectangle
+from commonroad.geometry.shape import Circle, Rectangle, ShapeGroup
 from commonroad.geometry.shape import Shape as CommonRoadShape
-from commonroad.geometry.shape import ShapeGroup
 from commonroad.prediction.prediction import SetBasedPrediction, TrajectoryPrediction
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle, PhantomObstacle
 from commonroad.scenario.state import State
@@ -18,8 +17,7 @@ from numpy.typing import NDArray
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.loading import (
-    exact_position, exact_value, group_outline, LoadedScenario)
+from crgame_ros.scenario.loading import exact_position, exact_value, group_outline, LoadedScenario
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 
 FloatArray = NDArray[np.float64]

@@ -26,6 +26,8 @@ _MAX_LANE_ANGLE = math.radians(45.0)
 _FREE_MOVERS = ('pedestrian', 'unknown')
 _SPACING = 0.5
 _BEHIND = 30.0
+# 200 m beyond a lanelet cover 3 s at any legal speed; farther than 5 km lies no planner's horizon.
+_MIN_REACH, _MAX_REACH = 200.0, 5000.0
 _NO_LANE = -1
 
 
@@ -100,6 +102,7 @@ class LanePrediction:
             np.stack((np.cos(obstacles.poses[..., 2]), np.sin(obstacles.poses[..., 2])), -1))
         self._reach = 0.0
         self._assign_lanes()
+        self._ensure_reach(_MIN_REACH)
 
     def predict(self, k: int, steps: int) -> tuple[FloatArray, FloatArray]:
         """
@@ -165,10 +168,10 @@ class LanePrediction:
             self._lane[where], self._s[where], self._d[where] = number, s[along], d[along]
 
     def _ensure_reach(self, reach: float) -> None:
-        """Tabulate every used lane at least `reach` metres beyond its end."""
-        if reach <= self._reach:
+        """Tabulate every used lane at least `reach` metres (at most 5 km) beyond its end."""
+        if min(reach, _MAX_REACH) <= self._reach or not self._used:
             return
-        self._reach = max(200.0, 1.5 * reach)
+        self._reach = min(max(_MIN_REACH, 1.5 * reach), _MAX_REACH)
         tables = []
         for lane in self._used:
             lanelet_id = self._network.lanelet_ids[lane]

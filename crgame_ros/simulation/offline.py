@@ -117,7 +117,8 @@ def run_offline(
     :param duration_s: simulated time; the game's own where None [s]
     :param latency_steps: simulation steps between a request and its plan.
     :param drivers: drivers of humans by id, instead of the game's own.
-    :param intervals_s: Delta t_eff of each step, as recorded; the nominal step where None [s]
+    :param intervals_s: Delta t_eff of each step, as recorded; the nominal step where None and
+        beyond their end [s]
     :param check_drivability: run the monitor in lockstep.
     :param clock_s: clock that times the planners, which the result doesn't depend on.
     :raises InputError: if a human's driver needs a person or a device.
@@ -138,7 +139,8 @@ def run_offline(
             seat.deliver()
         trace.add(simulation, result)
         commands = [hand.command(simulation.n, dt_s) for hand in hands]
-        effective_s = dt_s if intervals_s is None else float(intervals_s[simulation.n])
+        recorded = intervals_s is not None and simulation.n < len(intervals_s)
+        effective_s = float(intervals_s[simulation.n]) if recorded else dt_s
         result = simulation.step(effective_s, commands)
     trace.add(simulation, result)
     return OfflineResult(

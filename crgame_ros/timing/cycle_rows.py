@@ -52,7 +52,7 @@ class CycleRows:
             place += len(COMMAND_COLUMNS)
         self.count += 1
 
-    def taken(self) -> array[float]:
+    def taken(self) -> 'array[float]':
         """Empty the buffer and give its rows, flattened."""
         used = self._data[:self.count * len(self.columns)]
         self.count = 0

@@ -121,14 +121,14 @@ def test_keyboard_has_the_papers_keys() -> None:
     assert keys.held({e.KEY_UP, e.KEY_D}, False) == (True, False, False, True, False)
 
 
-COMBINED = '''
+COMBINED = """
 title: Old wheel
 kind: wheel
 match: [Old]
 steering: {evdev: {axis: ABS_WHEEL}, joy: {axis: 0, inverted: true}, deadzone: 0.1}
 pedals: {evdev: {axis: ABS_GAS, inverted: true}, joy: {axis: 1}}
 buttons: {reverse_toggle: [{evdev: BTN_A, joy: 2}]}
-'''
+"""
 
 
 def test_combined_pedals_are_read() -> None:
@@ -185,3 +185,13 @@ def test_maps_of_another_directory(tmp_path: Path) -> None:
     (tmp_path / 'old.yaml').write_text(COMBINED, encoding='utf-8')
     maps: tuple[DeviceMap, ...] = load_device_maps(tmp_path)
     assert [m.title for m in maps] == ['Old wheel']
+
+
+def test_the_documented_example_is_the_g29() -> None:
+    """The example of docs/driving.md is read, and drives as a G29 without a shifter does."""
+    text = (Path(__file__).parents[2] / 'docs' / 'driving.md').read_text(encoding='utf-8')
+    block = next(b for b in text.split('```yaml')[1:] if b.startswith('\ntitle:'))
+    device = parse_device_map(block.split('```')[0], 'driving.yaml')
+    g29 = load_device_map('logitech_g29')
+    assert device.evdev is not None and g29.evdev is not None
+    assert device.evdev.layout(WHEEL_LIMITS).ranges == g29.evdev.layout(WHEEL_LIMITS).ranges

@@ -161,3 +161,12 @@ def test_wrong_parameters_are_refused(wrong: dict[str, float]) -> None:
     """A rate that is no finite number of at least 0, or a cap outside (0, 1], names itself."""
     with pytest.raises(InputError, match=next(iter(wrong))):
         KeyboardParameters(**wrong)
+
+
+@pytest.mark.parametrize(('state', 'command'), [
+    (DriverCommand(0.00099, 0.00099, 0.000099), RELEASED),
+    (DriverCommand(0.00099, 0.00099, -0.000099), RELEASED),
+    (DriverCommand(0.00101, 0.00101, -0.000101), (0.00101, 0.00101, -0.000101, False))])
+def test_deadbands_are_the_papers(state: DriverCommand, command: DriverCommand) -> None:
+    """1e-3 for both pedals and 1e-4 for the steering, in either direction."""
+    assert KeyboardFilter().command(state) == command

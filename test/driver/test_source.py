@@ -20,12 +20,12 @@ from crgame_ros.driver.source import (
 from crgame_ros.errors import InputError
 
 DT_S = 0.01
-KEYS = '''
+KEYS = """
 keys:
   - {from: 0.5, to: 2.5, hold: [throttle]}
   - {from: 1.0, to: 1.2, hold: [left]}
   - {from: 2.0, to: 3.0, hold: [brake]}
-'''
+"""
 JOY = 'joy: {points: [[0, 0, 0, 0], [10, 1, 0, 1]], reverse: [{from: 4, to: 5}]}'
 G29_REST = [0.0, -1.0, -1.0, -1.0]
 
@@ -33,7 +33,8 @@ G29_REST = [0.0, -1.0, -1.0, -1.0]
 @pytest.mark.parametrize(('text', 'spec'), [
     ('auto', SourceSpec('auto')), ('idle', SourceSpec('idle')), ('evdev', SourceSpec('evdev')),
     ('evdev:Logitech G29', SourceSpec('evdev', 'Logitech G29')), ('joy', SourceSpec('joy')),
-    ('keys:a/b.yaml', SourceSpec('keys', 'a/b.yaml')), ('joy:c:d.yaml', SourceSpec('joy', 'c:d.yaml')),
+    ('keys:a/b.yaml', SourceSpec('keys', 'a/b.yaml')),
+    ('joy:c:d.yaml', SourceSpec('joy', 'c:d.yaml')),
     (' replay: runs/x/bag ', SourceSpec('replay', 'runs/x/bag'))])
 def test_sources_are_read(text: str, spec: SourceSpec) -> None:
     """Every form, and back to the same text."""

@@ -19,14 +19,14 @@ from crgame_ros.driver.timeline import (
 from crgame_ros.driver.wheel import normalize
 from crgame_ros.errors import InputError
 
-KEYS = '''
+KEYS = """
 keys:
   - {from: 0.0, to: 3.0, hold: [throttle]}
   - {from: 2.0, to: 2.4, hold: left}
   - {from: 2.2, to: 2.6, hold: [left, right]}
   - {from: 6, to: 8, hold: [throttle, reverse]}
-'''
-JOY = '''
+"""
+JOY = """
 joy:
   axes: [throttle, brake, steering]
   points:
@@ -35,7 +35,7 @@ joy:
     - [3.5, 0.0, 1.0, 0.0]
   reverse:
     - {from: 2.0, to: 2.5}
-'''
+"""
 
 
 def keys() -> KeyTimeline:
@@ -196,3 +196,11 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     path = tmp_path / 'drive.yaml'
     path.write_text(KEYS, encoding='utf-8')
     assert read_timeline(path) == keys()
+
+
+def test_the_documented_examples_are_read() -> None:
+    """The page docs/driving.md shows one timeline of keys and one of axes."""
+    text = (Path(__file__).parents[2] / 'docs' / 'driving.md').read_text(encoding='utf-8')
+    blocks = [block.split('```')[0] for block in text.split('```yaml')[1:]]
+    read = [parse_timeline(b, 'driving.md') for b in blocks if b.startswith(('\nkeys:', '\njoy:'))]
+    assert [timeline.end_s for timeline in read] == [8.0, 8.0]

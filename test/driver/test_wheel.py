@@ -38,7 +38,7 @@ def test_ends_are_exact() -> None:
 
 @pytest.mark.parametrize('value', range(0, 256, 5))
 def test_pedals_are_linear(value: int) -> None:
-    """p = l / l_max with l = 255 - raw, for the pedals rest at 255."""
+    """CRG 17, p = l / l_max, with l = 255 - raw, for the pedals rest at 255."""
     command = normalize(raw(throttle=value, brake=255 - value), WHEEL)
     assert command.throttle == pytest.approx((255 - value) / 255)
     assert command.brake == pytest.approx(value / 255)

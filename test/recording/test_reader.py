@@ -208,6 +208,22 @@ def test_damage_inside_is_named(tmp_path: Path, samples: Any) -> None:
             list(reader.messages())
 
 
+def test_checksum_is_compared(tmp_path: Path, samples: Any) -> None:
+    """Without compression a changed letter would read well; only the checksum tells."""
+    file = tmp_path / 'plain.mcap'
+    with file.open('wb') as stream:
+        writer = Writer(stream, compression=CompressionType.NONE)
+        writer.start('ros2')
+        schema = writer.register_schema(STRING, 'ros2msg', b'string data\n')
+        channel = writer.register_channel('/a', 'cdr', schema)
+        writer.add_message(channel, 1, samples.string('faithful'), 1)
+        writer.finish()
+    file.write_bytes(file.read_bytes().replace(b'faithful', b'faithfuI'))
+    with BagReader(file) as reader:
+        with pytest.raises(InputError, match='checksum'):
+            list(reader.messages())
+
+
 @pytest.mark.parametrize('change', ['', 'cut', 'longer', 'padded', 'encoding'])
 @pytest.mark.parametrize('type_name', [STRING, TRAJECTORY])
 def test_message_that_does_not_fit_its_type(tmp_path: Path, samples: Any, type_name: str,

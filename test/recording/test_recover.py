@@ -125,7 +125,11 @@ def test_recovering_twice_changes_nothing_more(tmp_path: Path, samples: Any) -> 
     record(tmp_path / 'run', samples)
     file = tmp_path / 'run' / 'run_0.mcap'
     file.write_bytes(file.read_bytes()[:-1000])
-    assert recover(tmp_path / 'run').changed
+    cut = file.read_bytes()
+    with file.open('rb') as held:
+        assert recover(tmp_path / 'run').changed
+        # The old file was replaced in one step, not written over: its bytes are still those.
+        assert held.read() == cut
     before = contents(tmp_path / 'run')
     assert sorted(before) == ['metadata.yaml', 'run_0.mcap']
     report = recover(tmp_path / 'run')
@@ -188,6 +192,30 @@ def test_damaged_chunk_costs_only_itself(tmp_path: Path, samples: Any) -> None:
             if not chunk.message_start_time <= message[2] <= chunk.message_end_time]
 
 
+def test_damaged_definitions_cost_only_what_they_define(tmp_path: Path, samples: Any) -> None:
+    """Outside of chunks there is no checksum: a channel and the header are unreadable text."""
+    file = tmp_path / 'foreign.mcap'
+    with file.open('wb') as stream:
+        writer = Writer(stream, use_chunking=False, repeat_channels=False)
+        writer.start('profile')
+        schema = writer.register_schema(STRING, 'ros2msg', b'string data\n')
+        channels = [writer.register_channel(topic, 'cdr', schema) for topic in ('/good', '/lost')]
+        for i in range(10):
+            writer.add_message(channels[i % 2], i, samples.string(str(i)), i)
+        writer.finish()
+    content = file.read_bytes()
+    file.write_bytes(content.replace(b'/lost', b'/\xff\xff\xff\xff')
+                     .replace(b'profile', b'\xff' * 7))
+    with BagReader(file) as reader:
+        assert not reader.complete
+    report = recover(file)
+    assert report.messages == 5
+    assert report.bytes_dropped > 5 * len(samples.string('1'))
+    with BagReader(file) as reader:
+        assert reader.complete
+        assert [m.message.data for m in reader.decoded()] == ['0', '2', '4', '6', '8']
+
+
 def test_split_recording_is_finished_whole(tmp_path: Path, samples: Any) -> None:
     """The last of two files was cut, and there is no metadata."""
     record(tmp_path / 'run', samples)
@@ -248,13 +276,14 @@ except CrgameError as error:
 """
 
 
-@pytest.mark.parametrize('limit', [100, 30_000, 60_000])
-def test_full_disk_leaves_the_recording_as_it_was(tmp_path: Path, samples: Any,
-                                                  limit: int) -> None:
-    """The operating system refuses to write past a limit; the file is about 75 kB."""
+@pytest.mark.parametrize(('limit', 'cut'), [(100, 0), (100, 1000), (30_000, 1000), (60_000, 1000)])
+def test_full_disk_leaves_the_recording_as_it_was(tmp_path: Path, samples: Any, limit: int,
+                                                  cut: int) -> None:
+    """The system refuses to write past a limit: the file (75 kB), or else only the metadata."""
     record(tmp_path / 'run', samples)
     file = tmp_path / 'run' / 'run_0.mcap'
-    file.write_bytes(file.read_bytes()[:-1000])
+    content = file.read_bytes()
+    file.write_bytes(content[:len(content) - cut])
     (tmp_path / 'run' / 'metadata.yaml').unlink()
     before = contents(tmp_path / 'run')
     result = subprocess.run([sys.executable, '-c', FULL, str(tmp_path / 'run'), str(limit)],

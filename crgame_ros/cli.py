@@ -1,0 +1,163 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The `crgame` command: run, offline, convert, recover, info, doctor."""
+
+import argparse
+from collections.abc import Callable, Sequence
+import json
+from pathlib import Path
+import sys
+import time
+
+from crgame_ros.errors import CrgameError, InputError
+
+DESCRIPTION = """\
+Tools around crgame_ros, the driving simulator for motion planning.
+
+  crgame run       run a game live, as ./run.sh does
+  crgame offline   run a game as fast as it can, without ROS
+  crgame convert   turn a recording into a CommonRoad scenario
+  crgame recover   finish a recording whose recorder was killed
+  crgame info      what is in a recording
+  crgame doctor    what is missing on this machine, and the remedy
+
+`crgame COMMAND --help` tells more."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> None:  # type: ignore[override]
+        raise InputError(message, self.prog, 'see --help')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """
+    Run one command.
+
+    :return: exit code: 0 success, 2 bad input, 1 any other failure.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        if words[:1] == ['run']:
+            from crgame_ros.launcher.main import main as run
+            return run(words[1:])
+        values = _build_parser().parse_args(words)
+        command: Callable[[argparse.Namespace], int] = values.command
+        return command(values)
+    except CrgameError as error:
+        print(f'error: {error}', file=sys.stderr, flush=True)
+        return error.exit_code
+    except KeyboardInterrupt:
+        return 130
+
+
+def _build_parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog='crgame', description=DESCRIPTION,
+                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
+                                     parser_class=_Parser)
+    commands.add_parser('run', help='run a game live (options: crgame run --help)')
+    _add_offline(commands.add_parser('offline', help='run a game as fast as it can'))
+    convert = commands.add_parser('convert', help='recording to CommonRoad scenario')
+    convert.add_argument('bag', type=Path, help='folder or file of the recording')
+    convert.add_argument('--out', type=Path, help='folder for the scenario (default: beside)')
+    convert.set_defaults(command=_convert)
+    recover = commands.add_parser('recover', help='finish a killed recording')
+    recover.add_argument('bag', type=Path, help='folder or .mcap file')
+    recover.set_defaults(command=_recover)
+    info = commands.add_parser('info', help='what is in a recording')
+    info.add_argument('bag', type=Path, help='folder or file of the recording')
+    info.set_defaults(command=_info)
+    doctor = commands.add_parser('doctor', help='what is missing on this machine')
+    doctor.set_defaults(command=_doctor)
+    return parser
+
+
+def _add_offline(parser: argparse.ArgumentParser) -> None:
+    parser.description = ('Run a game on a virtual clock, planners in lockstep. The same inputs '
+                          'give the same state hash on every run.')
+    add = parser.add_argument
+    add('game', nargs='?', type=Path, help='game file (default: the cut-in game)')
+    add('--scenario', type=Path, help='CommonRoad file instead of a game')
+    add('--planner', help='planner of all AVs')
+    add('--driver', help='driver of the first human: keys:FILE, joy:FILE, replay:BAG, idle')
+    add('--duration', type=float, metavar='S', help='simulated seconds')
+    add('--latency', type=int, default=0, metavar='L',
+        help='simulation steps between a request and its plan (default: 0)')
+    add('--out', type=Path, metavar='DIR', help='write the run as a CommonRoad scenario there')
+    parser.set_defaults(command=_offline)
+
+
+def _offline(values: argparse.Namespace) -> int:
+    from crgame_ros.launcher.arguments import RunRequest
+    from crgame_ros.launcher.run_plan import effective_game, with_planners
+    from crgame_ros.recording.run_log import run_log_of
+    from crgame_ros.scenario.export import write_scenario
+    from crgame_ros.simulation.offline import run_offline
+    from crgame_ros.simulation.replay import recorded_inputs
+    from crgame_ros.simulation.setup import build_setup
+    if values.latency < 0:
+        raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
+    request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
+                         duration_s=values.duration,
+                         planners=(values.planner,) if values.planner else ())
+    setup = with_planners(build_setup(effective_game(request)), request.planners)
+    drivers, intervals_s = recorded_inputs(setup)
+    start_s = time.perf_counter()
+    result = run_offline(setup, latency_steps=values.latency, drivers=drivers,
+                         intervals_s=intervals_s, clock_s=time.perf_counter)
+    wall_s = time.perf_counter() - start_s
+    simulated_s = (len(result.vehicle_states) - 1) * setup.scheduler.dt_s
+    report = {
+        'scenario': setup.loaded.benchmark_id, 'simulated_s': round(simulated_s, 6),
+        'wall_s': round(wall_s, 3), 'state_hash': result.state_hash,
+        'planners': {
+            av_id: {'accepted_ratio': round(record.accepted_ratio, 4),
+                    'requests': record.counters.requests, 'accepted': record.counters.accepted,
+                    'refused': record.counters.refused,
+                    'fallbacks': record.statistics.fallbacks,
+                    'reasons': dict(record.statistics.reasons)}
+            for av_id, record in result.planners.items()},
+        'violations': [{'vehicle': item.vehicle_id, 'n': item.n, 'hit': list(item.hit),
+                        'off_road': item.off_road}
+                       for item in result.violations if not item.is_valid]}
+    print(json.dumps(report, indent=2))
+    if values.out is not None:
+        values.out.mkdir(parents=True, exist_ok=True)
+        for notice in write_scenario(run_log_of(result), values.out).notices:
+            print(f'note: {notice}', file=sys.stderr)
+    return 0
+
+
+def _convert(values: argparse.Namespace) -> int:
+    from crgame_ros.recording.conversion import convert
+    report = convert(values.bag, values.out)
+    for notice in report.notices:
+        print(f'note: {notice}')
+    print(report.path)
+    return 0
+
+
+def _recover(values: argparse.Namespace) -> int:
+    from crgame_ros.recording.recover import recover
+    report = recover(values.bag)
+    if report.changed:
+        print(f'{report.path}: {report.messages} messages over {report.duration_s:.1f} s kept, '
+              f'{report.bytes_dropped} bytes of an unfinished end dropped')
+    else:
+        print(f'{report.path}: complete, left as it is ({report.messages} messages)')
+    return 0
+
+
+def _info(values: argparse.Namespace) -> int:
+    from crgame_ros.recording.info import describe, format_info
+    print(format_info(describe(values.bag)))
+    return 0
+
+
+def _doctor(_: argparse.Namespace) -> int:
+    from crgame_ros.doctor import main as doctor
+    return doctor()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

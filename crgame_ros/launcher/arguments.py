@@ -1,0 +1,120 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line of `run.sh`."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+
+DESCRIPTION = """\
+Drive in a CommonRoad scenario against autonomous vehicles, and record it.
+
+Without arguments: the cut-in game, driven by its script. A game file (YAML) says who takes part;
+--scenario alone works on any CommonRoad file: you are placed near the first AV, each planning
+problem becomes an AV, recorded obstacles play back."""
+EPILOG = """\
+examples:
+  ./run.sh                                        the cut-in game
+  ./run.sh scenarios/merge.yaml --driver evdev    drive the merge yourself
+  ./run.sh --scenario FILE.xml --planner reactive --duration 30
+  ./run.sh --driver replay:runs/NAME/bag          the same human against another planner
+
+driver sources: auto (wheel, gamepad or keyboard, whichever is found), evdev[:NAME], keys:FILE,
+joy:FILE (scripted), joy (an external joy node), replay:BAG, idle.
+planners: idm, idm-package, reactive, constant-velocity, a registered name, module:Class or
+file.py:Class."""
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """
+    What the user asked for on the command line.
+
+    :param game: game file, if any.
+    :param scenario: CommonRoad file instead of the game's.
+    :param driver: driver source of the first human.
+    :param planners: planners of the AVs in their order; a single one serves all.
+    :param duration_s: simulated time [s]
+    :param rate_hz: simulation rate [Hz]
+    :param headless: without the cockpit.
+    :param realtime_priority: SCHED_FIFO for the simulation.
+    :param out: folder of the run, instead of runs/<time>_<scenario>.
+    """
+
+    game: Path | None = None
+    scenario: Path | None = None
+    driver: str | None = None
+    planners: tuple[str, ...] = ()
+    duration_s: float | None = None
+    rate_hz: float | None = None
+    real_time_factor: float = 1.0
+    headless: bool = False
+    realtime_priority: bool = False
+    out: Path | None = None
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> None:  # type: ignore[override]
+        raise InputError(message, 'command line', 'see --help')
+
+
+def build_parser(program: str) -> argparse.ArgumentParser:
+    """Build the parser; its help teaches."""
+    parser = _Parser(prog=program, description=DESCRIPTION, epilog=EPILOG,
+                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    add = parser.add_argument
+    add('game', nargs='?', type=Path, metavar='GAME.yaml', help='game file (scenarios/*.yaml)')
+    add('--scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
+    add('--driver', metavar='SOURCE', help='who drives the first human\'s vehicle')
+    add('--planner', action='append', default=[], metavar='NAME', dest='planners',
+        help='planner of the AVs; give it again for the next AV')
+    add('--duration', type=_positive, metavar='S', dest='duration_s',
+        help='end after so many simulated seconds (default: the game\'s, else Ctrl-C)')
+    add('--rate', type=_positive, metavar='R', dest='rate_hz',
+        help='simulation rate in Hz (default: the game\'s, else 100)')
+    add('--real-time-factor', type=_factor, default=1.0, metavar='F',
+        help='simulated seconds per second, 0.1 to 10 (default: 1)')
+    add('--headless', action='store_true', help='no display')
+    add('--realtime-priority', action='store_true',
+        help='run the simulation under SCHED_FIFO, if the system allows it')
+    add('--out', type=Path, metavar='DIR',
+        help='folder for this run\'s files (default: runs/<time>_<scenario>)')
+    return parser
+
+
+def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunRequest:
+    """
+    Read the command line.
+
+    :raises InputError: naming the argument.
+    """
+    values = vars(build_parser(program).parse_args(list(arguments)))
+    values['planners'] = tuple(values['planners'])
+    return RunRequest(**values)
+
+
+def _positive(text: str) -> float:
+    value = _number(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} is not above 0')
+    return value
+
+
+def _factor(text: str) -> float:
+    value = _number(text)
+    if not MIN_REAL_TIME_FACTOR <= value <= MAX_REAL_TIME_FACTOR:
+        raise argparse.ArgumentTypeError(
+            f'{text} is not within {MIN_REAL_TIME_FACTOR} to {MAX_REAL_TIME_FACTOR}')
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f'{text} is no number') from error

@@ -1,0 +1,165 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole graph: nodes started, watched, restarted where that is safe, and ended in order."""
+
+from collections.abc import Callable, Sequence
+import selectors
+import signal
+import time
+from types import FrameType
+
+from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
+from crgame_ros.launcher.run_plan import RunPlan
+
+# The time that a node gets to end in good order [s].
+GRACE_S = 5.0
+# The recorder takes in what the others said last [s].
+DRAIN_S = 0.3
+MAX_RESTARTS = 5
+COMPANION_NICE = 5
+
+
+def node_specs(plan: RunPlan) -> list[NodeSpec]:
+    """List the nodes of a run; sim_node comes last, for it waits for the others."""
+    setup, request = plan.setup, plan.request
+    drivers = [NodeSpec('driver_node', f'driver_node_{human.id}', {'vehicle': human.id},
+                        restart=True) for human in setup.humans]
+    planners = [NodeSpec('planner_node', f'planner_node_{av.id}', {'vehicle': av.id},
+                         nice=COMPANION_NICE, restart=True) for av in setup.avs]
+    companions = [
+        *planners, *drivers,
+        NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
+                 nice=COMPANION_NICE, restart=True),
+        NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
+        NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True)]
+    waiting = ', '.join(f'"{name}"' for name in sorted({spec.executable for spec in companions}))
+    simulation = NodeSpec('sim_node', 'sim_node', {
+        'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
+        'realtime_priority': str(request.realtime_priority).lower(),
+        'wait_for': f'[{waiting}]'})
+    return [simulation, *companions]
+
+
+class Graph:
+    """
+    Runs the nodes until the simulation ends or a signal comes.
+
+    :param specs: the nodes; the first is the one whose end ends the run.
+    :param say: prints one line.
+    """
+
+    def __init__(self, specs: Sequence[NodeSpec], say: Callable[[str], None]) -> None:
+        self._say = say
+        self._selector = selectors.DefaultSelector()
+        self._signal: int | None = None
+        self._restarts: dict[str, int] = {}
+        self._specs = list(specs)
+        self._nodes: dict[str, NodeProcess] = {}
+        self._width = max(len(spec.name) for spec in specs)
+
+    def run(self) -> int:
+        """
+        Run to the end.
+
+        :return: the simulation's exit code; 0 after Ctrl-C in good order.
+        """
+        before = {number: signal.signal(number, self._on_signal)
+                  for number in (signal.SIGINT, signal.SIGTERM)}
+        first = self._specs[0].name
+        try:
+            for spec in self._specs:
+                self._start(spec)
+            while self._signal is None and self._nodes[first].exit_code() is None:
+                self._relay(0.1)
+                self._look_after(first)
+            return self._end(first)
+        finally:
+            for node in self._nodes.values():
+                node.kill()
+                node.close()
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def pids(self) -> dict[str, int]:
+        """Give the process ids by node name."""
+        return {name: node.pid for name, node in self._nodes.items()}
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self._signal = number
+
+    def _start(self, spec: NodeSpec) -> None:
+        node = NodeProcess(spec)
+        self._nodes[spec.name] = node
+        self._selector.register(node.output, selectors.EVENT_READ, node)
+
+    def _relay(self, timeout_s: float) -> None:
+        """Pass the nodes' output on, each line with the node's name."""
+        for key, _ in self._selector.select(timeout_s):
+            node: NodeProcess = key.data
+            for line in node.read_lines():
+                self._say(f'[{node.spec.name:{self._width}}] {line}')
+            if node.exit_code() is not None:
+                self._selector.unregister(node.output)
+
+    def _look_after(self, first: str) -> None:
+        """Name a node that died, and start it again where that is safe."""
+        for name, node in list(self._nodes.items()):
+            code = node.exit_code()
+            if name == first or code is None or self._restarts.get(name, 0) < 0:
+                continue
+            cause = f'signal {signal.Signals(-code).name}' if code < 0 else f'exit code {code}'
+            count = self._restarts.get(name, 0) + 1
+            # Bad input stays bad: exit code 2 is not tried again.
+            if not node.spec.restart or code == 2 or count > MAX_RESTARTS:
+                self._say(f'{name} died ({cause}); the others go on')
+                self._restarts[name] = -1
+                continue
+            self._say(f'{name} died ({cause}); starting it again')
+            self._restarts[name] = count
+            self._forget(node)
+            self._start(restarted(node.spec, count))
+
+    def _forget(self, node: NodeProcess) -> None:
+        if node.output in {key.fileobj for key in self._selector.get_map().values()}:
+            self._selector.unregister(node.output)
+        for line in node.read_lines():
+            self._say(f'[{node.spec.name:{self._width}}] {line}')
+        node.close()
+
+    def _end(self, first: str) -> int:
+        """End the simulation, let the recorder take the last messages in, end the others."""
+        simulation = self._nodes[first]
+        simulation.interrupt()
+        self._wait_for([simulation])
+        until_s = time.monotonic() + DRAIN_S
+        while time.monotonic() < until_s:
+            self._relay(0.05)
+        recorders = [node for node in self._nodes.values()
+                     if node.spec.executable == 'recorder_node']
+        others = [node for node in self._nodes.values()
+                  if node is not simulation and node not in recorders]
+        for group in (others, recorders):
+            for node in group:
+                node.interrupt()
+            self._wait_for(group)
+        code = simulation.exit_code()
+        return 0 if code == 0 else (code if code is not None and code > 0 else 1)
+
+    def _wait_for(self, nodes: Sequence[NodeProcess]) -> None:
+        until_s = time.monotonic() + GRACE_S
+        while any(node.exit_code() is None for node in nodes) and time.monotonic() < until_s:
+            self._relay(0.02)
+        for node in nodes:
+            if node.exit_code() is None:
+                self._say(f'{node.spec.name} does not end: killed')
+                node.kill()
+        self._relay(0.0)
+
+
+def restarted(spec: NodeSpec, count: int) -> NodeSpec:
+    """Give the spec of a node that is started again: a recorder continues in a new folder."""
+    if spec.executable != 'recorder_node':
+        return spec
+    folder = spec.parameters['directory'].strip('"').partition('_part')[0]
+    parameters = spec.parameters | {'directory': f'"{folder}_part{count + 1}"'}
+    return NodeSpec(spec.executable, spec.name, parameters, spec.nice, spec.restart)

@@ -1,0 +1,125 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From a request to a checked plan of the run: game, vehicles and folder."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.planner.registry import create_planner
+from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
+from crgame_ros.scenario.game_file import dump_game, load_game
+from crgame_ros.simulation.setup import build_setup, Setup
+
+DEFAULT_GAME = 'cut_in.yaml'
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """
+    A run that can be started.
+
+    :param request: what the user asked for.
+    :param setup: the run, loaded and checked.
+    :param folder: where its files go; exists.
+    """
+
+    request: RunRequest
+    setup: Setup
+    folder: Path
+
+    @property
+    def game_file(self) -> Path:
+        """The game as it is run, in the run's folder."""
+        return self.folder / 'game.yaml'
+
+    @property
+    def bag(self) -> Path:
+        """The recording."""
+        return self.folder / 'bag'
+
+
+def effective_game(request: RunRequest) -> Game:
+    """
+    Combine the game file with what the command line says.
+
+    :raises InputError: if a file or name cannot be used.
+    """
+    if request.game is not None:
+        game = load_game(request.game)
+    elif request.scenario is not None:
+        game = Game(request.scenario, humans=(HumanSpec('hv0'),))
+    else:
+        game = load_game(scenarios_directory() / DEFAULT_GAME)
+    if request.game is not None and request.scenario is not None:
+        game = replace(game, scenario=request.scenario)
+    if request.driver is not None and game.humans:
+        first = replace(game.humans[0], driver=_from_here(request.driver))
+        game = replace(game, humans=(first, *game.humans[1:]))
+    if request.duration_s is not None:
+        game = replace(game, duration=request.duration_s)
+    if request.rate_hz is not None:
+        game = replace(game, timing=replace(game.timing, rate=request.rate_hz))
+    return game
+
+
+def _from_here(driver: str) -> str:
+    """Resolve a file named on the command line against the present directory."""
+    kind, colon, argument = driver.partition(':')
+    if not colon or kind == 'evdev':
+        return driver
+    return f'{kind}:{Path(argument).expanduser().resolve()}'
+
+
+def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) -> RunPlan:
+    """
+    Load and check everything before any process starts, and make the run's folder.
+
+    :param now: wall clock for the folder's name.
+    :raises InputError: if anything cannot be used.
+    """
+    setup = build_setup(effective_game(request))
+    setup = with_planners(setup, request.planners)
+    for av in setup.avs:
+        create_planner(av.spec.planner, av.spec.options)
+    folder = _make_folder(request.out, setup.loaded.benchmark_id, now())
+    plan = RunPlan(request, setup, folder)
+    plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
+    return plan
+
+
+def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
+    """Write the AVs into the game as they were found, with the planners asked for."""
+    if len(planners) > max(1, len(setup.avs)):
+        raise InputError(f'{len(planners)} planners for {len(setup.avs)} AVs', '--planner',
+                         'give one for all, or one for each')
+    avs = []
+    for index, av in enumerate(setup.avs):
+        spec: AvSpec = av.spec
+        if planners:
+            name = planners[0] if len(planners) == 1 else planners[min(index, len(planners) - 1)]
+            spec = replace(spec, planner=name,
+                           options=spec.options if name == spec.planner else {})
+        avs.append(replace(av, spec=spec))
+    game = replace(setup.game, avs=tuple(av.spec for av in avs))
+    return replace(setup, game=game, avs=tuple(avs))
+
+
+def _make_folder(out: Path | None, benchmark_id: str, now: datetime) -> Path:
+    folder = out if out is not None else Path('runs') / f'{now:%Y%m%d-%H%M%S}_{benchmark_id}'
+    number = 1
+    while out is None and folder.exists():
+        number += 1
+        folder = folder.with_name(f'{now:%Y%m%d-%H%M%S}_{benchmark_id}_{number}')
+    if (folder / 'bag').exists():
+        raise InputError('holds a recording already', str(folder), 'choose another folder')
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f'cannot be made ({error.strerror})', str(folder),
+                         'choose another folder with --out') from error
+    return folder.resolve()

@@ -1,0 +1,52 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The graph for `ros2 launch crgame_ros crgame.launch.py`.
+
+`game:=FILE` names a game file; `humans:=hv0` and `avs:=av0,av1` say which drivers and planners to
+start (those of the game), `bag:=FOLDER` where to record.
+"""
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+
+def nodes(context: LaunchContext) -> list:
+    """Make the nodes, once the arguments are known."""
+    def value(name: str) -> str:
+        return LaunchConfiguration(name).perform(context)
+
+    humans = [item for item in value('humans').split(',') if item]
+    avs = [item for item in value('avs').split(',') if item]
+    companions = [
+        *(Node(package='crgame_ros', executable='driver_node', name=f'driver_node_{human}',
+               parameters=[{'vehicle': human}]) for human in humans),
+        *(Node(package='crgame_ros', executable='planner_node', name=f'planner_node_{av}',
+               parameters=[{'vehicle': av}], respawn=True) for av in avs),
+        Node(package='crgame_ros', executable='drivability_node', respawn=True),
+        Node(package='crgame_ros', executable='timesync_node', respawn=True),
+        Node(package='crgame_ros', executable='recorder_node',
+             parameters=[{'directory': value('bag')}])]
+    waiting = ['recorder_node', 'drivability_node', 'timesync_node']
+    waiting += ['driver_node'] if humans else []
+    waiting += ['planner_node'] if avs else []
+    simulation = Node(
+        package='crgame_ros', executable='sim_node', output='screen',
+        parameters=[{'game': value('game'), 'wait_for': waiting}])
+    end = RegisterEventHandler(OnProcessExit(
+        target_action=simulation, on_exit=[EmitEvent(event=Shutdown(reason='the game ended'))]))
+    return [*companions, simulation, end]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Describe the graph."""
+    return LaunchDescription([
+        DeclareLaunchArgument('game', default_value='', description='game file'),
+        DeclareLaunchArgument('humans', default_value='hv0', description='humans of the game'),
+        DeclareLaunchArgument('avs', default_value='av0', description='AVs of the game'),
+        DeclareLaunchArgument('bag', default_value='bag', description='folder of the recording'),
+        OpaqueFunction(function=nodes)])

@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Run a game: ./run.sh [GAME.yaml] [options]; ./run.sh --help tells all.
+# The first call makes .venv; PYTHON=python3.12 ./run.sh chooses the interpreter.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+# shellcheck source=scripts/env.sh
+source "$root/scripts/env.sh"
+# Replaced by the launcher, so that whoever kills this process reaches the one that owns the nodes.
+exec "$CRGAME_PYTHON" -m crgame_ros.launcher.main "$@"

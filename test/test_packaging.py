@@ -1,0 +1,287 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is installed and where, the pins, and scripts/env.sh."""
+
+import ast
+from configparser import ConfigParser
+from importlib import import_module
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+from zipfile import ZipFile
+
+from lxml import etree
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+import pytest
+
+from crgame_ros import __version__
+
+ROOT = Path(__file__).resolve().parents[1]
+NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'timesync_node',
+         'recorder_node')
+DATA = ('launch', 'config', 'scenarios', 'msg_defs')
+# Modules of ROS packages whose name is no ROS package's.
+MESSAGE_PACKAGE = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy')
+
+
+def _copy(target: Path, *names: str) -> Path:
+    """Copy a part of the source tree."""
+    for name in names:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, target / name, dirs_exist_ok=True,
+                            ignore=shutil.ignore_patterns('__pycache__'))
+        else:
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, target / name)
+    return target
+
+
+def _pip(*arguments: str) -> None:
+    """Run pip without a package index."""
+    done = subprocess.run([sys.executable, '-m', 'pip', '--disable-pip-version-check',
+                           *arguments], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture(scope='module')
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build a wheel from a copy of the source tree."""
+    source = _copy(tmp_path_factory.mktemp('source'), 'crgame_ros', 'resource', 'config',
+                   'msg_defs', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
+                   'requirements.txt', 'LICENSE',
+                   *(name for name in ('launch', 'scenarios') if (ROOT / name).is_dir()))
+    target = tmp_path_factory.mktemp('wheel')
+    _pip('wheel', '--no-deps', '--no-build-isolation', '--wheel-dir', str(target), str(source))
+    return next(target.glob('*.whl'))
+
+
+@pytest.fixture(scope='module')
+def prefix(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the wheel into a prefix of its own."""
+    target = tmp_path_factory.mktemp('prefix')
+    _pip('install', '--no-deps', '--ignore-installed', '--no-warn-script-location', '--prefix',
+         str(target), str(wheel))
+    return target
+
+
+def _pins() -> dict[str, str]:
+    """Read requirements.txt."""
+    lines = (ROOT / 'requirements.txt').read_text(encoding='utf-8').splitlines()
+    return {canonicalize_name(line.split('==')[0]): line.split('==')[1]
+            for line in lines if line and not line.startswith('#')}
+
+
+def test_data_files_are_installed_where_ros_looks(prefix: Path) -> None:
+    """The marker, the manifest and every data file are under share/, equal to the source's."""
+    share = prefix / 'share' / 'crgame_ros'
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages' / 'crgame_ros'
+    assert index.is_file()
+    assert (share / 'package.xml').read_bytes() == (ROOT / 'package.xml').read_bytes()
+    expected = {file.relative_to(ROOT) for name in DATA for file in (ROOT / name).rglob('*')
+                if file.is_file() and '__pycache__' not in file.parts}
+    installed = {file.relative_to(share) for file in share.rglob('*') if file.is_file()}
+    assert installed == expected | {Path('package.xml'), Path('requirements.txt')}
+    assert all((share / file).read_bytes() == (ROOT / file).read_bytes() for file in expected)
+
+
+def test_installed_package_finds_its_data(prefix: Path) -> None:
+    """The installed package, run elsewhere, takes the installed share directory."""
+    site = next(prefix.glob('lib/python3*/site-packages'))
+    assert (site / 'crgame_ros' / 'py.typed').is_file()
+    done = subprocess.run(
+        [sys.executable, '-c', 'import crgame_ros.paths as p; print(p.share_directory())'],
+        cwd=prefix, env=dict(os.environ, PYTHONPATH=str(site)), capture_output=True, text=True)
+    assert Path(done.stdout.strip()) == prefix / 'share' / 'crgame_ros'
+
+
+def test_ros2_run_finds_executables(prefix: Path) -> None:
+    """What `ros2 run` starts from lib/crgame_ros hands everything to the script in bin."""
+    for name in (*NODES, 'crgame'):
+        assert os.access(prefix / 'bin' / name, os.X_OK)
+        assert os.access(prefix / 'lib' / 'crgame_ros' / name, os.X_OK)
+    script = prefix / 'bin' / 'sim_node'
+    kept = script.read_text()
+    script.write_text('#!/bin/sh\nprintf "%s|" "$@"\nexit 3\n')
+    try:
+        done = subprocess.run([prefix / 'lib' / 'crgame_ros' / 'sim_node', 'a b', '--ros-args'],
+                              capture_output=True, text=True)
+    finally:
+        script.write_text(kept)
+    assert (done.returncode, done.stdout) == (3, 'a b|--ros-args|')
+
+
+def test_every_entry_point_resolves(wheel: Path) -> None:
+    """Each console script and each built-in planner names something that exists."""
+    with ZipFile(wheel) as archive:
+        name = next(name for name in archive.namelist() if name.endswith('entry_points.txt'))
+        parser = ConfigParser(delimiters=('=',))
+        parser.read_string(archive.read(name).decode())
+    assert set(parser['console_scripts']) == {*NODES, 'crgame'}
+    assert set(parser['crgame_ros.planners']) == {'idm', 'idm-package', 'reactive',
+                                                  'constant-velocity'}
+    missing = []
+    for section in parser.sections():
+        for entry, target in parser[section].items():
+            module, _, attribute = target.partition(':')
+            try:
+                getattr(import_module(module), attribute)
+            except (ImportError, AttributeError) as error:
+                missing.append(f'{entry} = {target}: {error}')
+    assert not missing, '\n'.join(missing)
+
+
+def test_requirements_are_pinned_and_serve_the_installation(wheel: Path) -> None:
+    """One pin a line, sorted in groups, no addresses; they satisfy what setup.py asks for."""
+    text = (ROOT / 'requirements.txt').read_text(encoding='utf-8')
+    assert '://' not in text
+    for group in text.split('\n\n')[1:]:
+        title, *lines = group.strip().splitlines()
+        assert title.startswith('# ')
+        assert all(re.fullmatch(r'[\w.-]+==[\w.]+', line) for line in lines)
+        assert lines == sorted(lines, key=lambda line: line.split('==')[0].lower())
+    pins = _pins()
+    with ZipFile(wheel) as archive:
+        name = next(name for name in archive.namelist() if name.endswith('METADATA'))
+        metadata = archive.read(name).decode()
+    asked = [Requirement(line) for line in re.findall('^Requires-Dist: (.+)$', metadata, re.M)]
+    assert len(asked) > 20
+    wrong = [str(requirement) for requirement in asked
+             if not requirement.specifier.contains(pins[canonicalize_name(requirement.name)])]
+    assert not wrong
+
+
+def test_manifest_names_what_the_package_imports() -> None:
+    """package.xml has the version, the build type, and every ROS package that is imported."""
+    manifest = etree.parse(ROOT / 'package.xml').getroot()
+    assert manifest.get('format') == '3'
+    assert manifest.findtext('name') == 'crgame_ros'
+    assert manifest.findtext('version') == __version__
+    assert manifest.findtext('license') == 'Apache-2.0'
+    assert manifest.findtext('export/build_type') == 'ament_python'
+    imported = set()
+    for file in (ROOT / 'crgame_ros').rglob('*.py'):
+        for node in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else (
+                [node.module or ''] if isinstance(node, ast.ImportFrom) else [])
+            imported |= {name.partition('.')[0] for name in names}
+    ros = {name for name in imported if MESSAGE_PACKAGE.fullmatch(name)}
+    declared = {element.text for element in manifest.iter('exec_depend')}
+    assert ros <= declared, ros - declared
+
+
+def _source(tree: Path, then: str = '', **variables: str) -> subprocess.CompletedProcess[str]:
+    """Source scripts/env.sh of a tree in a clean, strict bash and run a command after it."""
+    environment = {'PATH': os.environ['PATH'], 'HOME': os.environ.get('HOME', '/'), **variables}
+    return subprocess.run(
+        ['bash', '-c', f'set -euo pipefail; source "{tree}/scripts/env.sh"; {then}'],
+        env=environment, capture_output=True, text=True)
+
+
+def _stamped(tree: Path) -> Path:
+    """Make a tree with an .venv that is complete as far as scripts/env.sh can tell."""
+    _copy(tree, 'scripts/env.sh', 'requirements.txt', 'config/fastdds_loopback.xml')
+    libraries = tree / '.venv' / 'lib' / 'python3.11' / 'site-packages' / 'ros_rcl.libs'
+    libraries.mkdir(parents=True)
+    (tree / '.venv' / 'bin').mkdir()
+    (tree / '.venv' / 'bin' / 'python').symlink_to(sys.executable)
+    digest = subprocess.run(['sha256sum'], stdin=(tree / 'requirements.txt').open(),
+                            capture_output=True, text=True, check=True).stdout.strip()
+    (tree / '.venv' / 'stamp').write_text(
+        f'{digest}\n{tree.resolve()}\n{sys.executable}\n3.11\nwheels\ndefault\nnone\n')
+    return tree.resolve()
+
+
+def test_env_sets_the_environment_once(tmp_path: Path) -> None:
+    """A second call changes nothing; what the user had on the paths stays behind ours."""
+    tree = _stamped(tmp_path / 'a tree')
+    show = 'env | grep -vE "^(_|SHLVL|PWD|OLDPWD)=" | sort'
+    once = _source(tree, show, AMENT_PREFIX_PATH='/overlay')
+    twice = _source(tree, f'source "{tree}/scripts/env.sh"; {show}', AMENT_PREFIX_PATH='/overlay')
+    assert once.returncode == 0, once.stderr
+    assert once.stdout == twice.stdout
+    values = dict(line.split('=', 1) for line in once.stdout.splitlines())
+    profile = str(tree / 'config' / 'fastdds_loopback.xml')
+    assert values['AMENT_PREFIX_PATH'] == f'{tree}/.venv:/overlay'
+    assert set(values['LD_LIBRARY_PATH'].split(':')) == {
+        f'{tree}/.venv/lib', f'{tree}/.venv/lib/python3.11/site-packages/ros_rcl.libs'}
+    assert values['FASTRTPS_DEFAULT_PROFILES_FILE'] == profile
+    assert values['FASTDDS_DEFAULT_PROFILES_FILE'] == profile
+    assert values['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    assert values['RMW_IMPLEMENTATION'] == 'rmw_fastrtps_cpp'
+    assert values['PYTHONPATH'] == str(tree)
+    assert values['MPLBACKEND'] == 'Agg'
+    assert values['OMP_NUM_THREADS'] == values['OPENBLAS_NUM_THREADS'] == '1'
+    assert values['CRGAME_PYTHON'] == f'{tree}/.venv/bin/python'
+
+
+def test_env_opens_the_network_on_request(tmp_path: Path) -> None:
+    """CRGAME_OPEN_NETWORK=1 also takes back what an earlier call has set."""
+    tree = _stamped(tmp_path)
+    done = _source(tree, f'export CRGAME_OPEN_NETWORK=1; source "{tree}/scripts/env.sh"; env')
+    assert done.returncode == 0, done.stderr
+    assert 'PROFILES_FILE' not in done.stdout
+    assert 'DISCOVERY_RANGE' not in done.stdout
+
+
+def test_env_keeps_another_ros_apart(tmp_path: Path) -> None:
+    """With wheels, the paths of another ROS are dropped and the user's own entries kept."""
+    tree = _stamped(tmp_path / 'tree')
+    other = tmp_path / 'other'
+    for name in ('site/rclpy', 'share/rclpy', 'lib'):
+        (other / name).mkdir(parents=True)
+    (other / 'lib' / 'librcl.so').touch()
+    done = _source(tree, 'echo "$PYTHONPATH $AMENT_PREFIX_PATH $LD_LIBRARY_PATH"',
+                   PYTHONPATH=f'{other}/site:/mine', AMENT_PREFIX_PATH=str(other),
+                   LD_LIBRARY_PATH=f'{other}/lib:/lib/mine')
+    assert done.returncode == 0, done.stderr
+    assert str(other) not in done.stdout
+    assert ':/mine ' in done.stdout
+    assert ':/lib/mine' in done.stdout
+
+
+def test_env_refuses_other_pythons(tmp_path: Path) -> None:
+    """Python 3.10 is refused in one line with exit code 2, and nothing is made."""
+    tree = _copy(tmp_path / 'tree', 'scripts/env.sh', 'requirements.txt')
+    old = tmp_path / 'python3.10'
+    old.write_text('#!/bin/sh\necho "$0 3.10"\n')
+    old.chmod(0o755)
+    done = _source(tree, PYTHON=str(old))
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1
+    assert 'needs Python 3.11 or 3.12' in done.stderr
+    assert f'({old} is 3.10)' in done.stderr
+    assert not (tree / '.venv').exists()
+
+
+def test_env_leaves_a_foreign_venv_alone(tmp_path: Path) -> None:
+    """An .venv that somebody else made is not emptied."""
+    tree = _copy(tmp_path, 'scripts/env.sh', 'requirements.txt')
+    (tree / '.venv').mkdir()
+    (tree / '.venv' / 'precious').touch()
+    done = _source(tree, PYTHON=sys.executable)
+    assert done.returncode == 1
+    assert 'move it away' in done.stderr
+    assert (tree / '.venv' / 'precious').exists()
+
+
+def test_env_says_that_the_index_is_out_of_reach(tmp_path: Path) -> None:
+    """Without a package index it ends with one clear line, and the next call starts anew."""
+    tree = _copy(tmp_path, 'scripts/env.sh', 'requirements.txt')
+    done = _source(tree, PYTHON=sys.executable, PIP_CONFIG_FILE=os.devnull,
+                   PIP_INDEX_URL='http://127.0.0.1:9/simple', PIP_NO_CACHE_DIR='1')
+    assert done.returncode == 1
+    assert 'the package index cannot be reached' in done.stderr.splitlines()[-1]
+    assert not (tree / '.venv' / 'stamp').exists()
+    assert (tree / '.venv' / 'COLCON_IGNORE').exists()
+
+
+def test_shell_scripts_parse() -> None:
+    """bash reads every script of the project without an error."""
+    scripts = [ROOT / name for name in ('run.sh', 'test.sh', '.ci/run') if (ROOT / name).exists()]
+    for script in (*scripts, *(ROOT / 'scripts').glob('*.sh')):
+        done = subprocess.run(['bash', '-n', script], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
