@@ -147,7 +147,7 @@ _crgame_make() {
     mkdir -p "$venv" && touch "$venv/COLCON_IGNORE" && exec 9>"$venv/.lock" || return 1
     until flock --nonblock 9; do
         ((SECONDS == told)) || _crgame_progress \
-            'crgame: waiting for another call that makes .venv (%d %%)\n'
+            'crgame: waiting for another call that makes .venv (%d %%)%.0s%.0s%.0s\n'
         told=$SECONDS
         sleep 0.25
     done

@@ -4,8 +4,16 @@
 
 import numpy as np
 from scenario_curves import clothoids, connection
-from scenario_maps import (carriageway, KMH, Obstacle, OBSTACLE_ID, PLANNING_PROBLEM_ID, Problem,
-                           RoadMap, ScenarioFile)
+from scenario_maps import (
+    carriageway,
+    KMH,
+    Obstacle,
+    OBSTACLE_ID,
+    PLANNING_PROBLEM_ID,
+    Problem,
+    RoadMap,
+    ScenarioFile,
+)
 
 WIDTH = 3.75
 MOTORWAY = ('interstate', 'mainCarriageWay')

@@ -8,8 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scenario_curves import clothoids, Curve
 from scenario_junctions import Arm, junction, roundabout
-from scenario_maps import (KMH, Obstacle, OBSTACLE_ID, PLANNING_PROBLEM_ID, Problem, RoadMap,
-                           ScenarioFile)
+from scenario_maps import (
+    KMH,
+    Obstacle,
+    OBSTACLE_ID,
+    PLANNING_PROBLEM_ID,
+    Problem,
+    RoadMap,
+    ScenarioFile,
+)
 from scenario_xml import TIME_STEP_S
 
 WIDTH = 3.5

@@ -13,8 +13,7 @@ from pathlib import Path
 from lxml import etree
 import numpy as np
 from numpy.typing import NDArray
-from scenario_maps import (Incoming, Intersection, Lanelet, Obstacle, Problem, ScenarioFile,
-                           Sign)
+from scenario_maps import Incoming, Intersection, Lanelet, Obstacle, Problem, ScenarioFile, Sign
 
 TIME_STEP_S = 0.1
 ZAMUNDA_GEO_NAME_ID = -999

@@ -80,16 +80,13 @@ class Graph:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
-    def pids(self) -> dict[str, int]:
-        """Give the process ids by node name."""
-        return {name: node.pid for name, node in self._nodes.items()}
-
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._signal = number
 
     def _start(self, spec: NodeSpec) -> None:
         node = NodeProcess(spec)
         self._nodes[spec.name] = node
+        self._say(f'{spec.name}: process {node.pid}')
         self._selector.register(node.output, selectors.EVENT_READ, node)
 
     def _relay(self, timeout_s: float) -> None:

@@ -86,7 +86,8 @@ class DriverNode(Node):
             else:
                 driver = live_driver(self._choice or entry['driver'],
                                      '' if self._choice else entry['timeline'],
-                                     self._vehicle_id, self._joy_map)
+                                     self._vehicle_id, self._joy_map,
+                                     self.get_logger().warning)
                 self.get_logger().info(
                     f'{self._vehicle_id}: driven by {self._choice or entry["driver"]}')
         except CrgameError as error:

@@ -10,26 +10,26 @@ from typing import ClassVar
 # commonroad-clcs imports pyplot, which costs a second with a backend that has windows.
 os.environ.setdefault('MPLBACKEND', 'Agg')
 
-from commonroad.scenario.scenario import Scenario
-from commonroad_clcs.config import CLCSParams
-from commonroad_rp import reactive_planner as package
-from commonroad_rp.state import ReactivePlannerState
-from commonroad_rp.utility.config import ReactivePlannerConfiguration
-from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem
-import numpy as np
-from numpy.typing import NDArray
+from commonroad.scenario.scenario import Scenario  # noqa: E402
+from commonroad_clcs.config import CLCSParams  # noqa: E402
+from commonroad_rp import reactive_planner as package  # noqa: E402
+from commonroad_rp.state import ReactivePlannerState  # noqa: E402
+from commonroad_rp.utility.config import ReactivePlannerConfiguration  # noqa: E402
+from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem  # noqa: E402
+import numpy as np  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
 
-from crgame_ros.errors import PlanningError
-from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.geometry.curvilinear import CurvilinearFrame
-from crgame_ros.planner.collision_slices import CollisionSlices
-from crgame_ros.planner.idm import IdmPlanner
-from crgame_ros.planner.interface import Plan, PlannerContext, PlanRequest
-from crgame_ros.planner.path_following import PathPosition
-from crgame_ros.planner.path_planner import check_positive, PathPlanner
-from crgame_ros.planner.reference_path import DrivingPath
-from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
+from crgame_ros.errors import PlanningError  # noqa: E402
+from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
+from crgame_ros.geometry.curvilinear import CurvilinearFrame  # noqa: E402
+from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
+from crgame_ros.planner.idm import IdmPlanner  # noqa: E402
+from crgame_ros.planner.interface import Plan, PlannerContext, PlanRequest  # noqa: E402
+from crgame_ros.planner.path_following import PathPosition  # noqa: E402
+from crgame_ros.planner.path_planner import check_positive, PathPlanner  # noqa: E402
+from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
+from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
+from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -178,10 +178,9 @@ class ReactivePlanner(PathPlanner):
         high = float(self._bounds[index:ahead, 1].min())
         low, high = min(low, 0.0), max(high, 0.0)
         space = planner.sampling_space
-        space.samples_t = _Samples(
-            {_grid(0.5, horizon, self._context.time_step_s), horizon},
-            *({_grid(share, horizon, self._context.time_step_s) for share in (0.34, 0.67, 1.0)},)
-            * 2)
+        early, middle, late = (_grid(share, horizon, self._context.time_step_s)
+                               for share in (0.34, 0.6, 1.0))
+        space.samples_t = _Samples({middle, late}, {early, middle, late}, {early, late})
         slower = max(target - 2.0, 0.0)
         space.samples_v = _Samples(
             {target, slower, 0.5 * (target + speed)},

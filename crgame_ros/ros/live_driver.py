@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The driver source that a live seat uses, from its text in the game."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from crgame_ros.driver.device_map import load_device_map
@@ -12,7 +13,8 @@ from crgame_ros.driver.source import (
 from crgame_ros.errors import InputError
 
 
-def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str) -> DriverSource:
+def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
+                say: Callable[[str], object]) -> DriverSource:
     """
     Make a driver.
 
@@ -20,6 +22,7 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str) -> Driv
     :param timeline: text of the timeline, if the game carries it.
     :param vehicle_id: whose commands to take from a recording.
     :param joy_map: device map for an external joy node.
+    :param say: tells the user something in one line.
     :raises InputError: if the source names nothing that can be used.
     """
     source = parse_source(text)
@@ -39,9 +42,10 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str) -> Driv
         return JoyDriver(load_device_map(joy_map))
     if source.kind == 'idle':
         return IdleDriver()
-    try:
-        return EvdevDriver(open_evdev(source.argument))
-    except InputError:
-        if source.kind == 'auto':
-            return IdleDriver()
-        raise
+    device = open_evdev(source.argument)
+    if source.kind == 'auto' and device.problem is not None:
+        say(f'{vehicle_id}: nobody drives: {device.problem}')
+        device.close()
+        return IdleDriver()
+    # A device that is named may be plugged in later: until then the seat's watchdog stops the car.
+    return EvdevDriver(device)
