@@ -138,12 +138,13 @@ _crgame_explain() {
 
 # Make .venv anew, alone: other calls wait for the lock. Runs in a subshell of its own.
 _crgame_make() {
-    local filler='' told=-9 total
+    local filler='' told=-9 total skip='#'
+    [[ $ros == wheels ]] || skip=ros-
     if [[ -d $venv && ! -e $venv/.lock && -n $(ls -A "$venv") ]]; then
         _crgame_say "$venv exists and was not made by scripts/env.sh: move it away"
         return 1
     fi
-    total=$(grep -c '==' "$root/requirements.txt")
+    total=$(grep -vE "^$skip" "$root/requirements.txt" | grep -c '==')
     mkdir -p "$venv" && touch "$venv/COLCON_IGNORE" && exec 9>"$venv/.lock" || return 1
     until flock --nonblock 9; do
         ((SECONDS == told)) || _crgame_progress \
@@ -159,20 +160,21 @@ _crgame_make() {
         'this happens once and takes about a minute'
     find "$venv" -mindepth 1 -maxdepth 1 ! -name .lock ! -name COLCON_IGNORE -exec rm -rf {} + ||
         return 1
-    grep -vE "^(polygon3|setuptools)==|^$([[ $ros == wheels ]] && echo '#' || echo ros-)" \
-        "$root/requirements.txt" >"$venv/requirements.txt"
-    # A background job ignores Ctrl-C: it has to be told.
-    trap '[[ -z $filler ]] || { kill -TERM "$filler"; pkill -TERM -P "$filler"; } 2>/dev/null
-          exit 130' INT TERM HUP
+    grep -vE "^(polygon3==|setuptools==|$skip)" "$root/requirements.txt" \
+        >"$venv/requirements.txt"
+    # Ctrl-C does not reach a background job: a group of its own lets us end it with its children.
+    trap '[[ -z $filler ]] || kill -TERM -- "-$filler" 2>/dev/null; exit 130' INT TERM HUP
+    set -m
     _crgame_fill >"$venv/install.log" 2>&1 &
     filler=$!
+    set +m
     if ! _crgame_watch "$filler"; then
         _crgame_explain
         return 1
     fi
     if ! compgen -G "$venv/lib/python*/site-packages/polygon3-*.dist-info" >/dev/null; then
-        _crgame_say 'polygon3 did not compile: no road compliance, no planners reactive and idm-package;' \
-            'apt install gcc python3-dev, remove .venv and start again'
+        _crgame_say 'polygon3 did not compile: no road compliance, no planners reactive and' \
+            'idm-package; apt install gcc python3-dev, remove .venv and start again'
     fi
     _crgame_stamp
 }

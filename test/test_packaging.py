@@ -83,7 +83,8 @@ def test_data_files_are_installed_where_ros_looks(prefix: Path) -> None:
     assert (share / 'package.xml').read_bytes() == (ROOT / 'package.xml').read_bytes()
     expected = {file.relative_to(ROOT) for name in DATA for file in (ROOT / name).rglob('*')
                 if file.is_file() and '__pycache__' not in file.parts}
-    installed = {file.relative_to(share) for file in share.rglob('*') if file.is_file()}
+    installed = {file.relative_to(share) for file in share.rglob('*')
+                 if file.is_file() and '__pycache__' not in file.parts}
     assert installed == expected | {Path('package.xml'), Path('requirements.txt')}
     assert all((share / file).read_bytes() == (ROOT / file).read_bytes() for file in expected)
 

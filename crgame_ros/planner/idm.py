@@ -169,14 +169,18 @@ class IdmPlanner(PathPlanner):
             halts.append(line)
         # A standing obstacle is halted at with the gap s0, a line with LINE_GAP.
         halt = min(halts) + model.s0 - LINE_GAP
+        follower = [False] * len(leaders)
 
         def acceleration(i: int, s: float, speed: float) -> float:
             if speed < 0.0:
                 return min(model.b, -speed / dt_s)
             free = free_acceleration(speed, self._at(self._desired, s), model)
             wanted = free + interaction(speed, halt - s - front, 0.0, model)
-            for leader in leaders:
-                if leader.center[i] <= s + middle:
+            for number, leader in enumerate(leaders):
+                behind = leader.center[i] <= s + middle
+                # A prediction that drives through the ego from behind leads nobody.
+                follower[number] = leader.blocking[i] and (behind or follower[number])
+                if behind or follower[number]:
                     continue
                 gap = leader.rear[i] - s - front
                 if leader.blocking[i]:

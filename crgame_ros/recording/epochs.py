@@ -1,0 +1,125 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which run of a recording to read: its documents, and the messages that belong to it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import hashlib
+from itertools import pairwise
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.simulation.documents import (
+    GAME_TOPIC, GameDocument, OBJECTS_TOPIC, parse_game_document, parse_objects_document)
+
+XML_TOPIC = '/scenario/xml'
+_STRING = 'std_msgs/msg/String'
+
+
+class _Text(NamedTuple):
+    """A recorded document with its log time [ns]."""
+
+    log_time_ns: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """
+    One run of a recording, from one reset to the next.
+
+    Every reset gets a later clock offset, so stamps tell the runs apart; only where a restarted
+    simulation began its clock anew do log times decide.
+
+    :param game: its game.
+    :param xml_text: its scenario.
+    :param descriptions: what could appear in it.
+    :param from_log_ns: messages logged earlier belong to the run before, None where stamps say.
+    :param until_stamp_ns: clock offset of the next run, None where there is none or it doesn't say.
+    :param until_log_ns: messages logged from then on belong to the next run, None as above.
+    """
+
+    game: GameDocument
+    xml_text: str
+    descriptions: tuple[ObjectDescription, ...]
+    from_log_ns: int | None
+    until_stamp_ns: int | None
+    until_log_ns: int | None
+
+    def holds(self, stamp_ns: int, log_time_ns: int) -> bool:
+        """Tell whether a message belongs to this run."""
+        return (stamp_ns >= self.game.scheduler.clock_offset_ns
+                and (self.from_log_ns is None or log_time_ns >= self.from_log_ns)
+                and (self.until_stamp_ns is None or stamp_ns < self.until_stamp_ns)
+                and (self.until_log_ns is None or log_time_ns < self.until_log_ns))
+
+
+def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
+    """
+    Find the documents of one run in a recording.
+
+    :param number: its epoch, None for the last run.
+    :raises InputError: if a document or the epoch is not in the recording.
+    """
+    texts = _documents(reader)
+    games = [(log_ns, parse_game_document(text)) for log_ns, text in texts[GAME_TOPIC]]
+    chosen = [index for index, (_, game) in enumerate(games)
+              if number is None or game.epoch == number]
+    if not chosen:
+        known = ', '.join(str(game.epoch) for _, game in games)
+        raise InputError(f'no epoch {number} in it', str(reader.path), f'it has {known}')
+    index = chosen[-1]
+    log_ns, game = games[index]
+    before = games[index - 1] if index else None
+    after = games[index + 1] if index + 1 < len(games) else None
+    began_anew = before is not None and _offset(before[1]) >= _offset(game)
+    clock_goes_on = after is not None and _offset(after[1]) > _offset(game)
+    return Epoch(
+        game, _scenario_of(game, texts[XML_TOPIC], reader),
+        _objects_of(game, texts[OBJECTS_TOPIC], log_ns, reader),
+        log_ns if began_anew else None,
+        _offset(after[1]) if after is not None and clock_goes_on else None,
+        after[0] if after is not None and not clock_goes_on else None)
+
+
+def _offset(game: GameDocument) -> int:
+    return game.scheduler.clock_offset_ns
+
+
+def _documents(reader: BagReader) -> dict[str, list[_Text]]:
+    """Read every version of the documents, without immediate repetitions."""
+    texts: dict[str, list[_Text]] = {GAME_TOPIC: [], XML_TOPIC: [], OBJECTS_TOPIC: []}
+    for topic, type_name, log_time_ns, message in reader.decoded(texts):
+        if type_name != _STRING:
+            raise InputError(f'{topic} is a {type_name}', str(reader.path),
+                             'give a recording of crgame_ros')
+        texts[topic].append(_Text(log_time_ns, str(message.data)))
+    for topic, found in texts.items():
+        if not found:
+            raise InputError(f'no {topic} in it', str(reader.path),
+                             'record all topics, from before the start of the run')
+        found[1:] = [later for earlier, later in pairwise(found) if later.text != earlier.text]
+    return texts
+
+
+def _scenario_of(game: GameDocument, texts: Sequence[_Text], reader: BagReader) -> str:
+    for _, text in reversed(texts):
+        if hashlib.sha256(text.encode('utf-8')).hexdigest() == game.scenario_sha256:
+            return text
+    raise InputError(f'{XML_TOPIC} is that of another run', str(reader.path),
+                     'record from before the start of the run')
+
+
+def _objects_of(game: GameDocument, texts: Sequence[_Text], log_ns: int,
+                reader: BagReader) -> tuple[ObjectDescription, ...]:
+    """Choose the list that names the game's vehicles and was logged nearest to the game."""
+    vehicles = [entry['id'] for entry in (*game.humans, *game.avs)]
+    for _, text in sorted(texts, key=lambda found: abs(found.log_time_ns - log_ns)):
+        descriptions = parse_objects_document(text)
+        if [item.id for item in descriptions if item.role.is_ego] == vehicles:
+            return (*(item for item in descriptions if item.role.is_ego),
+                    *(item for item in descriptions if not item.role.is_ego))
+    raise InputError(f'{OBJECTS_TOPIC} is that of another run', str(reader.path),
+                     'record from before the start of the run')

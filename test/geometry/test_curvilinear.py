@@ -1,0 +1,108 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Paths and curvilinear frames against circles and the library's own conversion."""
+
+import math
+
+import numpy as np
+import pytest
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.curvilinear import CurvilinearFrame
+from crgame_ros.geometry.polyline import ReferencePath, resample
+
+RADIUS = 30.0
+
+
+def circle(turns: float = 1.0, points: int = 80) -> ReferencePath:
+    """Make a path along a circle around (0, RADIUS), counter-clockwise from the origin."""
+    angle = np.linspace(0.0, 2.0 * math.pi * turns, int(points * turns))
+    return ReferencePath.from_polyline(
+        RADIUS * np.column_stack((np.sin(angle), 1.0 - np.cos(angle))))
+
+
+def test_circle_keeps_radius_and_curvature() -> None:
+    path = circle()
+    inner = slice(30, -30)
+    radius = np.hypot(path.points[:, 0], path.points[:, 1] - RADIUS)
+    assert radius[inner] == pytest.approx(RADIUS, abs=0.05)
+    assert path.curvature[inner] == pytest.approx(1.0 / RADIUS, abs=0.001)
+    assert path.heading[-1] - path.heading[0] == pytest.approx(2.0 * math.pi, abs=0.05)
+
+
+def test_sharp_corner_is_rounded_below_the_bound() -> None:
+    corner = np.array([[0.0, 0.0], [50.0, 0.0], [50.0, 50.0]])
+    path = ReferencePath.from_polyline(corner, max_curvature=0.2)
+    assert 0.05 < np.abs(path.curvature).max() <= 0.21
+    assert path.heading[-1] == pytest.approx(0.5 * math.pi, abs=1e-6)
+
+
+def test_projection_inverts_the_pose() -> None:
+    path = circle()
+    s = np.linspace(20.0, 100.0, 33)
+    for d in (-3.0, 0.0, 4.0):
+        pose = path.pose_at(s)
+        points = pose[:, :2] + d * np.column_stack((-np.sin(pose[:, 2]), np.cos(pose[:, 2])))
+        found_s, found_d = path.project(points, 0.0, 110.0)
+        assert found_s == pytest.approx(s, abs=1e-3)
+        assert found_d == pytest.approx(d, abs=1e-3)
+
+
+def test_projection_of_nan_is_nan() -> None:
+    s, d = circle().project(np.array([[np.nan, np.nan], [5.0, 0.5]]))
+    assert np.isnan([s[0], d[0]]).all() and np.isfinite([s[1], d[1]]).all()
+
+
+def test_window_separates_the_laps_of_a_loop() -> None:
+    path = circle(2.0)
+    lap = 2.0 * math.pi * RADIUS
+    point = path.pose_at(np.array([0.25 * lap]))[:, :2]
+    assert path.project(point, 0.0, 0.5 * lap)[0][0] == pytest.approx(0.25 * lap, abs=0.1)
+    assert path.project(point, lap, 1.5 * lap)[0][0] == pytest.approx(1.25 * lap, abs=0.6)
+
+
+def test_frame_agrees_with_the_closed_form_on_a_circle() -> None:
+    """On a circle (CRG 1): s is radius times angle, d is the radius less the distance."""
+    frame = CurvilinearFrame(circle(0.5))
+    for angle in (0.5, 1.2, 2.0):
+        for d in (-2.0, 0.0, 3.0):
+            x = (RADIUS - d) * math.sin(angle)
+            y = RADIUS - (RADIUS - d) * math.cos(angle)
+            mapped = frame.to_curvilinear(x, y)
+            assert mapped is not None
+            # Resampling a polyline of 80 chords shortens the circle by 0.03 %.
+            assert mapped[0] == pytest.approx(RADIUS * angle, abs=0.08)
+            assert mapped[1] == pytest.approx(d, abs=0.05)
+            assert frame.to_cartesian(*mapped) == pytest.approx((x, y), abs=1e-3)
+
+
+def test_frame_maps_many_points_like_one() -> None:
+    frame = CurvilinearFrame(circle(0.5))
+    points = np.array([[5.0, 1.0], [400.0, 0.0], [12.0, 2.0], [np.nan, 0.0]])
+    many = frame.to_curvilinear_many(points)
+    assert tuple(many[0]) == pytest.approx(frame.to_curvilinear(5.0, 1.0), abs=1e-9)
+    assert tuple(many[2]) == pytest.approx(frame.to_curvilinear(12.0, 2.0), abs=1e-9)
+    assert np.isnan(many[[1, 3]]).all()
+    assert frame.to_curvilinear(400.0, 0.0) is None
+
+
+def test_frame_of_a_loop_stops_before_the_heading_limit() -> None:
+    path = circle(3.0)
+    lap = 2.0 * math.pi * RADIUS
+    first = CurvilinearFrame(path)
+    assert 0.9 * lap < first.last < lap
+    later = CurvilinearFrame(path, 1.5 * lap)
+    x, y = path.pose_at(np.array(1.7 * lap))[:2]
+    assert later.to_curvilinear(float(x), float(y))[0] == pytest.approx(1.7 * lap, abs=0.01)
+
+
+def test_outside_of_the_domain_is_an_input_error() -> None:
+    with pytest.raises(InputError, match='outside the domain'):
+        CurvilinearFrame(circle(0.5)).to_cartesian(30.0, 29.9)
+
+
+@pytest.mark.parametrize('points', [[[0.0, 0.0]], [[1.0, 1.0], [1.0, 1.0]],
+                                    [[0.0, 0.0], [np.nan, 1.0]]])
+def test_degenerate_polylines_are_refused(points: list[list[float]]) -> None:
+    with pytest.raises(InputError, match='polyline'):
+        resample(np.array(points), 0.5)

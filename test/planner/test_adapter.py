@@ -1,0 +1,155 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The adapter: whatever a planner does wrong becomes a counted braking plan."""
+
+from collections.abc import Callable
+import dataclasses
+from itertools import count
+from typing import ClassVar
+
+import numpy as np
+import planner_support as support
+import pytest
+
+from crgame_ros.errors import CrgameError, PlanningError
+from crgame_ros.planner.adapter import PlannerAdapter
+from crgame_ros.planner.braking import braking_plan
+from crgame_ros.planner.idm import IdmPlanner
+from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.plan_check import check_plan
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+
+EGO = VehicleState(0.0, 0.0, 0.0, 10.0, 0.05, 0.3, 0.19, 0.0)
+Answer = Callable[[PlanRequest], Plan]
+
+
+class Scripted(Planner):
+    """Answer as told."""
+
+    name: ClassVar[str] = 'scripted'
+
+    def __init__(self, answer: Answer, setup: Exception | None = None) -> None:
+        self._answer = answer
+        self._setup = setup
+
+    def setup(self, context: PlannerContext) -> None:
+        if self._setup is not None:
+            raise self._setup
+
+    def plan(self, request: PlanRequest) -> Plan:
+        return self._answer(request)
+
+
+def adapter(answer: Answer, setup: Exception | None = None) -> PlannerAdapter:
+    ticks = count()
+    made = PlannerAdapter(Scripted(answer, setup), clock=lambda: 0.25 * next(ticks))
+    made.setup(support.context(support.straight(), support.problem(10.0)))
+    return made
+
+
+def good(request: PlanRequest) -> Plan:
+    return braking_plan(request, None, support.load_vehicle_parameters(), 1.0)
+
+
+def raising(error: BaseException) -> Answer:
+    def answer(request: PlanRequest) -> Plan:
+        raise error
+    return answer
+
+
+def changed(column: int, row: int, value: float) -> Answer:
+    def answer(request: PlanRequest) -> Plan:
+        plan = good(request)
+        plan.states[row, column] = value
+        return plan
+    return answer
+
+
+@pytest.mark.parametrize(('answer', 'reason'), [
+    (raising(PlanningError('no way through')), 'no way through'),
+    (raising(ZeroDivisionError('division by zero')), 'ZeroDivisionError: division by zero'),
+    (changed(0, 3, np.nan), 'x of state 3 is nan'),
+    (changed(0, 0, 5.0), 'the first state is 5.00 m from the vehicle'),
+    (lambda request: dataclasses.replace(good(request), stamp_ns=7), 'the stamp 7 ns'),
+    (lambda request: Plan(request.stamp_ns, np.zeros((3, 2))), 'shape (3, 2)'),
+    (lambda request: None, 'NoneType'),
+])
+def test_failures_become_braking_plans(answer: Answer, reason: str,
+                                       vehicle: VehicleParameters) -> None:
+    made = adapter(answer)
+    asked = support.request(EGO, 3)
+    plan = made.plan(asked)
+    assert plan.fallback
+    assert made.last_reason is not None and reason in made.last_reason
+    assert (made.statistics.plans, made.statistics.fallbacks) == (1, 1)
+    assert sum(made.statistics.reasons.values()) == 1
+    assert check_plan(plan, EGO, asked.stamp_ns, vehicle, support.DT) is None
+    assert plan.states[-1, 3] == 0.0
+
+
+def test_good_plans_pass_unchanged_and_are_timed() -> None:
+    made = adapter(good)
+    asked = support.request(EGO)
+    assert np.array_equal(made.plan(asked).states, good(asked).states)
+    assert made.last_reason is None
+    assert made.statistics.fallbacks == 0
+    # The injected clock advances by 0.25 s at each reading.
+    assert made.statistics.durations_s == [0.25]
+
+
+def test_reasons_are_counted_without_their_numbers() -> None:
+    distances = count(5)
+    made = adapter(lambda request: changed(0, 0, float(next(distances)))(request))
+    for k in range(3):
+        made.plan(support.request(EGO, k))
+    assert dict(made.statistics.reasons) == {'the first state is # m from the vehicle': 3}
+
+
+def test_failed_setup_brakes_until_the_next_setup() -> None:
+    made = adapter(good, ValueError('no map'))
+    assert made.plan(support.request(EGO)).fallback
+    assert made.last_reason == 'setup failed: ValueError: no map'
+    made.planner = Scripted(good)
+    assert made.setup(support.context(support.straight(), support.problem(10.0))) is None
+    assert made.plan(support.request(EGO)).stamp_ns == 0
+    assert made.last_reason is None
+
+
+def test_exits_pass() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        adapter(raising(KeyboardInterrupt())).plan(support.request(EGO))
+
+
+def test_plan_before_setup_is_refused() -> None:
+    with pytest.raises(CrgameError, match='before its setup'):
+        PlannerAdapter(Scripted(good)).plan(support.request(EGO))
+
+
+def test_braking_distance_is_that_of_constant_deceleration(vehicle: VehicleParameters) -> None:
+    ego = VehicleState(0.0, 0.0, 0.0, 10.0)
+    states = braking_plan(support.request(ego), None, vehicle, 4.0).states
+    # v^2 / (2 b) = 100 / 8 = 12.5 m, straight ahead.
+    assert states[-1, :3] == pytest.approx([12.5, 0.0, 0.0], abs=1e-9)
+    assert (np.diff(states[:, 3]) <= 0.0).all() and states[:, 3].min() == 0.0
+    assert states[0].tolist() == list(ego)
+
+
+def test_braking_keeps_the_curvature_beyond_the_last_plan(vehicle: VehicleParameters) -> None:
+    ego = VehicleState(0.0, 0.0, 0.0, 8.0, 0.1)
+    states = braking_plan(support.request(ego), None, vehicle, 4.0).states
+    # Constant steering turns by distance * tan(delta) / L; the distance is 64 / 8 = 8 m.
+    assert states[-1, 2] == pytest.approx(8.0 * np.tan(0.1) / vehicle.wheelbase, abs=1e-9)
+
+
+def test_braking_follows_the_last_plans_path(vehicle: VehicleParameters) -> None:
+    made = IdmPlanner(v0=10.0)
+    made.setup(support.context(support.straight(), support.problem(10.0)))
+    last = made.plan(support.request(VehicleState(0.0, 1.5, 0.0, 10.0)))
+    now = VehicleState(*last.states[5])
+    states = braking_plan(support.request(now, 5), last, vehicle, 3.0).states
+    # The last plan swings back to the lane; a straight continuation would miss it by far.
+    path_y = np.interp(states[:, 0], last.states[:, 0], last.states[:, 1])
+    assert np.abs(states[:, 1] - path_y).max() < 0.05
+    straight_on = now.y + np.tan(now.yaw) * (states[-1, 0] - now.x)
+    assert abs(states[-1, 1] - straight_on) > 0.1
