@@ -17,8 +17,8 @@ HEADER = ('# Copyright 2026 The crgame_ros authors', '# SPDX-License-Identifier:
 MAX_FILE_LINES = 350
 MAX_FUNCTION_LINES = 60
 # These may import ROS; everything else is the core.
-ROS_FOLDERS = {'ros', 'nodes'}
-ROS_FILES = {'cli.py', 'doctor.py', 'launcher.py'}
+ROS_FOLDERS = {'ros', 'nodes', 'launcher'}
+ROS_FILES = {'cli.py', 'doctor.py'}
 BLOCKED_IMPORTS = """
 import importlib, sys
 

@@ -281,7 +281,7 @@ def test_env_says_that_the_index_is_out_of_reach(tmp_path: Path) -> None:
 
 
 def test_shell_scripts_parse() -> None:
-    """bash reads every script of the project without an error."""
+    """Every shell script of the project parses."""
     scripts = [ROOT / name for name in ('run.sh', 'test.sh', '.ci/run') if (ROOT / name).exists()]
     for script in (*scripts, *(ROOT / 'scripts').glob('*.sh')):
         done = subprocess.run(['bash', '-n', script], capture_output=True, text=True)

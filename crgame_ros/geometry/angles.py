@@ -24,7 +24,8 @@ def wrap_pi(angle: float) -> float:
 def wrap_pi_array(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Normalise an array of angles [rad] to (-pi, pi]; NaN stays NaN."""
     wrapped = np.pi - np.mod(np.pi - angles, 2.0 * np.pi)
-    return np.asarray(wrapped, dtype=np.float64)
+    # The remainder of a tiny negative number rounds up to the modulus itself.
+    return np.asarray(np.where(wrapped <= -np.pi, np.pi, wrapped), dtype=np.float64)
 
 
 def interpolate_angle(start: float, end: float, fraction: float) -> float:

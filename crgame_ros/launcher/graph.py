@@ -9,7 +9,7 @@ import time
 from types import FrameType
 
 from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
-from crgame_ros.launcher.run_plan import RunPlan
+from crgame_ros.launcher.run_plan import EXTERNAL, RunPlan
 
 # The time that a node gets to end in good order [s].
 GRACE_S = 5.0
@@ -25,7 +25,8 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     drivers = [NodeSpec('driver_node', f'driver_node_{human.id}', {'vehicle': human.id},
                         restart=True) for human in setup.humans]
     planners = [NodeSpec('planner_node', f'planner_node_{av.id}', {'vehicle': av.id},
-                         nice=COMPANION_NICE, restart=True) for av in setup.avs]
+                         nice=COMPANION_NICE, restart=True)
+                for av in setup.avs if av.spec.planner != EXTERNAL]
     companions = [
         *planners, *drivers,
         NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},

@@ -11,11 +11,13 @@ from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.registry import create_planner
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
-from crgame_ros.scenario.game_file import dump_game, load_game
+from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, TimingSpec
+from crgame_ros.scenario.game_file import build, dump_game, load_game
 from crgame_ros.simulation.setup import build_setup, Setup
 
 DEFAULT_GAME = 'cut_in.yaml'
+# As a planner's name: a process of the user's own answers the requests (docs/external_planners.md).
+EXTERNAL = 'external'
 
 
 @dataclass(frozen=True)
@@ -57,13 +59,16 @@ def effective_game(request: RunRequest) -> Game:
         game = load_game(scenarios_directory() / DEFAULT_GAME)
     if request.game is not None and request.scenario is not None:
         game = replace(game, scenario=request.scenario)
-    if request.driver is not None and game.humans:
+    if request.driver is not None:
+        if not game.humans:
+            raise InputError('the game has no human', '--driver', 'leave it out')
         first = replace(game.humans[0], driver=_from_here(request.driver))
         game = replace(game, humans=(first, *game.humans[1:]))
     if request.duration_s is not None:
         game = replace(game, duration=request.duration_s)
     if request.rate_hz is not None:
-        game = replace(game, timing=replace(game.timing, rate=request.rate_hz))
+        timing = build(TimingSpec, {**vars(game.timing), 'rate': request.rate_hz}, '--rate')
+        game = replace(game, timing=timing)
     return game
 
 
@@ -85,11 +90,19 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
     setup = build_setup(effective_game(request))
     setup = with_planners(setup, request.planners)
     for av in setup.avs:
-        create_planner(av.spec.planner, av.spec.options)
+        _check_planner(av.spec)
     folder = _make_folder(request.out, setup.loaded.benchmark_id, now())
     plan = RunPlan(request, setup, folder)
     plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
     return plan
+
+
+def _check_planner(spec: AvSpec) -> None:
+    if spec.planner != EXTERNAL:
+        create_planner(spec.planner, spec.options)
+    elif spec.options:
+        raise InputError('an external planner takes no options from the game', spec.id,
+                         'give them to the external planner itself')
 
 
 def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:

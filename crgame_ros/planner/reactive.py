@@ -60,9 +60,10 @@ class ReactivePlanner(PathPlanner):
     Run commonroad-reactive-planner, a sampling planner in the curvilinear frame.
 
     It samples quartic speed profiles around the speed that the Intelligent Driver Model would
-    reach, and quintic offsets within the carriageway; samples that break the vehicle's limits
-    or hit a predicted obstacle are dropped, the cheapest of the rest is the plan. Three sets of
-    samples are tried in turn, from comfortable to emergency; their number bounds the time.
+    reach, and quintic offsets; samples that break the vehicle's limits or hit a predicted
+    obstacle are dropped, the cheapest of the rest is the plan. Three sets of samples are tried
+    in turn: comfortable in the lane, evading within the lanes of the same direction, and
+    emergency braking and evading on the whole carriageway. Their number bounds the time.
 
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
     :param horizon: length of a plan [s]
@@ -88,7 +89,8 @@ class ReactivePlanner(PathPlanner):
 
     def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
         """Build the package's planner and its coordinate system for a new path."""
-        self._bounds = _road_bounds(driving, vehicle)
+        self._lanes = _road_bounds(driving, vehicle, False)
+        self._carriageway = _road_bounds(driving, vehicle, True)
         self._build_frame(driving.start_s)
         self._planner = package.ReactivePlanner(self._configuration())
 
@@ -172,21 +174,26 @@ class ReactivePlanner(PathPlanner):
         planner, horizon = self._planner, self._steps * self._context.time_step_s
         # Told the current speed, the package would take the goal's speed instead at 0 m/s.
         planner.set_desired_velocity(target)
-        index = int(position.s / self._driving.path.step)
-        ahead = index + int((speed + 5.0) * horizon / self._driving.path.step) + 1
-        low = float(self._bounds[index:ahead, 0].max())
-        high = float(self._bounds[index:ahead, 1].min())
-        low, high = min(low, 0.0), max(high, 0.0)
+        low, high = self._within(self._lanes, position.s, speed)
+        lowest, highest = self._within(self._carriageway, position.s, speed)
         space = planner.sampling_space
         early, middle, late = (_grid(share, horizon, self._context.time_step_s)
                                for share in (0.34, 0.6, 1.0))
-        space.samples_t = _Samples({middle, late}, {early, middle, late}, {early, late})
+        space.samples_t = _Samples({middle, late}, {early, middle, late},
+                                   {early, middle, late})
         slower = max(target - 2.0, 0.0)
         space.samples_v = _Samples(
             {target, slower, 0.5 * (target + speed)},
             {target, 0.5 * target, 0.0, speed},
-            {0.0, 0.5 * speed, speed, target + 2.0})
-        space.samples_d = _Samples({0.0}, {0.0, 0.5 * low, 0.5 * high}, {low, 0.0, high})
+            {0.0, 0.5 * speed, speed})
+        # The package adds the present offset to each set.
+        space.samples_d = _Samples({0.0}, {0.0, low, high}, {lowest, highest})
+
+    def _within(self, bounds: Array, s: float, speed: float) -> tuple[float, float]:
+        """Give the offsets that stay within bounds as far as the vehicle can get."""
+        first = int(s / self._driving.path.step)
+        last = first + int((speed + 5.0) * self._horizon / self._driving.path.step) + 1
+        return float(bounds[first:last, 0].max()), float(bounds[first:last, 1].min())
 
     def _states(self, request: PlanRequest, found: list[ReactivePlannerState]) -> Array:
         """Take over the package's states; at standstill it returns one too few."""
@@ -212,29 +219,27 @@ def _grid(share: float, horizon: float, dt_s: float) -> float:
     return max(2, round(share * horizon / dt_s)) * dt_s
 
 
-def _road_bounds(driving: DrivingPath, vehicle: VehicleParameters) -> Array:
+def _road_bounds(driving: DrivingPath, vehicle: VehicleParameters, oncoming: bool) -> Array:
     """
     Find how far the rear axle may leave the path before the vehicle leaves the carriageway.
 
-    Lanes of the same direction count as carriageway.
-
+    :param oncoming: count neighbouring lanes of the other direction as carriageway too.
     :return: (N, 2) least and greatest offset at the path's samples [m]
     """
     roads, s = driving.roads, driving.path.s
     bounds = np.zeros((len(s), 2))
+    reserve = 0.5 * vehicle.width + ROAD_MARGIN
     for lanelet, (first, last) in zip(driving.lanelets, driving.lanelet_spans, strict=True):
-        inside = np.flatnonzero((s >= first) & (s <= last))
-        if not len(inside):
-            continue
+        inside = (s >= first) & (s <= last)
         middle = 0.5 * roads.line(lanelet).length
         half = 0.5 * roads.width_at(lanelet, middle)
-        right, left = half, half
-        neighbour = roads.left_of(lanelet)
-        if neighbour is not None and roads.is_for_cars(neighbour):
-            left += roads.width_at(neighbour, middle)
-        neighbour = roads.right_of(lanelet)
-        if neighbour is not None and roads.is_for_cars(neighbour):
-            right += roads.width_at(neighbour, middle)
-        reserve = 0.5 * vehicle.width + ROAD_MARGIN
-        bounds[inside] = (min(0.0, reserve - right), max(0.0, left - reserve))
+        own = roads.lanelet_network.find_lanelet_by_id(lanelet)
+        sides = []
+        for neighbour, same_way in ((own.adj_right, own.adj_right_same_direction),
+                                    (own.adj_left, own.adj_left_same_direction)):
+            usable = (neighbour in roads.lanelet_ids and roads.is_for_cars(neighbour)
+                      and (same_way or oncoming))
+            sides.append(max(0.0, half - reserve
+                             + (roads.width_at(neighbour, middle) if usable else 0.0)))
+        bounds[inside] = (-sides[0], sides[1])
     return bounds

@@ -8,7 +8,8 @@ import numpy as np
 
 from crgame_ros.errors import InputError
 from crgame_ros.planner.interface import PlanRequest
-from crgame_ros.planner.joints import JointSeries, vehicle_joint_names, vehicles_from_joints
+from crgame_ros.planner.joints import (
+    JointSeries, object_joint_names, vehicle_joint_names, vehicles_from_joints)
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.state import VehicleState
@@ -45,6 +46,8 @@ class RequestReader:
         tick = self._scheduler.tick_of_stamp(series.stamp_ns)
         if tick is None:
             raise InputError(f'stamp {series.stamp_ns} ns is no scenario tick', where)
+        if not len(series.positions):
+            raise InputError('has no points', where)
         ego = vehicles_from_joints(series.positions[0, :4], series.velocities[0, :4],
                                    series.accelerations[0, :4])
         poses = series.positions[:, self._columns]
@@ -74,6 +77,9 @@ class RequestReader:
             if object_id not in self._objects:
                 raise InputError(f'object "{object_id}" is not described', where,
                                  'publish it on /scenario/objects first')
+            if not place.keys() >= set(object_joint_names(object_id)):
+                raise InputError(f'object "{object_id}" lacks a joint', where,
+                                 'name ' + ', '.join(object_joint_names(object_id)))
         self._ids = tuple(ids)
         self._columns = np.array([[place[f'{object_id}/{joint}'] for joint in ('x', 'y', 'yaw')]
                                   for object_id in ids], dtype=np.intp).reshape(-1, 3)

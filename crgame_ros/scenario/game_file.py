@@ -7,6 +7,8 @@ from dataclasses import asdict, fields, is_dataclass, MISSING
 import math
 from pathlib import Path
 import re
+import reprlib
+import sys
 import types
 from typing import Any, get_args, get_origin, get_type_hints, Literal, TypeVar, Union
 
@@ -22,7 +24,7 @@ PREFIX = {'humans': 'hv', 'avs': 'av'}
 # Lower and upper bounds of numbers, by their name.
 BOUNDS: dict[str, tuple[float, float]] = {
     'rate': (1.0, 10000.0), 'duration': (0.0, math.inf), 'horizon': (0.1, 60.0),
-    'dt_min': (0.0, 1.0), 'dt_max': (1e-4, 10.0), 'skip_threshold': (0.0, math.inf),
+    'dt_min': (1e-6, 1.0), 'dt_max': (1e-4, 10.0), 'skip_threshold': (0.0, math.inf),
     'reset_threshold': (0.0, math.inf), 'warm_up_steps': (0, 1e9),
     'max_catch_up_steps': (1, 1e9), 'seed': (0, 2**63 - 1), 'speed': (-100.0, 100.0)}
 
@@ -43,7 +45,7 @@ def read_yaml(path: Path, what: str) -> Any:
     except OSError as error:
         raise InputError(f'cannot read the {what} ({error.strerror})', str(path),
                          'check the name') from error
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         detail = str(error).splitlines()[0] if str(error) else type(error).__name__
         mark = getattr(error, 'problem_mark', None)
         line = f', line {mark.line + 1}' if mark is not None else ''
@@ -71,12 +73,14 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
     if not isinstance(values, Mapping):
         raise InputError('is no mapping', where, 'see docs/games.md for the keys')
     table = dict(values)
+    if 'base' in table:
+        raise InputError('"base" is unknown', where, 'file names are relative to this file')
     if not isinstance(table.get('scenario'), str):
         raise InputError('"scenario" is missing', where, 'name a CommonRoad file')
     table['scenario'] = base / table['scenario']
     for group in ('humans', 'avs'):
         if table.get(group) is not None:
-            table[group] = _vehicles(table[group], group, where)
+            table[group] = _vehicles(table[group], group, where, base)
     for key, kind in (('prediction', PredictionSpec), ('drivability', DrivabilitySpec),
                       ('timing', TimingSpec)):
         if key in table:
@@ -94,7 +98,8 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
     return game
 
 
-def _vehicles(values: Any, group: str, where: str) -> tuple[HumanSpec | AvSpec, ...]:
+def _vehicles(values: Any, group: str, where: str,
+              base: Path) -> tuple[HumanSpec | AvSpec, ...]:
     if not isinstance(values, list):
         raise InputError(f'"{group}" is no list', where, 'give one entry for each vehicle')
     specs: list[HumanSpec | AvSpec] = []
@@ -103,6 +108,9 @@ def _vehicles(values: Any, group: str, where: str) -> tuple[HumanSpec | AvSpec, 
         if not isinstance(entry, Mapping):
             raise InputError('is no mapping', place, 'see docs/games.md for the keys')
         table = {'id': f'{PREFIX[group]}{index}', **entry}
+        for key in ('vehicle', 'planner'):
+            if isinstance(table.get(key), str):
+                table[key] = _named_file(table[key], base)
         if group == 'humans' and isinstance(table.get('spawn'), Mapping):
             kind = LaneletSpawn if 'lanelet' in table['spawn'] else PoseSpawn
             table['spawn'] = build(kind, table['spawn'], f'{place}: spawn')
@@ -156,22 +164,24 @@ def _checked(value: Any, hint: Any, name: str, where: str) -> Any:
         if origin is Literal:
             if value in get_args(option):
                 return value
-            raise InputError(f'"{name}" is {value!r}', where,
+            raise InputError(f'"{name}" is {reprlib.repr(value)}', where,
                              'use one of ' + ', '.join(map(str, get_args(option))))
         plain = origin or option
         if isinstance(plain, type) and isinstance(value, plain):
             return value
     names = ' or '.join(getattr(option, '__name__', str(option)) for option in options)
-    raise InputError(f'"{name}" is {value!r}', where, f'give a {names}')
+    raise InputError(f'"{name}" is {reprlib.repr(value)}', where, f'give a {names}')
 
 
 def _number(value: Any, kind: type, name: str, where: str) -> float | int:
     allowed = int | float if kind is float else int
     if isinstance(value, bool) or not isinstance(value, allowed) or value != value:
-        raise InputError(f'"{name}" is {value!r}', where, 'give a number')
+        raise InputError(f'"{name}" is {reprlib.repr(value)}', where, 'give a number')
     low, high = BOUNDS.get(name, (-math.inf, math.inf))
-    if not low <= value <= high or (math.isinf(value) and name != 'duration'):
-        raise InputError(f'"{name}" is {value!r}', where, f'give a number from {low:g} to {high:g}')
+    largest = math.inf if name == 'duration' else sys.float_info.max
+    if not max(low, -largest) <= value <= min(high, largest):
+        raise InputError(f'"{name}" is {reprlib.repr(value)}', where,
+                         f'give a number from {low:g} to {high:g}')
     return kind(value)
 
 
@@ -185,10 +195,14 @@ def dump_game(game: Game) -> str:
     if math.isfinite(game.duration):
         values['duration'] = game.duration
     values['seed'] = game.seed
+    here = Path.cwd()
     values['humans'] = [_without_empty(asdict(human)) | {
-        'driver': _absolute_driver(human.driver, game.base)} for human in game.humans]
+        'driver': _absolute_driver(human.driver, game.base),
+        'vehicle': _named_file(human.vehicle, here)} for human in game.humans]
     if game.avs is not None:
-        values['avs'] = [_without_empty(asdict(av)) for av in game.avs]
+        values['avs'] = [_without_empty(asdict(av)) | {
+            'vehicle': _named_file(av.vehicle, here),
+            'planner': _named_file(av.planner, here)} for av in game.avs]
     for key in ('prediction', 'drivability', 'timing'):
         values[key] = asdict(getattr(game, key))
     return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
@@ -203,3 +217,11 @@ def _absolute_driver(driver: str, base: Path) -> str:
     if not colon or kind == 'evdev':
         return driver
     return f'{kind}:{(base / Path(argument).expanduser()).resolve()}'
+
+
+def _named_file(name: str, base: Path) -> str:
+    """Resolve `FILE.yaml` and `FILE.py:Class` against a directory; other names stay."""
+    file, colon, attribute = name.rpartition(':')
+    if not (name.endswith('.yaml') or file.endswith('.py')):
+        return name
+    return str(base / (file or name)) + colon + (attribute if file else '')

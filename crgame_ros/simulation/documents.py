@@ -19,9 +19,12 @@ from crgame_ros.scenario.game import DrivabilitySpec
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.vehicle.parameters import VehicleParameters
 
 GAME_TOPIC = '/scenario/game'
 OBJECTS_TOPIC = '/scenario/objects'
+# What reading a text that somebody else wrote can raise: huge numbers and deep nesting included.
+MALFORMED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
 
 
 def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
@@ -42,11 +45,11 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
         'k0': scheduler.k0, 'clock_offset_ns': clock_offset_ns,
         'real_time_factor': real_time_factor, 'seed': game.seed, 'duration': duration,
         'humans': [
-            {'id': human.id, 'vehicle': asdict(human.vehicle) | {'steering_ratio': ''},
+            {'id': human.id, 'vehicle': _vehicle_entry(human.vehicle),
              'state': list(human.state), 'driver': human.driver, 'timeline': human.timeline}
             for human in setup.humans],
         'avs': [
-            {'id': av.id, 'vehicle': asdict(av.vehicle) | {'steering_ratio': ''},
+            {'id': av.id, 'vehicle': _vehicle_entry(av.vehicle),
              'state': list(av.state), 'planner': av.spec.planner, 'options': av.spec.options,
              'planning_problem': av.planning_problem.planning_problem_id,
              'transform': [av.transform.yaw_offset, av.transform.offset_x,
@@ -55,6 +58,12 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
         'prediction': asdict(game.prediction), 'drivability': asdict(game.drivability),
         'timing': asdict(game.timing)}
     return json.dumps(document, allow_nan=False)
+
+
+def _vehicle_entry(vehicle: VehicleParameters) -> dict[str, Any]:
+    """Write a vehicle; JSON has no infinity, so a limit that is none becomes null."""
+    values = asdict(vehicle) | {'steering_ratio': ''}
+    return {key: None if value == math.inf else value for key, value in values.items()}
 
 
 @dataclass(frozen=True)
@@ -94,13 +103,18 @@ def parse_game_document(text: str) -> GameDocument:
     """
     try:
         content = json.loads(text)
+        for entry in (*content['humans'], *content['avs']):
+            entry['vehicle'] = {key: math.inf if value is None else value
+                                for key, value in entry['vehicle'].items()}
+        if min(content['dt_c_ns'], content['steps_per_tick']) < 1:
+            raise ValueError('a step that is not positive')
         return GameDocument(
             int(content['epoch']), str(content['scenario_sha256']),
             ScenarioScheduler(int(content['dt_c_ns']), int(content['steps_per_tick']),
                               int(content['k0']), int(content['clock_offset_ns'])),
             tuple(content['humans']), tuple(content['avs']),
             DrivabilitySpec(**content['drivability']), content)
-    except (KeyError, TypeError, ValueError) as error:
+    except MALFORMED as error:
         raise InputError(f'is no game document ({type(error).__name__}: {error})',
                          GAME_TOPIC) from error
 
@@ -128,6 +142,6 @@ def parse_objects_document(text: str) -> tuple[ObjectDescription, ...]:
                       tuple((float(x), float(y)) for x, y in item['shape']['vertices'])),
                 float(item['rear_to_center']))
             for item in json.loads(text))
-    except (KeyError, TypeError, ValueError) as error:
+    except MALFORMED as error:
         raise InputError(f'is no list of objects ({type(error).__name__}: {error})',
                          OBJECTS_TOPIC) from error

@@ -52,7 +52,8 @@ class OfflineResult:
     :param state_hash: SHA-256 over all states; equal for equal inputs.
     :param vehicle_states: (n + 1, V, 8) states of humans, then AVs, at every step.
     :param object_poses: (ticks, M, 3) centre poses at every tick.
-    :param commands: (n, H, 4) consumed throttle, brake, steering, reverse.
+    :param commands: (n + 1, H, 4) throttle, brake, steering and reverse; row i was consumed by
+        the step that led to state i, row 0 by none.
     :param planners: what each AV's planner did.
     :param violations: changes of the vehicles' drivability, in order.
     """

@@ -154,6 +154,9 @@ def _place_avs(
         if number not in problems:
             raise InputError(f'planning problem {number} does not exist', where,
                              'use one of ' + ', '.join(map(str, problems)))
+        if number in {av.planning_problem.planning_problem_id for av in avs}:
+            raise InputError(f'planning problem {number} has an AV already', where,
+                             'give each AV its own')
         parameters = load_vehicle_parameters(spec.vehicle)
         declared = problem_pose(problems[number], parameters.rear_to_center,
                                 parameters.wheelbase)

@@ -47,7 +47,7 @@ class ProgressTracker:
         :param states: (S, 8) planned states in simulation coordinates
         :param request_n: simulation step of the request that the plan answers
         :param n: simulation step at which the plan is first sampled
-        :param vehicle: present state of the vehicle
+        :param vehicle: present state of the vehicle, at step n - 1
         :return: True if sigma was aligned to the nearest point because the plan is elsewhere.
         """
         self._states = states.tolist()
@@ -57,12 +57,12 @@ class ProgressTracker:
             self._zero_n, self._offset = n, float(np.argmin(distance))
             return False
         self._zero_n, self._offset = request_n, 0.0
-        planned = self.sample(n)
+        planned = self.sample(n - 1)
         if planned is not None and (
                 abs(planned.x - vehicle.x) < REALIGN_DISTANCE
                 and abs(planned.y - vehicle.y) < REALIGN_DISTANCE):
             return False
-        self._zero_n, self._offset = n, _nearest_progress(states, vehicle)
+        self._zero_n, self._offset = n - 1, _nearest_progress(states, vehicle)
         return True
 
     def progress(self, n: int) -> float:

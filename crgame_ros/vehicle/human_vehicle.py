@@ -56,7 +56,8 @@ class HumanVehicle:
         x, y, yaw, new_speed, angle = integrate(
             state.x, state.y, state.yaw, speed, state.steering_angle,
             acceleration, rate, vehicle.wheelbase, driven_s)
-        if driven_s < dt_s:
+        # A stop at the very end of the step may leave a rounding error behind zero.
+        if driven_s < dt_s or self._gear * new_speed < 0.0:
             new_speed, acceleration = 0.0, 0.0
             angle += rate * (dt_s - driven_s)
         self.state = VehicleState(

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import functools
 import math
 from pathlib import Path
+import sys
 from typing import Any
 
 import yaml
@@ -15,6 +16,10 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import config_directory
 
 DEFAULT_VEHICLE = 'bmw_320i'
+# Switched off by 0, and without a limit, respectively; all others divide or bound something.
+MAY_BE_ZERO = {'rear_to_center', 'max_reverse_speed', 'drag_coefficient', 'frontal_area',
+               'rolling_resistance', 'air_density', 'friction', 'max_brake_force'}
+MAY_BE_INFINITE = {'max_steering_rate'}
 
 
 @dataclass(frozen=True)
@@ -91,10 +96,19 @@ def _checked(values: dict[str, Any], path: Path) -> dict[str, Any]:
         if key in texts:
             checked[key] = str(value)
             continue
-        if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value) \
-                or value < 0.0:
-            raise InputError(f'"{key}" is {value!r}', str(path), 'give a number of at least 0')
-        checked[key] = float(value)
+        checked[key] = _number(key, value, path)
     table = Path(checked['steering_ratio'])
     checked['steering_ratio'] = str(table if table.is_absolute() else path.parent / table)
     return checked
+
+
+def _number(key: str, value: Any, path: Path) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f'"{key}" is {value!r}', str(path), 'give a number')
+    largest = math.inf if key in MAY_BE_INFINITE else sys.float_info.max
+    if key in MAY_BE_ZERO and value == 0:
+        return 0.0
+    if not 0 < value <= largest:
+        least = 'at least 0' if key in MAY_BE_ZERO else 'above 0'
+        raise InputError(f'"{key}" is {value!r}', str(path), f'give a finite number {least}')
+    return float(value)

@@ -56,11 +56,15 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
         values = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
         raise InputError(f'cannot read the steering ratios ({error})', path) from error
-    table = SteeringRatioTable(
-        _numbers(values, 'speed', path), _numbers(values, 'steering_wheel_angle', path),
-        tuple(tuple(float(value) for value in row) for row in values.get('ratio', ())))
+    try:
+        table = SteeringRatioTable(
+            _numbers(values, 'speed', path), _numbers(values, 'steering_wheel_angle', path),
+            tuple(tuple(float(value) for value in row) for row in values.get('ratio', ())))
+    except (TypeError, ValueError) as error:
+        raise InputError(f'holds something that is no number ({error})', path,
+                         'see config/vehicles/steering_ratio.yaml') from error
     for name, grid in (('speed', table.speeds), ('steering_wheel_angle', table.wheel_angles)):
-        if len(grid) < 2 or any(b <= a for a, b in zip(grid, grid[1:], strict=False)):
+        if len(grid) < 2 or any(not b > a for a, b in zip(grid, grid[1:], strict=False)):
             raise InputError(f'"{name}" does not ascend', path, 'give at least two grid points')
     if len(table.ratios) != len(table.speeds) or any(
             len(row) != len(table.wheel_angles) for row in table.ratios):

@@ -120,7 +120,7 @@ def test_paths_on_real_maps_are_drivable(path: Path, vehicle: VehicleParameters)
     _, offset = curve.project(np.array([[start.x, start.y]]), driving.start_s - 5.0,
                               driving.start_s + 5.0)
     assert abs(float(offset[0])) < 1.0
-    inside = (curve.s > driving.start_s) & (curve.s < min(driving.end_s, curve.length) - 5.0)
+    inside = (curve.s > driving.start_s + 5.0) & (curve.s < min(driving.end_s, curve.length) - 5.0)
     roads = driving.roads
     outside = [point for point in curve.points[inside][::8] if roads.lanelet_at(*point) is None]
     assert not outside

@@ -1,0 +1,132 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of a run: snapshots from above and profiles over time (as CRG figures 8 and 9)."""
+
+from collections.abc import Sequence
+import math
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.simulation.offline import OfflineResult
+from crgame_ros.vehicle.state import StateColumn
+
+Array = NDArray[np.float64]
+# Okabe and Ito's palette, told apart by the colour-blind: humans vermilion, AVs blue.
+HUMAN_COLOUR = '#d55e00'
+AV_COLOURS = ('#0072b2', '#56b4e9', '#009e73')
+OBJECT_COLOUR = '#777777'
+ROAD_COLOUR = '#d9d9d9'
+
+
+def colour_of(vehicle_id: str) -> str:
+    """Give a driven vehicle its colour."""
+    if vehicle_id.startswith('hv'):
+        return HUMAN_COLOUR
+    return AV_COLOURS[int(vehicle_id[2:]) % len(AV_COLOURS)]
+
+
+def draw_run(result: OfflineResult, times_s: Sequence[float], *, reach: float = 45.0) -> Figure:
+    """
+    Draw a run: one view from above for each time, and profiles below.
+
+    :param times_s: times of the snapshots [s]
+    :param reach: half the length of road shown around the first AV [m]
+    """
+    rows = len(times_s)
+    figure = Figure(figsize=(9.0, 0.95 * rows + 3.0), layout='constrained')
+    grid = figure.add_gridspec(rows + 3, 2)
+    for row, time_s in enumerate(times_s):
+        _snapshot(figure.add_subplot(grid[row, :]), result, time_s, reach)
+    _profile(figure.add_subplot(grid[rows:, 0]), result, StateColumn.SPEED, 'speed [m/s]')
+    _gap(figure.add_subplot(grid[rows:, 1]), result)
+    return figure
+
+
+def _snapshot(axes: Axes, result: OfflineResult, time_s: float, reach: float) -> None:
+    setup = result.setup
+    n = min(round(time_s / setup.scheduler.dt_s), len(result.vehicle_states) - 1)
+    states = result.vehicle_states[n]
+    focus = states[len(setup.humans)] if setup.avs else states[0]
+    view = _View(focus)
+    for lanelet in setup.loaded.scenario.lanelet_network.lanelets:
+        axes.add_patch(Polygon(view.of(lanelet.polygon.vertices), facecolor=ROAD_COLOUR,
+                               edgecolor='white', linewidth=0.8))
+    tick = n // setup.scheduler.steps_per_tick
+    for description, pose in zip(setup.obstacles.descriptions, result.object_poses[tick],
+                                 strict=True):
+        if math.isfinite(pose[0]):
+            _footprint(axes, view, description, pose, OBJECT_COLOUR)
+    for description, state in zip(setup.vehicle_descriptions, states, strict=True):
+        x, y, yaw = state[:3]
+        offset = description.rear_to_center
+        center = np.array((x + offset * math.cos(yaw), y + offset * math.sin(yaw), yaw))
+        _footprint(axes, view, description, center, colour_of(description.id))
+    axes.set_xlim(-0.6 * reach, 1.4 * reach)
+    axes.set_ylim(-0.13 * reach, 0.13 * reach)
+    axes.set_aspect('equal')
+    axes.set_yticks([])
+    axes.set_xticks([])
+    axes.set_ylabel(f'{time_s:g} s', rotation=0, ha='right', va='center')
+
+
+class _View:
+    """Coordinates seen from a vehicle, heading to the right."""
+
+    def __init__(self, focus: Array) -> None:
+        cos, sin = math.cos(focus[2]), math.sin(focus[2])
+        self._origin = focus[:2]
+        self._turn = np.array(((cos, -sin), (sin, cos)))
+
+    def of(self, points: Array) -> Array:
+        """Map points (N, 2) from map."""
+        return (points - self._origin) @ self._turn
+
+
+def _footprint(axes: Axes, view: _View, description: ObjectDescription, center: Array,
+               colour: str) -> None:
+    shape = description.shape
+    if shape.kind == 'polygon':
+        corners = np.array(shape.vertices)
+    else:
+        half_length, half_width = 0.5 * shape.length, 0.5 * shape.width
+        corners = np.array(((half_length, half_width), (half_length, -half_width),
+                            (-half_length, -half_width), (-half_length, half_width)))
+    cos, sin = math.cos(center[2]), math.sin(center[2])
+    turned = corners @ np.array(((cos, sin), (-sin, cos))) + center[:2]
+    axes.add_patch(Polygon(view.of(turned), facecolor=colour, edgecolor='black', linewidth=0.6,
+                           zorder=3))
+
+
+def _times(result: OfflineResult) -> Array:
+    return np.arange(len(result.vehicle_states)) * result.setup.scheduler.dt_s
+
+
+def _profile(axes: Axes, result: OfflineResult, column: StateColumn, label: str) -> None:
+    for vehicle_id in result.setup.vehicle_ids:
+        axes.plot(_times(result), result.states_of(vehicle_id)[:, column],
+                  color=colour_of(vehicle_id), label=vehicle_id)
+    axes.set_xlabel('time [s]')
+    axes.set_ylabel(label)
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def _gap(axes: Axes, result: OfflineResult) -> None:
+    """Plot the distance between the first human's vehicle and each AV."""
+    setup = result.setup
+    if setup.humans:
+        human = result.states_of(setup.humans[0].id)
+        for av in setup.avs:
+            state = result.states_of(av.id)
+            axes.plot(_times(result), np.hypot(human[:, 0] - state[:, 0],
+                                               human[:, 1] - state[:, 1]),
+                      color=colour_of(av.id), label=f'{av.id} to {setup.humans[0].id}')
+        axes.legend()
+    axes.set_xlabel('time [s]')
+    axes.set_ylabel('distance of rear axles [m]')
+    axes.grid(alpha=0.3)

@@ -1,0 +1,80 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From a recording to a CommonRoad scenario file."""
+
+from dataclasses import dataclass
+from datetime import date, datetime, UTC
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.scenario.export import export_scenario, SOURCE_MARK, write_text
+
+_HEAD_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class ConversionReport:
+    """
+    What became of a recording.
+
+    :param path: the scenario file.
+    :param benchmark_id: its benchmark id.
+    :param first_k: scenario step of the original that is its time step 0.
+    :param time_steps: number of its time steps.
+    :param obstacle_ids: CommonRoad ids of the vehicles and objects in it, by their names.
+    :param problem_ids: ids of the planning problems, by vehicle.
+    :param notices: what was refused, left out or mended, one line each.
+    """
+
+    path: Path
+    benchmark_id: str
+    first_k: int
+    time_steps: int
+    obstacle_ids: dict[str, int]
+    problem_ids: dict[str, int]
+    notices: tuple[str, ...]
+
+    def as_text(self) -> str:
+        """Write the report for people, in several lines."""
+        vehicles = ', '.join(f'{name} is obstacle {self.obstacle_ids[name]} and planning problem '
+                             f'{number}' for name, number in self.problem_ids.items())
+        return '\n'.join([f'{self.path}: {self.time_steps} time steps; {vehicles}',
+                          *(f'note: {notice}' for notice in self.notices)])
+
+
+def convert(bag: Path, out: Path | None = None, epoch: int | None = None) -> ConversionReport:
+    """
+    Write the scenario that a recording holds.
+
+    :param bag: a recording of ours or of `ros2 bag record`, finished or cut off.
+    :param out: the file (`*.xml`) or the folder for `<benchmark id>.xml`; None puts it beside the
+        recording.
+    :param epoch: which run, where the recording holds several; None for the last.
+    :raises InputError: if there is no run in it, or another file is in the way.
+    :raises CrgameError: if the schema refuses the result; nothing is written then.
+    """
+    log = read_run_log(bag, epoch)
+    exported = export_scenario(log, day=_day_of(bag))
+    folder = bag.resolve().parent if out is None else out
+    path = folder if folder.suffix == '.xml' else folder / f'{exported.benchmark_id}.xml'
+    if path.exists() and not _is_ours(path):
+        raise InputError('a file that is no conversion is there already', str(path),
+                         'name another file or folder')
+    write_text(exported.xml_text, path)
+    return ConversionReport(path, exported.benchmark_id, int(log.ks[0]), len(log.ks),
+                            exported.obstacle_ids, exported.problem_ids, exported.notices)
+
+
+def _day_of(bag: Path) -> date:
+    with BagReader(bag) as reader:
+        return datetime.fromtimestamp(reader.start_ns * 1e-9, UTC).date()
+
+
+def _is_ours(path: Path) -> bool:
+    """Tell whether a file was written by a conversion, so that another may replace it."""
+    if not path.is_file():
+        return False
+    with path.open('rb') as stream:
+        return SOURCE_MARK.encode() in stream.read(_HEAD_BYTES)

@@ -1,0 +1,187 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Obstacles and planning problems as CommonRoad 2020a XML text.
+
+Text is put together directly: a run has tens of thousands of states, and building an element for
+each of their values would take seconds. Numbers never carry an exponent, which the schema forbids.
+"""
+
+from collections.abc import Iterable, Sequence
+import math
+from typing import Any
+
+from commonroad.common.util import Interval
+from commonroad.geometry.shape import Circle, Polygon, Rectangle, ShapeGroup
+from commonroad.geometry.shape import Shape as CommonRoadShape
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.shape import Shape
+
+STATIC_TYPES = frozenset({'unknown', 'parkedVehicle', 'constructionZone', 'roadBoundary'})
+DYNAMIC_TYPES = frozenset({'unknown', 'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'pedestrian',
+                           'priorityVehicle', 'train', 'taxi'})
+ENVIRONMENT_TYPES = frozenset({'building', 'pillar', 'median_strip'})
+
+_POSE = ('<position><point><x>{:.4f}</x><y>{:.4f}</y></point></position>'
+         '<orientation><exact>{:.4f}</exact></orientation>')
+_TIME = '<time><exact>{:d}</exact></time>'
+_VALUE = '<{0}><exact>{{:.4f}}</exact></{0}>'
+_OBJECT_STATE = _POSE + _TIME + _VALUE.format('velocity')
+_VEHICLE_STATE = _OBJECT_STATE + ''.join(
+    _VALUE.format(name) for name in ('acceleration', 'yawRate', 'steeringAngle'))
+_PROBLEM_STATE = _OBJECT_STATE + ''.join(
+    _VALUE.format(name) for name in ('acceleration', 'yawRate', 'slipAngle'))
+
+FloatArray = NDArray[np.float64]
+
+
+def exact_number(value: float) -> str:
+    """Write a number to a picometre, without exponent."""
+    text = f'{value:.12f}'.rstrip('0')
+    return text + '0' if text.endswith('.') else text
+
+
+def static_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[float]) -> str:
+    """
+    Write an obstacle that never moves.
+
+    :param kind: one of `STATIC_TYPES`
+    :param pose: of its centre x [m], y [m], yaw [rad]
+    """
+    return (f'<staticObstacle id="{number}"><type>{kind}</type><shape>{_shape(shape)}</shape>'
+            f'<initialState>{_POSE.format(*pose)}{_TIME.format(0)}</initialState>'
+            '</staticObstacle>\n')
+
+
+def environment_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[float]) -> str:
+    """Write a building or the like, one of `ENVIRONMENT_TYPES`, in map coordinates."""
+    return (f'<environmentObstacle id="{number}"><type>{kind}</type>'
+            f'<shape>{_placed_shape(shape, pose)}</shape></environmentObstacle>\n')
+
+
+def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequence[float]],
+                     driven: bool) -> str:
+    """
+    Write an obstacle with its trajectory.
+
+    :param kind: one of `DYNAMIC_TYPES`
+    :param states: two or more rows from time step 0 on: x, y, yaw of the centre, speed; of a
+        driven vehicle also acceleration, yaw rate, steering angle
+    :param driven: whether the rows have the values of a driven vehicle
+    """
+    template = _VEHICLE_STATE if driven else _OBJECT_STATE
+    lines = [template.format(*row[:3], step, *row[3:]) for step, row in enumerate(states)]
+    trajectory = '</state>\n<state>'.join(lines[1:])
+    return (f'<dynamicObstacle id="{number}"><type>{kind}</type><shape>{_shape(shape)}</shape>\n'
+            f'<initialState>{lines[0]}</initialState>\n'
+            f'<trajectory>\n<state>{trajectory}</state>\n</trajectory></dynamicObstacle>\n')
+
+
+def phantom_obstacle(number: int, shape: Shape, first: int, poses: Iterable[Sequence[float]]) -> str:
+    """
+    Write where something is at consecutive time steps, which need not begin with 0.
+
+    :param first: time step of the first pose, at least 1
+    :param poses: of its centre x [m], y [m], yaw [rad]
+    """
+    occupancies = '\n'.join(
+        f'<occupancy><shape>{_placed_shape(shape, pose)}</shape>{_TIME.format(step)}</occupancy>'
+        for step, pose in enumerate(poses, first))
+    return (f'<phantomObstacle id="{number}"><occupancySet>\n{occupancies}\n'
+            '</occupancySet></phantomObstacle>\n')
+
+
+def planning_problem(number: int, row: Sequence[float], goals: Sequence[str]) -> str:
+    """
+    Write a planning problem that begins at time step 0.
+
+    :param row: x, y, yaw of the centre, speed, acceleration, yaw rate, as of a driven vehicle
+    :param goals: its `goalState` elements
+    """
+    # The speed is that of the rear axle, whose direction is the heading: no slip.
+    state = _PROBLEM_STATE.format(*row[:3], 0, *row[3:6], 0.0)
+    return (f'<planningProblem id="{number}">\n<initialState>{state}</initialState>\n'
+            f'{"".join(goals)}</planningProblem>\n')
+
+
+def goal_state(time: tuple[int, int], position: str,
+               intervals: Sequence[tuple[str, float, float]] = ()) -> str:
+    """
+    Write a goal.
+
+    :param time: first and last time step, the last at least 1
+    :param position: content of its position, empty if there is none
+    :param intervals: element name, start and end
+    """
+    text = f'<time>{_interval(str(time[0]), str(time[1]))}</time>'
+    if position:
+        text += f'<position>{position}</position>'
+    for name, start, end in intervals:
+        text += f'<{name}>{_interval(exact_number(start), exact_number(end))}</{name}>'
+    return f'<goalState>{text}</goalState>\n'
+
+
+def lanelet_references(lanelets: Iterable[int]) -> str:
+    """Write a position that is any of these lanelets."""
+    return ''.join(f'<lanelet ref="{lanelet}"/>' for lanelet in lanelets)
+
+
+def placed_rectangle(length: float, width: float, pose: Sequence[float]) -> str:
+    """Write a rectangle around a pose in map."""
+    return _placed_shape(Shape.rectangle(length, width), pose)
+
+
+def commonroad_shape(shape: CommonRoadShape) -> str:
+    """Write a shape of commonroad-io, in the coordinates it has."""
+    if isinstance(shape, ShapeGroup):
+        return ''.join(commonroad_shape(part) for part in shape.shapes)
+    if isinstance(shape, Rectangle):
+        return placed_rectangle(shape.length, shape.width, (*shape.center, shape.orientation))
+    if isinstance(shape, Circle):
+        return _placed_shape(Shape.circle(shape.radius), (*shape.center, 0.0))
+    if isinstance(shape, Polygon):
+        return _polygon(shape.vertices[:, :2].tolist())
+    raise TypeError(f'no shape of CommonRoad: {type(shape).__name__}')
+
+
+def interval_bounds(value: Any) -> tuple[float, float]:
+    """Give the bounds of an interval, or of the single value that it is."""
+    if isinstance(value, Interval):
+        return float(value.start), float(value.end)
+    return float(value), float(value)
+
+
+def _interval(start: str, end: str) -> str:
+    return f'<intervalStart>{start}</intervalStart><intervalEnd>{end}</intervalEnd>'
+
+
+def _shape(shape: Shape) -> str:
+    """Write a footprint in the coordinates of its object."""
+    if shape.kind == 'circle':
+        return f'<circle><radius>{exact_number(0.5 * shape.length)}</radius></circle>'
+    if shape.kind == 'polygon':
+        return _polygon(shape.vertices)
+    return (f'<rectangle><length>{exact_number(shape.length)}</length>'
+            f'<width>{exact_number(shape.width)}</width></rectangle>')
+
+
+def _placed_shape(shape: Shape, pose: Sequence[float]) -> str:
+    """Write a footprint at a pose in map."""
+    x, y, yaw = pose
+    center = f'<center><x>{x:.4f}</x><y>{y:.4f}</y></center>'
+    if shape.kind == 'circle':
+        return f'<circle><radius>{exact_number(0.5 * shape.length)}</radius>{center}</circle>'
+    if shape.kind == 'polygon':
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return _polygon([(x + cos * u - sin * v, y + sin * u + cos * v)
+                         for u, v in shape.vertices])
+    return (f'<rectangle><length>{exact_number(shape.length)}</length>'
+            f'<width>{exact_number(shape.width)}</width>'
+            f'<orientation>{yaw:.4f}</orientation>{center}</rectangle>')
+
+
+def _polygon(vertices: Iterable[Sequence[float]]) -> str:
+    points = ''.join(f'<point><x>{x:.4f}</x><y>{y:.4f}</y></point>' for x, y in vertices)
+    return f'<polygon>{points}</polygon>'

@@ -1,0 +1,61 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The goals of exported planning problems."""
+
+from collections.abc import Collection
+
+from commonroad.planning.planning_problem import PlanningProblem
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.export_elements import (
+    commonroad_shape, goal_state, interval_bounds, lanelet_references, placed_rectangle)
+
+# The place where a vehicle ended reaches so far beyond it [m], along and across.
+_MARGIN = (5.0, 1.0)
+
+
+def goal_where_it_ended(centers: NDArray[np.float64], shape: Shape) -> str:
+    """
+    Make a goal of the place where a vehicle ended, and of the time steps that it spent there.
+
+    :param centers: (K, 3) poses of its centre at the time steps from 0 on
+    :param shape: of the vehicle
+    """
+    length, width = shape.length + 2.0 * _MARGIN[0], shape.width + 2.0 * _MARGIN[1]
+    cos, sin = np.cos(centers[-1, 2]), np.sin(centers[-1, 2])
+    delta = centers[:, :2] - centers[-1, :2]
+    along, across = delta @ (cos, sin), delta @ (-sin, cos)
+    outside = np.flatnonzero((np.abs(along) > 0.5 * length) | (np.abs(across) > 0.5 * width))
+    arrived = int(outside[-1]) + 1 if len(outside) else 0
+    return goal_state((arrived, len(centers) - 1),
+                      placed_rectangle(length, width, centers[-1].tolist()))
+
+
+def goals_of(problem: PlanningProblem, vehicle_id: str, shift: int, last: int,
+             lanelets: Collection[int], notices: list[str]) -> list[str]:
+    """
+    Give the goals of a planning problem on the time steps of the run.
+
+    :param shift: scenario step that is time step 0
+    :param last: last time step
+    :param lanelets: ids of the lanelets that a goal may refer to
+    :param notices: told what had to be changed
+    """
+    goals = []
+    by_lanelet = problem.goal.lanelets_of_goal_position or {}
+    for index, state in enumerate(problem.goal.state_list):
+        start, end = (int(bound) - shift for bound in interval_bounds(state.time_step))
+        if end < 1:
+            notices.append(f'{vehicle_id}: the time of its goal is over before the first step; it '
+                           'may be reached at any step of the run')
+            start, end = 0, last
+        known = [number for number in by_lanelet.get(index, ()) if number in lanelets]
+        position = lanelet_references(known)
+        if not known and state.has_value('position'):
+            position = commonroad_shape(state.position)
+        goals.append(goal_state((max(start, 0), end), position, [
+            (name, *interval_bounds(getattr(state, name)))
+            for name in ('orientation', 'velocity') if state.has_value(name)]))
+    return goals

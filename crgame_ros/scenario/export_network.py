@@ -1,0 +1,153 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The roads of a scenario for export: as its file has them, or rewritten where that is invalid."""
+
+from copy import deepcopy
+import functools
+from importlib import resources
+import warnings
+
+from commonroad.common.writer.file_writer_xml import (
+    IntersectionXMLNode, LaneletXMLNode, LocationXMLNode, TrafficLightXMLNode, TrafficSignXMLNode)
+from commonroad.scenario.scenario import Location
+from lxml import etree
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.scenario import guard
+from crgame_ros.scenario.loading import LoadedScenario
+
+_PARTS = ('location', 'scenarioTags', 'lanelet', 'trafficSign', 'trafficLight', 'intersection')
+_SIMULATED = 'simulated'
+_LOCATION = ('<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude>'
+             '<gpsLongitude>999</gpsLongitude></location>')
+# What the schema asks for beside the roads, so that they can be checked alone.
+_FRAME = ('<commonRoad commonRoadVersion="2020a" benchmarkID="ZAM_Frame-1" date="2020-01-01" '
+          'author="" affiliation="" source="" timeStepSize="0.1"/>')
+_PROBLEM = (
+    '<planningProblem id="{}"><initialState><position><point><x>0</x><y>0</y></point></position>'
+    '<velocity><exact>0</exact></velocity><orientation><exact>0</exact></orientation>'
+    '<yawRate><exact>0</exact></yawRate><slipAngle><exact>0</exact></slipAngle>'
+    '<time><exact>0</exact></time></initialState><goalState><time><intervalStart>0'
+    '</intervalStart><intervalEnd>1</intervalEnd></time></goalState></planningProblem>')
+
+
+@functools.cache
+def commonroad_schema() -> etree.XMLSchema:
+    """Load the CommonRoad 2020a schema that commonroad-io brings."""
+    file = resources.files('commonroad').joinpath(
+        'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')
+    return etree.XMLSchema(etree.fromstring(file.read_bytes()))
+
+
+def schema_errors(root: etree._Element) -> list[str]:
+    """List what the schema finds wrong, empty for a valid scenario."""
+    schema = commonroad_schema()
+    if schema.validate(root):
+        return []
+    return [f'line {entry.line}: {entry.message}' for entry in schema.error_log]
+
+
+def network_elements(loaded: LoadedScenario, shift: int,
+                     notices: list[str]) -> list[etree._Element]:
+    """
+    Give location, tags, lanelets, traffic signs, traffic lights and intersections.
+
+    They are copied from the file as they are, or, where that breaks the schema (a third of the
+    published files do), written anew from what was read.
+
+    :param shift: scenario step that becomes time step 0; the cycles of the lights move with it
+    :param notices: told where the roads were written anew
+    :raises CrgameError: if they cannot be written so that the schema accepts them.
+    """
+    root = guard.parse_hardened(loaded.xml_text, loaded.source)
+    if root.get('commonRoadVersion') == '2020a':
+        copied = _completed([deepcopy(child) for tag in _PARTS
+                             for child in root.iterchildren(tag)], shift)
+        if not _errors_of(copied):
+            return copied
+    rewritten = _completed(_rewritten(loaded), shift)
+    errors = _errors_of(rewritten)
+    if errors:
+        raise CrgameError(f'{loaded.source}: the roads cannot be written as a valid scenario '
+                          f'({"; ".join(errors[:3])}); correct the scenario and run again')
+    notices.append('the roads of the original are not as the CommonRoad 2020a schema has them and '
+                   'are written anew from what was read')
+    return rewritten
+
+
+def used_ids(elements: list[etree._Element]) -> set[int]:
+    """Give every id that the elements take."""
+    return {int(node.get('id')) for element in elements for node in element.iter()
+            if node.get('id') is not None}
+
+
+def _errors_of(elements: list[etree._Element]) -> list[str]:
+    """List what is wrong with the roads by themselves."""
+    frame = etree.fromstring(_FRAME)
+    frame.extend(deepcopy(elements))
+    # ids that are no numbers are for the schema to refuse
+    numbers = [int(node.get('id')) for node in frame.iter('*')
+               if node.get('id', '').isdecimal()]
+    frame.append(etree.fromstring(_PROBLEM.format(max(numbers, default=0) + 1)))
+    return schema_errors(frame)
+
+
+def _completed(elements: list[etree._Element], shift: int) -> list[etree._Element]:
+    """Add what every scenario must have, and move the lights' cycles."""
+    if not any(element.tag == 'location' for element in elements):
+        elements.insert(0, etree.fromstring(_LOCATION))
+    if not any(element.tag == 'scenarioTags' for element in elements):
+        elements.insert(1, etree.Element('scenarioTags'))
+    tags = next(element for element in elements if element.tag == 'scenarioTags')
+    if tags.find(_SIMULATED) is None:
+        etree.SubElement(tags, _SIMULATED)
+    for light in elements:
+        for cycle in light.iterchildren('cycle') if light.tag == 'trafficLight' else ():
+            _shift_cycle(cycle, shift)
+    return elements
+
+
+def _shift_cycle(cycle: etree._Element, shift: int) -> None:
+    """Let a light show at time step 0 what it showed at the shift."""
+    if cycle.find('cycleElement') is None:
+        element = etree.SubElement(cycle, 'cycleElement')
+        etree.SubElement(element, 'duration').text = '1'
+        etree.SubElement(element, 'color').text = 'inactive'
+    durations = [int(node.text or 0) for node in cycle.iterfind('cycleElement/duration')]
+    node = cycle.find('timeOffset')
+    offset = (int(node.text or 0) if node is not None else 0) - shift
+    if shift and sum(durations) > 0:
+        offset %= sum(durations)
+    if node is not None and offset == 0:
+        # The schema knows positive offsets only.
+        cycle.remove(node)
+    elif offset:
+        node = etree.SubElement(cycle, 'timeOffset') if node is None else node
+        node.text = str(offset)
+
+
+def _rewritten(loaded: LoadedScenario) -> list[etree._Element]:
+    network = loaded.scenario.lanelet_network
+    tags = etree.Element('scenarioTags')
+    for tag in sorted(loaded.scenario.tags or (), key=lambda item: str(item.value)):
+        etree.SubElement(tags, tag.value)
+    with warnings.catch_warnings():
+        # A lanelet without a type gets the type unknown, and a warning.
+        warnings.simplefilter('ignore', UserWarning)
+        elements = [LocationXMLNode.create_node(loaded.scenario.location or Location()), tags]
+        elements += [LaneletXMLNode.create_node(lanelet) for lanelet in network.lanelets]
+        elements += [TrafficSignXMLNode.create_node(sign) for sign in network.traffic_signs]
+        elements += [TrafficLightXMLNode.create_node(light) for light in network.traffic_lights]
+        elements += [IntersectionXMLNode.create_node(item) for item in network.intersections]
+    for element in elements:
+        for line in element.iterchildren('stopLine'):
+            _complete_stop_line(line)
+    return elements
+
+
+def _complete_stop_line(line: etree._Element) -> None:
+    """Give a stop line the marking that the schema asks for."""
+    if line.find('lineMarking') is None:
+        marking = etree.Element('lineMarking')
+        marking.text = 'unknown'
+        line.insert(len(line.findall('point')), marking)

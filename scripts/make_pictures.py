@@ -1,0 +1,30 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Make the pictures of the documentation from offline runs of the project's own games."""
+
+from pathlib import Path
+
+from crgame_ros.analysis.figures import draw_run
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_game
+from crgame_ros.paths import scenarios_directory, share_directory
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+
+PICTURES = {'cut_in': (2.0, 5.0, 8.0, 11.0, 16.0), 'two_avs': (2.0, 5.0, 8.0, 12.0)}
+
+
+def main() -> None:
+    """Draw each game."""
+    folder = share_directory() / 'docs' / 'images'
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, times_s in PICTURES.items():
+        request = RunRequest(game=Path(scenarios_directory() / f'{name}.yaml'))
+        result = run_offline(build_setup(effective_game(request)))
+        path = folder / f'{name}.png'
+        draw_run(result, times_s).savefig(path, dpi=110)
+        print(path)
+
+
+if __name__ == '__main__':
+    main()
