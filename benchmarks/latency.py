@@ -14,7 +14,8 @@ import numpy as np
 
 from crgame_ros.paths import scenarios_directory
 
-PLANNERS = {'idm': '<= 5', 'constant-velocity': '', 'idm-package': '', 'reactive': '<= 100'}
+PLANNERS = {'idm': 'p99 <= 5', 'constant-velocity': '', 'idm-package': '',
+            'reactive': 'p99 <= 100'}
 LIMIT_S = 1.0
 
 
@@ -22,8 +23,8 @@ class InputProbe:
     """Turns a wheel left and right through an external joy device and waits for the car to."""
 
     def __init__(self) -> None:
-        import rclpy
         from nav_msgs.msg import Odometry
+        import rclpy
         from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import JointState, Joy
         self._joy = Joy
@@ -107,7 +108,7 @@ def plan_latency(folder: Path, game: list[str], duration_s: float) -> None:
             latency = values['latency_ms']
             good = values['accepted'] - (values.get('fallbacks') or 0)
             print(f'{f"request to plan, {planner} ({av_id})":34}{latency["p50"]:9.2f}'
-                  f'{latency["p99"]:9.2f}{latency["max"]:9.2f}  {"p99 " + wanted if wanted else "":21}'
+                  f'{latency["p99"]:9.2f}{latency["max"]:9.2f}  {wanted:21}'
                   f'  ({good} of {values["requests"]} requests answered by a real plan)',
                   flush=True)
 

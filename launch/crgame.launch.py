@@ -7,12 +7,13 @@ The graph for `ros2 launch crgame_ros crgame.launch.py`.
 start (those of the game), `bag:=FOLDER` where to record.
 """
 
-from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription
 
 
 def nodes(context: LaunchContext) -> list:

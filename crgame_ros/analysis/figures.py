@@ -84,7 +84,8 @@ class _View:
 
     def of(self, points: Array) -> Array:
         """Map points (N, 2) from map."""
-        return (points - self._origin) @ self._turn
+        mapped: Array = (points - self._origin) @ self._turn
+        return mapped
 
 
 def _footprint(axes: Axes, view: _View, description: ObjectDescription, center: Array,

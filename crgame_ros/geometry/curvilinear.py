@@ -3,8 +3,11 @@
 """The curvilinear coordinate frame along a reference path (CRG 1)."""
 
 from commonroad_clcs.pycrccosy import (
-    CartesianProjectionDomainError, CurvilinearCoordinateSystem,
-    CurvilinearProjectionDomainLateralError, CurvilinearProjectionDomainLongitudinalError)
+    CartesianProjectionDomainError,
+    CurvilinearCoordinateSystem,
+    CurvilinearProjectionDomainLateralError,
+    CurvilinearProjectionDomainLongitudinalError,
+)
 import numpy as np
 from numpy.typing import NDArray
 

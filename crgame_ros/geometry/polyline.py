@@ -89,11 +89,11 @@ class ReferencePath:
         :param s: (...) arc lengths, clipped to the path; NaN counts as 0 [m]
         :return: (..., 4) x [m], y [m], heading [rad] and curvature [1/m]
         """
-        position = np.clip(np.nan_to_num(s) / self.step, 0.0, len(self.heading) - 1.000001)
+        # fmax and fmin prefer a number to NaN.
+        position = np.fmin(np.fmax(s / self.step, 0.0), len(self.heading) - 1.000001)
         index = position.astype(np.intp)
-        fraction = (position - index)[..., None]
-        table = self._table
-        return np.asarray(table[index] * (1.0 - fraction) + table[index + 1] * fraction)
+        table, slope = self._table
+        return table.take(index, 0) + slope.take(index, 0) * (position - index)[..., None]
 
     def project(self, points: Array, first: float = -math.inf,
                 last: float = math.inf) -> tuple[Array, Array]:
@@ -130,7 +130,7 @@ class ReferencePath:
         s = np.asarray(guess, dtype=np.float64)
         lateral = np.zeros_like(s)
         for remaining in range(iterations, -1, -1):
-            inside = np.clip(s, 0.0, self.length)
+            inside = np.minimum(np.maximum(s, 0.0), self.length)
             pose = self.pose_at(inside)
             cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
             dx, dy = points[:, 0] - pose[:, 0], points[:, 1] - pose[:, 1]
@@ -141,8 +141,10 @@ class ReferencePath:
         return np.where(absent, np.nan, s), np.where(absent, np.nan, lateral)
 
     @functools.cached_property
-    def _table(self) -> Array:
-        return np.column_stack((self.points, self.heading, self.curvature))
+    def _table(self) -> tuple[Array, Array]:
+        """Give the samples and the differences to the next ones."""
+        table = np.column_stack((self.points, self.heading, self.curvature))
+        return table, np.diff(table, axis=0)
 
 
 def arc_length(points: Array) -> Array:

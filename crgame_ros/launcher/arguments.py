@@ -70,20 +70,20 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add = parser.add_argument
     add('game', nargs='?', type=Path, metavar='GAME.yaml', help='game file (scenarios/*.yaml)')
     add('--scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
-    add('--driver', metavar='SOURCE', help='who drives the first human\'s vehicle')
+    add('--driver', metavar='SOURCE', help="who drives the first human's vehicle")
     add('--planner', action='append', default=[], metavar='NAME', dest='planners',
         help='planner of the AVs; give it again for the next AV')
     add('--duration', type=_positive, metavar='S', dest='duration_s',
-        help='end after so many simulated seconds (default: the game\'s, else Ctrl-C)')
+        help="end after so many simulated seconds (default: the game's, else Ctrl-C)")
     add('--rate', type=_positive, metavar='R', dest='rate_hz',
-        help='simulation rate in Hz (default: the game\'s, else 100)')
+        help="simulation rate in Hz (default: the game's, else 100)")
     add('--real-time-factor', type=_factor, default=1.0, metavar='F',
         help='simulated seconds per second, 0.1 to 10 (default: 1)')
     add('--headless', action='store_true', help='no display')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--out', type=Path, metavar='DIR',
-        help='folder for this run\'s files (default: runs/<time>_<scenario>)')
+        help="folder for this run's files (default: runs/<time>_<scenario>)")
     return parser
 
 

@@ -3,6 +3,7 @@
 """The whole graph: nodes started, watched, restarted where that is safe, and ended in order."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 import selectors
 import signal
 import time
@@ -94,10 +95,15 @@ class Graph:
         """Pass the nodes' output on, each line with the node's name."""
         for key, _ in self._selector.select(timeout_s):
             node: NodeProcess = key.data
-            for line in node.read_lines():
-                self._say(f'[{node.spec.name:{self._width}}] {line}')
-            if node.exit_code() is not None:
+            # Asked first: what a node says last is then read before its pipe is given up.
+            ended = node.exit_code() is not None
+            self._pass_on(node)
+            if ended:
                 self._selector.unregister(node.output)
+
+    def _pass_on(self, node: NodeProcess) -> None:
+        for line in node.read_lines():
+            self._say(f'[{node.spec.name:{self._width}}] {line}')
 
     def _look_after(self, first: str) -> None:
         """Name a node that died, and start it again where that is safe."""
@@ -105,7 +111,7 @@ class Graph:
             code = node.exit_code()
             if name == first or code is None or self._restarts.get(name, 0) < 0:
                 continue
-            cause = f'signal {signal.Signals(-code).name}' if code < 0 else f'exit code {code}'
+            cause = cause_of_death(code)
             count = self._restarts.get(name, 0) + 1
             # Bad input stays bad: exit code 2 is not tried again.
             if not node.spec.restart or code == 2 or count > MAX_RESTARTS:
@@ -120,13 +126,15 @@ class Graph:
     def _forget(self, node: NodeProcess) -> None:
         if node.output in {key.fileobj for key in self._selector.get_map().values()}:
             self._selector.unregister(node.output)
-        for line in node.read_lines():
-            self._say(f'[{node.spec.name:{self._width}}] {line}')
+        self._pass_on(node)
         node.close()
 
     def _end(self, first: str) -> int:
         """End the simulation, let the recorder take the last messages in, end the others."""
         simulation = self._nodes[first]
+        died = simulation.exit_code()
+        if died:
+            self._say(f'{first} died ({cause_of_death(died)}); ending the others')
         simulation.interrupt()
         self._wait_for([simulation])
         until_s = time.monotonic() + DRAIN_S
@@ -154,10 +162,16 @@ class Graph:
         self._relay(0.0)
 
 
+def cause_of_death(code: int) -> str:
+    """Say how a process ended, from its exit code."""
+    return f'signal {signal.Signals(-code).name}' if code < 0 else f'exit code {code}'
+
+
 def restarted(spec: NodeSpec, count: int) -> NodeSpec:
     """Give the spec of a node that is started again: a recorder continues in a new folder."""
     if spec.executable != 'recorder_node':
         return spec
-    folder = spec.parameters['directory'].strip('"').partition('_part')[0]
-    parameters = spec.parameters | {'directory': f'"{folder}_part{count + 1}"'}
+    folder = Path(spec.parameters['directory'].strip('"'))
+    name = f'{folder.name.partition("_part")[0]}_part{count + 1}'
+    parameters = spec.parameters | {'directory': f'"{folder.with_name(name)}"'}
     return NodeSpec(spec.executable, spec.name, parameters, spec.nice, spec.restart)

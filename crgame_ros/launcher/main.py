@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command behind `run.sh`: check, run, and turn the recording into a scenario."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 import os
 import sys
 
@@ -65,12 +66,15 @@ def finish(plan: RunPlan) -> int:
         say('nothing was recorded: the run ended before its first step')
         return 1
     code = 0
-    for step in (lambda: recover(plan.bag),
-                 lambda: write_timing_report(plan.bag, plan.folder / 'timing.json'),
-                 lambda: convert(plan.bag, plan.folder)):
+    # A reset begins another bag, a recorder that was started again too.
+    bags = sorted(path for path in plan.folder.glob(f'{plan.bag.name}*') if path.is_dir())
+    steps: list[Callable[[], object]] = [partial(recover, bag) for bag in bags]
+    steps += [lambda: write_timing_report(plan.bag, plan.folder / 'timing.json'),
+              lambda: convert(plan.bag, plan.folder)]
+    for step in steps:
         try:
             step()
-        except CrgameError as error:
+        except (CrgameError, OSError) as error:
             say(f'error: {error}')
             code = 1
     for path in sorted(plan.folder.iterdir()):

@@ -89,7 +89,8 @@ class NodeProcess:
     def interrupt(self) -> None:
         """Ask the node to end."""
         if self.exit_code() is None:
-            self._process.send_signal(signal.SIGINT)
+            # To a process that is still importing, SIGINT would mean a traceback.
+            self._process.send_signal(signal.SIGTERM)
 
     def kill(self) -> None:
         """End the node at once."""

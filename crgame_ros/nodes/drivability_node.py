@@ -22,7 +22,10 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.documents import (
-    GameDocument, parse_game_document, parse_objects_document)
+    GameDocument,
+    parse_game_document,
+    parse_objects_document,
+)
 from crgame_ros.simulation.setup import scenario_digest
 
 PERIOD_S = 0.005

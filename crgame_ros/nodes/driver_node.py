@@ -9,6 +9,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
@@ -38,9 +39,9 @@ class DriverNode(Node):
         super().__init__('driver_node')
         declare = self.declare_parameter
         self._vehicle_id: str = declare('vehicle', 'hv0', ParameterDescriptor(
-            description='id of the human\'s vehicle', read_only=True)).value
+            description="id of the human's vehicle", read_only=True)).value
         self._choice: str = declare('source', '', ParameterDescriptor(
-            description='driver source instead of the game\'s: auto, idle, evdev[:NAME], '
+            description="driver source instead of the game's: auto, idle, evdev[:NAME], "
             'keys:FILE, joy:FILE, joy, replay:BAG', read_only=True)).value
         self._joy_map: str = declare('joy_map', 'generic_gamepad', ParameterDescriptor(
             description='device map for the messages of an external joy node',
@@ -61,7 +62,7 @@ class DriverNode(Node):
         self._running = True
         self._kept = [endpoints.subscription('/scenario/game', self._on_game),
                       endpoints.subscription('/clock', self._on_clock)]
-        self._joy_subscription = None
+        self._joy_subscription: Subscription | None = None
         self._endpoints = endpoints
 
     def run(self, stop: StopFlag) -> None:

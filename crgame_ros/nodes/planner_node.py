@@ -9,8 +9,8 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
-from rclpy.node import Node
 from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
 from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
 
@@ -27,7 +27,10 @@ from crgame_ros.ros.spinning import spin
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.simulation.documents import (
-    GameDocument, parse_game_document, parse_objects_document)
+    GameDocument,
+    parse_game_document,
+    parse_objects_document,
+)
 from crgame_ros.simulation.setup import scenario_digest
 from crgame_ros.vehicle.parameters import VehicleParameters
 
@@ -105,8 +108,8 @@ class PlannerNode(Node):
         problem = next((problem for problem in loaded.planning_problems
                         if problem.planning_problem_id == entry['planning_problem']), None)
         if problem is None:
-            raise InputError(f'planning problem {entry["planning_problem"]} is not in the scenario',
-                             '/scenario/game')
+            raise InputError(f'planning problem {entry["planning_problem"]} is not in it',
+                             '/scenario/xml')
         name = self._choice or entry['planner']
         options = {} if self._choice and self._choice != entry['planner'] else entry['options']
         adapter = PlannerAdapter(create_planner(name, options), time.perf_counter)

@@ -47,6 +47,7 @@ class SimNode(Node):
             if outcome is not Outcome.RESET:
                 return
             self._control.reset_wanted = False
+            self._control.steps_wanted = 0
             setup = self._next_setup(setup)
             epoch += 1
             offset_ns = (now_ns // NS_PER_S + 2) * NS_PER_S
@@ -54,7 +55,7 @@ class SimNode(Node):
     def _next_setup(self, present: Setup) -> Setup:
         """Load what the parameters name now; keep the present game if that is unusable."""
         try:
-            return self._told(build_setup(self._control.next_game()))
+            return self._told(build_setup(self._control.next_game(present.game)))
         except CrgameError as error:
             self.get_logger().error(f'{error}; the present game starts again')
             return present

@@ -46,8 +46,7 @@ from commonroad_idm_planner.idm_path import IDMPathFactory  # noqa: E402
 from commonroad_idm_planner.idm_planner import IDMPlanner  # noqa: E402
 from commonroad_idm_planner.idm_state import IDMState  # noqa: E402
 from commonroad_idm_planner.idm_trajectory import IDMTrajectory  # noqa: E402
-from commonroad_idm_planner.util.closest_obstacle import (  # noqa: E402
-    get_closest_obstacle_front_on_idm_path)
+from commonroad_idm_planner.util.closest_obstacle import get_closest_obstacle_front_on_idm_path  # noqa: E402
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
@@ -57,8 +56,7 @@ from crgame_ros.planner.obstacles import Corridor, ObstacleProjector, prolong  #
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
 from crgame_ros.planner.path_planner import check_positive, PathPlanner  # noqa: E402
 from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
-from crgame_ros.planner.speed_profile import (  # noqa: E402
-    admissible_speeds, default_speed, desired_speeds)
+from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds  # noqa: E402
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
 
 Array = NDArray[np.float64]
@@ -235,7 +233,7 @@ def _dynamic_obstacle(number: int, shape: Shape, k: int, poses: Array,
         body = Rectangle(shape.length, shape.width)
     if shape.kind != 'rectangle':
         # The package reads the length, which only rectangles have.
-        body.length = shape.length  # type: ignore[union-attr]
+        body.length = shape.length
     yaws = np.arctan2(np.sin(poses[:, 2]), np.cos(poses[:, 2]))
     states = [KSState(time_step=k + i, position=poses[i, :2], orientation=float(yaws[i]),
                       velocity=float(np.nan_to_num(speeds[i])), steering_angle=0.0)

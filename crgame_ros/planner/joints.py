@@ -86,7 +86,8 @@ def vehicles_from_joints(
     states[..., StateColumn.X:StateColumn.YAW + 1] = positions[..., :3]
     states[..., StateColumn.SPEED] = velocities[..., 0] * cos + velocities[..., 1] * sin
     states[..., StateColumn.STEERING_ANGLE] = positions[..., 3]
-    states[..., StateColumn.ACCELERATION] = accelerations[..., 0] * cos + accelerations[..., 1] * sin
+    states[..., StateColumn.ACCELERATION] = (
+        accelerations[..., 0] * cos + accelerations[..., 1] * sin)
     states[..., StateColumn.YAW_RATE] = velocities[..., 2]
     states[..., StateColumn.STEERING_RATE] = velocities[..., 3]
     return states

@@ -189,7 +189,7 @@ def _project_tracks(path: ReferencePath, corridor: Corridor,
     fraction = (position - index)[:, None]
     after = np.minimum(index + 1, len(anchors) - 1)
     guess = found[index] * (1.0 - fraction) + found[after] * fraction
-    s, d = path.refine(poses[..., :2].reshape(-1, 2), guess.reshape(-1), 2)
+    s, d = path.refine(poses[..., :2].reshape(-1, 2), guess.reshape(-1), 1)
     return s.reshape(steps, count), d.reshape(steps, count)
 
 

@@ -115,11 +115,10 @@ class PathFollower:
         x, y, yaw, speed, steering = ego[:5]
         states = np.empty((steps + 1, STATE_WIDTH))
         states[0] = ego
-        position = start
+        position, moved = start, 0.0
         for i in range(steps):
             if i:
-                guess = position.s + moved
-                position = self.locate(x, y, yaw, guess)
+                position = self.locate(x, y, yaw, position.s + moved)
             wanted = longitudinal(i, position.s, speed)
             # A vehicle that brakes to a stop inside the step stands for the rest of it.
             moving = dt_s

@@ -9,7 +9,11 @@ import numpy as np
 from crgame_ros.errors import InputError
 from crgame_ros.planner.interface import PlanRequest
 from crgame_ros.planner.joints import (
-    JointSeries, object_joint_names, vehicle_joint_names, vehicles_from_joints)
+    JointSeries,
+    object_joint_names,
+    vehicle_joint_names,
+    vehicles_from_joints,
+)
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.state import VehicleState

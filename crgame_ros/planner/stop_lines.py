@@ -89,7 +89,7 @@ def _find(scenario: Scenario, driving: DrivingPath) -> tuple[StopLine, ...]:
         lanelet = network.find_lanelet_by_id(lanelet_id)
         line = lanelet.stop_line
         lights = set(lanelet.traffic_lights)
-        signs = set()
+        signs: set[int] = set()
         s = float(last)
         if line is not None:
             lights |= line.traffic_light_ref or set()

@@ -12,7 +12,12 @@ from crgame_ros.errors import InputError
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.simulation.documents import (
-    GAME_TOPIC, GameDocument, OBJECTS_TOPIC, parse_game_document, parse_objects_document)
+    GAME_TOPIC,
+    GameDocument,
+    OBJECTS_TOPIC,
+    parse_game_document,
+    parse_objects_document,
+)
 
 XML_TOPIC = '/scenario/xml'
 _STRING = 'std_msgs/msg/String'
@@ -37,7 +42,8 @@ class Epoch:
     :param xml_text: its scenario.
     :param descriptions: what could appear in it.
     :param from_log_ns: messages logged earlier belong to the run before, None where stamps say.
-    :param until_stamp_ns: clock offset of the next run, None where there is none or it doesn't say.
+    :param until_stamp_ns: clock offset of the next run, None where there is none or log times
+        decide.
     :param until_log_ns: messages logged from then on belong to the next run, None as above.
     """
 

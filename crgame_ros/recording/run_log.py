@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.errors import InputError
-from crgame_ros.planner.joints import (
-    object_joint_names, vehicle_joint_names, vehicles_from_joints)
+from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicles_from_joints
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.scenario.objects import ObjectDescription
@@ -101,7 +100,8 @@ def read_run_log(path: Path, epoch: int | None = None) -> RunLog:
             if found is not None and found.type_name != _TRAJECTORY:
                 raise InputError(f'{topic} is a {found.type_name}', str(path),
                                  'give a recording of crgame_ros')
-        points = _read_points(reader, run, {VEHICLES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects})
+        points = _read_points(reader, run,
+                              {VEHICLES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects})
         notices = list(reader.notices)
     ticks = _usable_ticks(points, bool(objects), run, path, notices)
     states = np.array([points[VEHICLES_TOPIC][tick] for tick in ticks])

@@ -53,4 +53,5 @@ class LiveDiagnostics:
             self._outputs.publish_diagnostics(
                 f'{human.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
                 'driver lost' if seat.lost else 'driven',
-                {'losses': seat.losses, 'malformed': seat.malformed}, stamp_ns)
+                {'losses': seat.losses, 'malformed': seat.malformed,
+                 'outdated': seat.outdated}, stamp_ns)

@@ -9,7 +9,14 @@ from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.evdev_device import open_evdev
 from crgame_ros.driver.replay import ReplayDriver
 from crgame_ros.driver.source import (
-    DriverSource, EvdevDriver, IdleDriver, JoyDriver, load_timeline, parse_source, ScriptedDriver)
+    DriverSource,
+    EvdevDriver,
+    IdleDriver,
+    JoyDriver,
+    load_timeline,
+    parse_source,
+    ScriptedDriver,
+)
 from crgame_ros.errors import InputError
 
 

@@ -57,7 +57,7 @@ class LiveRun:
         self._control = control
         self._epoch = epoch
         self._outputs = SimOutputs(node, setup)
-        self._inputs = SimInputs(node, setup)
+        self._inputs = SimInputs(node, setup, clock_offset_ns)
         self.simulation = Simulation(setup, clock_offset_ns)
         scheduler = self.simulation.scheduler
         self._dt_s = scheduler.dt_s
@@ -69,6 +69,7 @@ class LiveRun:
         self._second = max(1, round(1.0 / self._dt_s))
         self._setup = setup
         self._sleep_from_ns = 0
+        self._stepped = 0
         self._stop = StopFlag()
 
     def run(self, stop: StopFlag) -> Outcome:
@@ -115,7 +116,7 @@ class LiveRun:
         unanswered = set(result.requests)
         connected = False
         resend_ns = 0
-        while not connected or unanswered or self._control.paused:
+        while not connected or unanswered or self._stands_still():
             self._executor.spin_once(timeout_sec=0.005)
             outcome = self._ordered_end()
             if outcome is not None:
@@ -167,7 +168,7 @@ class LiveRun:
 
     def _loop(self) -> Outcome:
         while self.simulation.n != self._last_n:
-            if self._control.paused and not self._control.steps_wanted:
+            if self._stands_still():
                 self._stay_paused()
             outcome = self._ordered_end()
             if outcome is not None:
@@ -175,14 +176,29 @@ class LiveRun:
             if self._control.real_time_factor != self._controller.real_time_factor:
                 self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
             self._wait()
-            self._cycle()
+            # A pause ordered while waiting holds from this very step on.
+            if not self._stands_still():
+                self._cycle()
         return Outcome.FINISHED
+
+    def _stands_still(self) -> bool:
+        return self._control.paused and not self._control.steps_wanted
+
+    def _count_single_steps(self) -> None:
+        """Count down the scenario steps that were ordered during a pause: N steps each."""
+        control = self._control
+        if not (control.paused and control.steps_wanted):
+            control.steps_wanted = self._stepped = 0
+            return
+        self._stepped += 1
+        if self._stepped == self.simulation.scheduler.steps_per_tick:
+            self._stepped = 0
+            control.steps_wanted -= 1
 
     def _stay_paused(self) -> None:
         """Serve orders while everything else stands still."""
         self._outputs.publish_rows()
-        control = self._control
-        while control.paused and not control.steps_wanted and self._ordered_end() is None:
+        while self._stands_still() and self._ordered_end() is None:
             self._executor.spin_once(timeout_sec=0.02)
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)
@@ -215,6 +231,7 @@ class LiveRun:
         outputs.publish_step(simulation, result)
         if result.tick:
             self._at_tick(result)
+        self._count_single_steps()
         if outputs.rows.full:
             outputs.publish_rows()
         busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S
@@ -238,7 +255,5 @@ class LiveRun:
             self._node.get_logger().warning(
                 f'{vehicle_id} violates drivability (n = {n}): stopping at n = {result.n}')
             self._control.stop_wanted = True
-        if self._control.steps_wanted:
-            self._control.steps_wanted -= 1
         if result.n % self._second < self.simulation.scheduler.steps_per_tick:
             self._diagnostics.publish(result.n)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The services and parameters by which people steer sim_node."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ class SimControl:
             floating_point_range=[FloatingPointRange(
                 from_value=MIN_REAL_TIME_FACTOR, to_value=MAX_REAL_TIME_FACTOR)]))
         declare('duration', 0.0, ParameterDescriptor(
-            description='simulated seconds until the run ends; 0 takes the game\'s',
+            description="simulated seconds until the run ends; 0 takes the game's",
             read_only=True))
         declare('start_paused', False, ParameterDescriptor(
             description='wait for /sim/start', read_only=True))
@@ -115,14 +116,21 @@ class SimControl:
         """
         return self._game(self._value(self._chosen))
 
-    def next_game(self) -> Game:
+    def next_game(self, present: Game) -> Game:
         """
         Load the game that the parameters name now, for a reset.
 
+        :param present: a new scenario keeps its humans with their drivers, and its rules.
         :raises InputError: if it cannot be used or lies outside the configured directories.
         """
         name = self._value(self._chosen)
-        return self._game(str(self._allowed(name)) if name else '')
+        if self._chosen != 'scenario' or not name:
+            return self._game(str(self._allowed(name)) if name else '')
+        path = self._allowed(name)
+        if path.samefile(present.scenario):
+            return present
+        humans = tuple(replace(human, spawn=None) for human in present.humans)
+        return replace(present, scenario=path, title='', humans=humans, avs=None)
 
     def _game(self, path: str) -> Game:
         if not path:

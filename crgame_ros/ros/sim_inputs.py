@@ -9,7 +9,7 @@ from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
 from crgame_ros.planner.joints import JointSeries
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.messages import from_joint_trajectory, from_joy
+from crgame_ros.ros.messages import from_joint_trajectory, from_joy, from_time
 from crgame_ros.simulation.setup import Setup
 
 NS = 1e-9
@@ -20,15 +20,18 @@ class Seat:
     One human's seat: the latest command and how old it is on the steady clock.
 
     :param commands: where the commands come from.
+    :param clock_offset_ns: simulation time of step 0; older commands are of a run before [ns]
     """
 
-    def __init__(self, human_id: str, commands: PolledSubscription) -> None:
+    def __init__(self, human_id: str, commands: PolledSubscription, clock_offset_ns: int) -> None:
         self._where = f'/{human_id}/driver_command'
         self._commands = commands
         self._watchdog = SeatWatchdog()
         self._last = RELEASED
         self._heard_ns: int | None = None
+        self._clock_offset_ns = clock_offset_ns
         self.malformed = 0
+        self.outdated = 0
 
     @property
     def losses(self) -> int:
@@ -48,7 +51,9 @@ class Seat:
     def command(self, now_ns: int, dt_s: float, speed: float) -> DriverCommand:
         """Give the command for this cycle; released, then gentle braking, after a loss."""
         message = self._commands.latest()
-        if message is not None:
+        if message is not None and from_time(message.header.stamp) < self._clock_offset_ns:
+            self.outdated += 1
+        elif message is not None:
             try:
                 self._last = from_joy(message, self._where)
                 self._heard_ns = now_ns
@@ -66,14 +71,16 @@ class SimInputs:
 
     :param node: owner of the subscriptions.
     :param setup: the run.
+    :param clock_offset_ns: simulation time of step 0 [ns]
     """
 
-    def __init__(self, node: Node, setup: Setup) -> None:
+    def __init__(self, node: Node, setup: Setup, clock_offset_ns: int) -> None:
         self._node = node
         endpoints = Endpoints(node)
         self._command_slots = {human.id: endpoints.polled('/<hv>/driver_command', human.id)
                                for human in setup.humans}
-        self.seats = [Seat(human, slot) for human, slot in self._command_slots.items()]
+        self.seats = [Seat(human, slot, clock_offset_ns)
+                      for human, slot in self._command_slots.items()]
         self._plans = {av.id: endpoints.polled('/<av>/plan', av.id) for av in setup.avs}
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._drivability = {}

@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 import json
 import math
+import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import AccelStamped
@@ -28,6 +29,7 @@ from crgame_ros.vehicle.state import VehicleState
 
 # Rate to which /clock and the states are thinned above it [Hz].
 PUBLISHING_RATE = 100.0
+# For all acknowledgements together: a process that is stopped never gives one.
 ACKNOWLEDGE_S = 2.0
 
 
@@ -202,8 +204,10 @@ class SimOutputs:
 
     def wait_until_received(self) -> None:
         """Wait for the subscribers to acknowledge what was published, with a limit."""
+        until_s = time.monotonic() + ACKNOWLEDGE_S
         for publisher in (self._cycle, self._state, self._objects, self._diagnostics):
-            publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_S))
+            left_s = max(0.0, until_s - time.monotonic())
+            publisher.wait_for_all_acked(Duration(seconds=left_s))
 
     def destroy(self) -> None:
         """Release the publishers, for a game with other vehicles."""

@@ -79,7 +79,8 @@ def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequ
             f'<trajectory>\n<state>{trajectory}</state>\n</trajectory></dynamicObstacle>\n')
 
 
-def phantom_obstacle(number: int, shape: Shape, first: int, poses: Iterable[Sequence[float]]) -> str:
+def phantom_obstacle(number: int, shape: Shape, first: int,
+                     poses: Iterable[Sequence[float]]) -> str:
     """
     Write where something is at consecutive time steps, which need not begin with 0.
 

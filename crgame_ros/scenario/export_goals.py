@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.export_elements import (
-    commonroad_shape, goal_state, interval_bounds, lanelet_references, placed_rectangle)
+    commonroad_shape,
+    goal_state,
+    interval_bounds,
+    lanelet_references,
+    placed_rectangle,
+)
 
 # The place where a vehicle ended reaches so far beyond it [m], along and across.
 _MARGIN = (5.0, 1.0)

@@ -8,7 +8,12 @@ from importlib import resources
 import warnings
 
 from commonroad.common.writer.file_writer_xml import (
-    IntersectionXMLNode, LaneletXMLNode, LocationXMLNode, TrafficLightXMLNode, TrafficSignXMLNode)
+    IntersectionXMLNode,
+    LaneletXMLNode,
+    LocationXMLNode,
+    TrafficLightXMLNode,
+    TrafficSignXMLNode,
+)
 from commonroad.scenario.scenario import Location
 from lxml import etree
 

@@ -16,7 +16,15 @@ import yaml
 
 from crgame_ros.errors import InputError
 from crgame_ros.scenario.game import (
-    AvSpec, DrivabilitySpec, Game, HumanSpec, LaneletSpawn, PoseSpawn, PredictionSpec, TimingSpec)
+    AvSpec,
+    DrivabilitySpec,
+    Game,
+    HumanSpec,
+    LaneletSpawn,
+    PoseSpawn,
+    PredictionSpec,
+    TimingSpec,
+)
 
 T = TypeVar('T')
 MAX_BYTES = 1 << 20
@@ -116,7 +124,8 @@ def _vehicles(values: Any, group: str, where: str,
             table['spawn'] = build(kind, table['spawn'], f'{place}: spawn')
         elif table.get('spawn') == 'auto':
             table.pop('spawn')
-        spec: HumanSpec | AvSpec = build(HumanSpec if group == 'humans' else AvSpec, table, place)
+        kind_of: type[HumanSpec | AvSpec] = HumanSpec if group == 'humans' else AvSpec
+        spec = build(kind_of, table, place)
         if not re.fullmatch(PREFIX[group] + r'\d{1,3}', spec.id):
             raise InputError(f'"{spec.id}" is no id', place,
                              f'use {PREFIX[group]}0, {PREFIX[group]}1, …')

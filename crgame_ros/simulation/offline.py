@@ -132,6 +132,7 @@ def run_offline(
              for index in range(len(setup.avs))]
     trace = _Trace(setup, steps, check_drivability)
     dt_s = simulation.scheduler.dt_s
+    intervals: list[float] = [] if intervals_s is None else intervals_s.tolist()
     result = simulation.begin()
     for _ in range(steps):
         for seat in seats:
@@ -140,8 +141,7 @@ def run_offline(
             seat.deliver()
         trace.add(simulation, result)
         commands = [hand.command(simulation.n, dt_s) for hand in hands]
-        recorded = intervals_s is not None and simulation.n < len(intervals_s)
-        effective_s = float(intervals_s[simulation.n]) if recorded else dt_s
+        effective_s = intervals[simulation.n] if simulation.n < len(intervals) else dt_s
         result = simulation.step(effective_s, commands)
     trace.add(simulation, result)
     return OfflineResult(
@@ -173,7 +173,7 @@ class _Trace:
             setup.loaded.scenario.lanelet_network, setup.game.drivability) if check else None
         if self._monitor is not None:
             self._monitor.prepare(np.array([
-                vehicle.state for vehicle in (*setup.humans, *setup.avs)]))
+                vehicle.state for vehicle in setup.vehicles]))
 
     def add(self, simulation: Simulation, result: StepResult) -> None:
         n = simulation.n

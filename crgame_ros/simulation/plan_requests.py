@@ -6,9 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.planner.joints import (
-    JointSeries, object_joint_names, vehicle_joint_names, vehicle_to_joints)
+    JointSeries,
+    object_joint_names,
+    vehicle_joint_names,
+    vehicle_to_joints,
+)
 from crgame_ros.scenario.prediction import (
-    LanePrediction, predict_constant_steering, recorded_future)
+    LanePrediction,
+    predict_constant_steering,
+    recorded_future,
+)
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.setup import AvSetup, Setup
 from crgame_ros.vehicle.state import StateColumn, VehicleState
@@ -43,8 +50,7 @@ class PlanRequests:
         self._time_step_s = setup.scheduler.time_step_s
         self.points = max(1, round(setup.game.prediction.horizon / self._time_step_s)) + 1
         self._times_ns = np.arange(self.points, dtype=np.int64) * setup.scheduler.time_step_ns
-        vehicles = (*setup.humans, *setup.avs)
-        self._wheelbases = np.array([vehicle.vehicle.wheelbase for vehicle in vehicles])
+        self._wheelbases = np.array([item.vehicle.wheelbase for item in setup.vehicles])
         self._lane_prediction = LanePrediction(setup.obstacles, setup.network)
         object_names = [name for description in setup.obstacles.descriptions
                         for name in object_joint_names(description.id)]

@@ -87,9 +87,14 @@ class Setup:
     scheduler: ScenarioScheduler
 
     @property
+    def vehicles(self) -> tuple['HumanSetup | AvSetup', ...]:
+        """The driven vehicles: humans, then AVs."""
+        return (*self.humans, *self.avs)
+
+    @property
     def vehicle_ids(self) -> tuple[str, ...]:
         """Ids of the driven vehicles: humans, then AVs."""
-        return tuple(vehicle.id for vehicle in (*self.humans, *self.avs))
+        return tuple(vehicle.id for vehicle in self.vehicles)
 
     @property
     def vehicle_descriptions(self) -> tuple[ObjectDescription, ...]:
@@ -97,8 +102,9 @@ class Setup:
         return tuple(
             ObjectDescription(vehicle.id, 'car', role, vehicle.vehicle.shape,
                               vehicle.vehicle.rear_to_center)
-            for role, group in ((Role.HUMAN, self.humans), (Role.AUTONOMOUS, self.avs))
-            for vehicle in group)
+            for vehicle, role in zip(
+                self.vehicles, [Role.HUMAN] * len(self.humans)
+                + [Role.AUTONOMOUS] * len(self.avs), strict=True))
 
     @property
     def descriptions(self) -> tuple[ObjectDescription, ...]:
@@ -142,7 +148,7 @@ def _place_avs(
         specs = tuple(AvSpec(f'av{index}') for index in range(len(problems)))
     named = {spec.planning_problem for spec in specs}
     free = [number for number in problems if number not in named]
-    avs = []
+    avs: list[AvSetup] = []
     for spec in specs:
         where = f'{loaded.source}: {spec.id}'
         number = spec.planning_problem

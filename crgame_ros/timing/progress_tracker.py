@@ -11,7 +11,7 @@ from crgame_ros.geometry.angles import interpolate_angle
 from crgame_ros.vehicle.state import StateColumn, VehicleState
 
 # Further apart than this, the plan's state for now and the vehicle are not the same motion (an
-# overdue plan met a vehicle that had meanwhile braked) and the plan is entered at the nearest point.
+# overdue plan met a vehicle that had meanwhile braked): the plan is entered at the nearest point.
 REALIGN_DISTANCE = 0.5
 
 

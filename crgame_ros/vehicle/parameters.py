@@ -71,7 +71,9 @@ def load_vehicle_parameters(name: str = DEFAULT_VEHICLE) -> VehicleParameters:
     :param name: a name in `config/vehicles/`, or the path of a YAML file.
     :raises InputError: if the file is missing or a value is missing, unknown or no number.
     """
-    path = Path(name) if name.endswith('.yaml') else config_directory() / 'vehicles' / f'{name}.yaml'
+    path = config_directory() / 'vehicles' / f'{name}.yaml'
+    if name.endswith('.yaml'):
+        path = Path(name)
     try:
         values = yaml.safe_load(path.read_text(encoding='utf-8'))
     except OSError as error:

@@ -61,7 +61,7 @@ def test_unusable_names_are_refused(name: str, message: str) -> None:
 
 @pytest.mark.parametrize(('options', 'message'), [
     ({'speed': 3.0}, '"speed" is unknown; allowed are: v0, time_headway'),
-    ({'v0': 'fast'}, '''"v0" is 'fast'; give float or None'''),
+    ({'v0': 'fast'}, "\"v0\" is 'fast'; give float or None"),
     ({'s0': True}, '"s0" is True; give float'),
     ({'a': float('nan')}, '"a" is nan'),
     ({'a': -1.0}, '"a" is -1.0; give a positive number'),

@@ -5,9 +5,12 @@
 from commonroad.scenario.lanelet import LineMarking, StopLine
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.traffic_light import (
-    TrafficLight, TrafficLightCycle, TrafficLightCycleElement, TrafficLightState)
-from commonroad.scenario.traffic_sign import (
-    TrafficSign, TrafficSignElement, TrafficSignIDGermany)
+    TrafficLight,
+    TrafficLightCycle,
+    TrafficLightCycleElement,
+    TrafficLightState,
+)
+from commonroad.scenario.traffic_sign import TrafficSign, TrafficSignElement, TrafficSignIDGermany
 import numpy as np
 import planner_support as support
 import pytest
