@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import json
 import os
 from pathlib import Path
+import re
 import signal
 import subprocess
 import sys
@@ -39,6 +40,17 @@ class LiveGraph:
             [sys.executable, '-m', 'crgame_ros.launcher.main', '--headless', '--out', str(folder),
              *arguments], stdout=self._stream, stderr=subprocess.STDOUT, env=environment,
             start_new_session=True)
+
+    @property
+    def running(self) -> bool:
+        """Whether the launcher has not ended."""
+        return self._process.poll() is None
+
+    def node_pids(self) -> dict[str, int]:
+        """Give the process ids that the launcher has told, by node."""
+        text = self._log.read_text(encoding='utf-8', errors='replace')
+        return {name: int(pid) for name, pid in re.findall(
+            r'^(\S+): process (\d+)$', text, re.MULTILINE)}
 
     def wait(self) -> dict[str, Any]:
         """Wait for the end of the run and give its timing report."""

@@ -24,23 +24,21 @@ class ExternalPlanner(Node):
 
     def __init__(self) -> None:
         super().__init__('external_planner')
-        self.av = self.declare_parameter('vehicle', 'av0').value
+        self.av, self.lanes, self.desired = self.declare_parameter('vehicle', 'av0').value, {}, 8.0
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.create_subscription(String, '/scenario/xml', self.on_scenario, latched)
-        self.plans = self.create_publisher(JointTrajectory, f'/{self.av}/plan', 1)
         self.create_subscription(JointTrajectory, f'/{self.av}/plan_request', self.on_request, 1)
-        self.lanes, self.desired = [], 8.0
+        self.plans = self.create_publisher(JointTrajectory, f'/{self.av}/plan', 1)
 
     def on_scenario(self, message: String) -> None:
-        """Take the centre lines: a point every 2 m and the direction there."""
-        self.lanes, self.desired = [], 8.0
+        """Take the centre lines: the direction at points at most 2 m apart."""
+        self.lanes, self.desired = {}, 8.0
         for lanelet in ElementTree.fromstring(message.data).iterfind('lanelet'):
-            sides = [[complex(float(point.findtext('x')), float(point.findtext('y')))
-                      for point in lanelet.iterfind(f'{side}/point')]
-                     for side in ('leftBound', 'rightBound')]
-            for a, b in pairwise((left + right) / 2 for left, right in zip(*sides, strict=True)):
-                count = math.ceil(abs(b - a) / 2.0)
-                self.lanes += [(a + (b - a) * i / count, (b - a) / abs(b - a)) for i in range(count)]
+            bounds = map(lanelet.findall, ('leftBound/point', 'rightBound/point'))
+            line = [sum(complex(*(float(p.findtext(axis)) for axis in 'xy')) for p in pair) / 2
+                    for pair in zip(*bounds, strict=True)]
+            self.lanes |= {a + (b - a) * i / n: (b - a) / abs(b - a) for a, b in pairwise(line)
+                           for n in [math.ceil(abs(b - a) / 2.0)] for i in range(n)}
 
     def on_request(self, request: JointTrajectory) -> None:
         """Answer with a plan on the time grid of the request."""
@@ -48,54 +46,40 @@ class ExternalPlanner(Node):
         own = names.index(f'{self.av}/x')
         at, (yaw, steering) = complex(*now.positions[own:own + 2]), now.positions[own + 2:own + 4]
         ahead, dt = cmath.rect(1.0, yaw), request.points[1].time_from_start.nanosec * 1e-9
-        others = [i for i, name in enumerate(names) if name.endswith('/x') and i != own
-                  and ((complex(*now.positions[i:i + 2]) - at) / ahead).real > 0.0]
         speed = (complex(*now.velocities[own:own + 2]) / ahead).real
         self.desired = max(self.desired, speed)
-        lanes = [lane for lane in self.lanes if abs(lane[0] - at) < 20.0 + 4.0 * speed]
+        near = [point for point in self.lanes if abs(point - at) < 20.0 + 4.0 * speed]
+        others = [i for i, name in enumerate(names) if name.endswith('/x') and i != own
+                  and ((complex(*now.positions[i:i + 2]) - at) / ahead).real > 0.0]
         plan = JointTrajectory(header=request.header, joint_names=names[own:own + 4])
         for point in request.points:
-            ahead = cmath.rect(1.0, yaw)
-            goal = at + (4.0 + 0.5 * speed) * ahead
-            goal, _ = min(lanes, default=(goal, ahead), key=lambda lane: (
-                abs(lane[0] - goal) + 5.0 * abs(lane[1] - ahead)))
-            curvature = 2.0 * ((goal - at) / ahead).imag / abs(goal - at) ** 2
-            rate = (math.atan(WHEELBASE * curvature) - steering) / dt
-            rate = max(-RATE, min(RATE, rate))
-            braking = 0.0
-            for i in others:
-                offset = (complex(*point.positions[i:i + 2]) - at) / ahead
-                if offset.real > 0.0 and abs(offset.imag - curvature * offset.real ** 2 / 2) < SIDE:
+            ahead, braking = cmath.rect(1.0, yaw), 0.0
+            aim = at + (4.0 + 0.5 * speed) * ahead
+            way = min(near, default=aim, key=lambda p: (
+                abs(p - aim) + 5.0 * abs(self.lanes[p] - ahead))) - at
+            curvature = 2.0 * (way / ahead).imag / max(1.0, abs(way)) ** 2
+            rate = max(-RATE, min(RATE, (math.atan(WHEELBASE * curvature) - steering) / dt))
+            for i in others:  # those that are in the way, as predicted for this moment
+                gap = (complex(*point.positions[i:i + 2]) - at) / ahead
+                if gap.real > 0.0 and abs(gap.imag - curvature * gap.real ** 2 / 2) < SIDE:
                     closing = speed - (complex(*point.velocities[i:i + 2]) / ahead).real
-                    wanted = speed * (HEADWAY + closing / (2.0 * math.sqrt(A * B)))
-                    gap = max(0.1, offset.real - BODY)
-                    braking = max(braking, (GAP + max(0.0, wanted)) / gap)
+                    wanted = GAP + max(0.0, speed * (HEADWAY + closing / math.sqrt(4 * A * B)))
+                    braking = max(braking, wanted / max(0.1, gap.real - BODY))
             desired = min(self.desired, math.sqrt(LATERAL / max(abs(curvature), 1e-6)))
-            acceleration = A * (1.0 - (speed / desired) ** 4 - braking ** 2)
-            acceleration = max(acceleration, -8.0, -speed / dt)
+            pull = max(A * (1.0 - (speed / desired) ** 4 - braking ** 2), -8.0, -speed / dt)
             turn = speed * math.tan(steering) / WHEELBASE
-            pull = (acceleration + 1j * speed * turn) * ahead
+            force = (pull + 1j * speed * turn) * ahead
             plan.points.append(JointTrajectoryPoint(
-                positions=[at.real, at.imag, yaw, steering],
+                positions=[at.real, at.imag, yaw, steering], time_from_start=point.time_from_start,
                 velocities=[speed * ahead.real, speed * ahead.imag, turn, rate],
-                accelerations=[pull.real, pull.imag, math.nan, math.nan],
-                time_from_start=point.time_from_start))
-            way, steering = (speed + acceleration * dt / 2) * dt, steering + rate * dt
-            bend = way * math.tan(steering) / WHEELBASE
-            at, yaw = at + cmath.rect(way, yaw + bend / 2), yaw + bend
-            speed += acceleration * dt
+                accelerations=[force.real, force.imag, math.nan, math.nan]))
+            at += cmath.rect((speed + pull * dt / 2) * dt, yaw + turn * dt / 2)
+            yaw, steering, speed = yaw + turn * dt, steering + rate * dt, speed + pull * dt
         self.plans.publish(plan)
 
 
-def main() -> None:
-    """Plan until Ctrl-C."""
-    rclpy.init()
-    node = ExternalPlanner()
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(node)
-    node.destroy_node()
-    rclpy.try_shutdown()
-
-
 if __name__ == '__main__':
-    main()
+    rclpy.init()
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(ExternalPlanner())
+    rclpy.try_shutdown()

@@ -74,7 +74,7 @@ class ReferencePath:
     @functools.cached_property
     def s(self) -> Array:
         """Arc length of every sample, (N) [m]."""
-        return self.step * np.arange(len(self.heading))
+        return self.step * np.arange(len(self.heading), dtype=np.float64)
 
     @functools.cached_property
     def rows(self) -> tuple[list[float], list[float], list[float], list[float]]:

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from crgame_ros.scenario.objects import ObjectDescription
 Array = NDArray[np.float64]
 
 ANCHORS = 5
+# Who is farther to the side than this at every anchor does not come near between them [m].
+ASIDE = 3.0
 CIRCLE_CORNERS = 8
 
 
@@ -96,30 +99,38 @@ class ObstacleProjector:
         """
         self._describe(request.obstacle_ids)
         poses, velocities = prolong(request, steps)
-        near = self._near(path, corridor, poses)
-        poses, velocities = poses[:, near], velocities[:, near]
-        if not len(near):
-            nothing = np.empty((steps, 0))
-            return PathObstacles((), nothing, nothing, nothing, nothing, nothing.astype(bool))
-        s, d = _project_tracks(path, corridor, poses)
+        near, s, d = self._tracks(path, corridor, poses)
         radius = self._radii[near]
         low, high = corridor.bounds(path, s)
         with np.errstate(invalid='ignore'):
             close = ((d - radius < high) & (d + radius > low)
                      & (s > corridor.s - 30.0) & (s < corridor.s + corridor.ahead + radius))
         kept = np.flatnonzero(close.any(axis=0))
-        near = near[kept]
-        extent = _extents(path, poses[:, kept], s[:, kept], self._outlines[near])
-        low, high = corridor.bounds(path, extent[0])
+        near, s = near[kept], s[:, kept]
+        rear, front, right, left = _extents(path, poses[:, near], s, self._outlines[near])
+        low, high = corridor.bounds(path, rear)
         with np.errstate(invalid='ignore'):
-            blocking = close[:, kept] & (extent[2] < high) & (extent[3] > low)
+            blocking = close[:, kept] & (right < high) & (left > low)
         hit = np.flatnonzero(blocking.any(axis=0))
-        heading = path.pose_at(s[:, kept[hit]])[..., 2]
-        velocity = velocities[:, kept[hit]]
+        heading = path.pose_at(s[:, hit])[..., 2]
+        velocity = velocities[:, near[hit]]
         speed = velocity[..., 0] * np.cos(heading) + velocity[..., 1] * np.sin(heading)
-        names = tuple(request.obstacle_ids[i] for i in near[hit])
-        return PathObstacles(names, extent[0][:, hit], extent[1][:, hit], s[:, kept[hit]],
-                             np.nan_to_num(speed), blocking[:, hit])
+        return PathObstacles(
+            tuple(request.obstacle_ids[i] for i in near[hit]), rear[:, hit], front[:, hit],
+            s[:, hit], np.nan_to_num(speed), blocking[:, hit])
+
+    def _tracks(self, path: ReferencePath, corridor: Corridor,
+                poses: Array) -> tuple[NDArray[np.intp], Array, Array]:
+        """Choose the obstacles that may come near; their columns and centres (s, d), (S, K)."""
+        near = self._near(path, corridor, poses)
+        anchors = np.unique(np.linspace(0, len(poses) - 1, ANCHORS).astype(np.intp))
+        found, aside = path.project(poses[anchors[:, None], near, :2], corridor.s - 30.0,
+                                    corridor.s + corridor.ahead + 40.0)
+        limit = self._radii[near] + corridor.half_width + abs(corridor.d) + ASIDE
+        with np.errstate(invalid='ignore'):
+            away = (aside > limit).all(axis=0) | (aside < -limit).all(axis=0)
+        kept = np.flatnonzero(~away)
+        return near[kept], *_project_tracks(path, poses[:, near[kept]], anchors, found[:, kept])
 
     def _describe(self, ids: tuple[str, ...]) -> None:
         if ids == self._ids:
@@ -177,13 +188,15 @@ def prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
             np.concatenate((velocities, np.repeat(velocities[-1:], steps - given, axis=0))))
 
 
-def _project_tracks(path: ReferencePath, corridor: Corridor,
-                    poses: Array) -> tuple[Array, Array]:
-    """Project centres (S, K, 3): searched at a few steps, refined in between."""
+def _project_tracks(path: ReferencePath, poses: Array, anchors: NDArray[np.intp],
+                    found: Array) -> tuple[Array, Array]:
+    """Project centres (S, K, 3), whose arc lengths are known at a few steps."""
     steps, count = poses.shape[:2]
-    anchors = np.unique(np.linspace(0, steps - 1, ANCHORS).astype(int))
-    found, _ = path.project(np.nan_to_num(poses[anchors, :, :2]), corridor.s - 30.0,
-                            corridor.s + corridor.ahead + 40.0)
+    # Where an object is absent at an anchor, the neighbouring anchor serves to start from.
+    found = found.copy()
+    for here, there in [*pairwise(range(len(anchors)))] + [*pairwise(range(len(anchors))[::-1])]:
+        found[there] = np.where(np.isnan(found[there]), found[here], found[there])
+    found = np.nan_to_num(found)
     position = np.interp(np.arange(steps), anchors, np.arange(len(anchors)))
     index = np.minimum(position.astype(int), max(len(anchors) - 2, 0))
     fraction = (position - index)[:, None]

@@ -16,10 +16,11 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, String
 
-from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
+from crgame_ros.planner.joints import (
+    JointSeries, object_joint_names, vehicle_joint_names, vehicle_to_joints)
 from crgame_ros.ros.contract import load_contract
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import MAP, set_time, StateMessage, to_joint_trajectory, to_time
+from crgame_ros.ros.messages import MAP, SeriesMessage, set_time, StateMessage, to_time
 from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.documents import game_document, objects_document
 from crgame_ros.simulation.engine import Simulation, StepResult
@@ -92,6 +93,7 @@ class SimOutputs:
         self._diagnostics = endpoints.publisher('/diagnostics')
         self._requests = {av.id: endpoints.publisher('/<av>/plan_request', av.id)
                           for av in setup.avs}
+        self._request_messages: dict[str, SeriesMessage] = {}
         self._vehicles = [VehicleOutputs(endpoints, vehicle) for vehicle in setup.vehicle_ids]
         self.frames_skipped = False
         self._lights = TrafficLights(setup.loaded.scenario)
@@ -131,7 +133,7 @@ class SimOutputs:
     def publish_step(self, simulation: Simulation, result: StepResult) -> None:
         """Publish a step: requests first, for planners have the least time to lose."""
         for av_id, request in result.requests.items():
-            self._requests[av_id].publish(to_joint_trajectory(request))
+            self._publish_request(av_id, request)
         due = result.n % self.publish_every == 0
         if not due and not result.tick:
             return
@@ -155,7 +157,14 @@ class SimOutputs:
 
     def resend(self, av_id: str, result: StepResult) -> None:
         """Send a request again to a planner that may not have been there the first time."""
-        self._requests[av_id].publish(to_joint_trajectory(result.requests[av_id]))
+        self._publish_request(av_id, result.requests[av_id])
+
+    def _publish_request(self, av_id: str, request: JointSeries) -> None:
+        message = self._request_messages.get(av_id)
+        if message is None:
+            message = SeriesMessage(request.names, request.times_ns)
+            self._request_messages[av_id] = message
+        self._requests[av_id].publish(message.fill(request))
 
     def _publish_states(self, states: list[VehicleState], stamp_ns: int) -> None:
         message = self._state_message

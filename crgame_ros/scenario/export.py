@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run as a CommonRoad 2020a scenario: what happened, on the grid of its time steps."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 import os
@@ -80,21 +81,13 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
     lanelets = {int(element.get('id')) for element in network if element.tag == 'lanelet'}
     problems = _problems(log, loaded, objects.vehicle_rows, problem_ids, lanelets, notices)
     header = _header(log, loaded, len(problem_ids), notices)
-    if author is not None:
-        header['author'] = author
-    if affiliation is not None:
-        header['affiliation'] = affiliation
+    for name, value in (('author', author), ('affiliation', affiliation), ('source', source),
+                        ('date', None if day is None else day.isoformat())):
+        if value is not None:
+            header[name] = value
     remark = f'{loaded.benchmark_id} {SOURCE_MARK}'
-    given = header['source'] if source is None else source
-    header['source'] = f'{given}; {remark}' if given else remark
-    if day is not None:
-        header['date'] = day.isoformat()
-    attributes = ' '.join(f'{name}={quoteattr(value)}' for name, value in header.items())
-    roads = ''.join(etree.tostring(element, encoding='unicode').rstrip() + '\n'
-                    for element in network)
-    text = (f"<?xml version='1.0' encoding='UTF-8'?>\n<commonRoad {attributes}>\n"
-            f'{roads}{objects.text()}{problems}</commonRoad>\n')
-    _refuse_invalid(text)
+    header['source'] = f'{header["source"]}; {remark}' if header['source'] else remark
+    text = _document(header, network, objects.text() + problems)
     return ExportedScenario(header['benchmarkID'], text, objects.ids, problem_ids, tuple(notices))
 
 
@@ -165,6 +158,9 @@ def _problems(log: RunLog, loaded: LoadedScenario, rows: NDArray[np.float64],
     text = ''
     for column, item in enumerate(log.vehicles):
         if item.id in own:
+            if own[item.id] not in known:
+                raise InputError(f'planning problem {own[item.id]} of {item.id} is not in it',
+                                 loaded.source, 'record the run again')
             goals = goals_of(known[own[item.id]], item.id, int(log.ks[0]), len(log.ks) - 1,
                              lanelets, notices)
         else:
@@ -174,12 +170,23 @@ def _problems(log: RunLog, loaded: LoadedScenario, rows: NDArray[np.float64],
     return text
 
 
-def _refuse_invalid(text: str) -> None:
-    """Refuse to write what the schema does not accept."""
+def _document(header: dict[str, str], network: Sequence[etree._Element], rest: str) -> str:
+    """
+    Put the file together.
+
+    :raises CrgameError: if the schema does not accept it.
+    """
+    attributes = ' '.join(f'{name}={quoteattr(value)}' for name, value in header.items())
+    roads = ''.join(etree.tostring(element, encoding='unicode').rstrip() + '\n'
+                    for element in network)
+    text = (f"<?xml version='1.0' encoding='UTF-8'?>\n<commonRoad {attributes}>\n"
+            f'{roads}{rest}</commonRoad>\n')
     try:
-        errors = schema_errors(etree.fromstring(text.encode('utf-8')))
+        errors = schema_errors(etree.fromstring(text.encode('utf-8'),
+                                                etree.XMLParser(huge_tree=True)))
     except etree.XMLSyntaxError as error:
         errors = [str(error)]
     if errors:
         raise CrgameError('the exported scenario would break the CommonRoad schema: '
                           + '; '.join(errors[:_ERRORS_TOLD]))
+    return text

@@ -83,7 +83,7 @@ class ObjectWriter:
         self._parts: dict[str, list[str]] = {group: [] for group in _GROUPS}
         self.vehicle_rows = _vehicle_rows(log)
         self.ids: dict[str, int] = {}
-        seen = np.isfinite(log.object_poses).all(axis=2).any(axis=0).tolist()
+        seen = [bool(there) for there in np.isfinite(log.object_poses).all(axis=2).any(axis=0)]
         for item in (item for item, there in zip(log.objects, seen, strict=True) if there):
             number = item.id.removeprefix('o')
             self.ids[item.id] = ids.keep(int(number), item.id) if number.isdecimal() \

@@ -210,3 +210,11 @@ def test_shared_scenarios_are_present() -> None:
 def test_options_must_be_positive(option: str) -> None:
     with pytest.raises(InputError, match=f'"{option}"'):
         IdmPlanner(**{option: -1.0})
+
+
+def test_sees_someone_who_appears_later(vehicle: VehicleParameters) -> None:
+    asked = support.request(ego(vehicle, 10.0), 0, ((32.0, 0.0, 0.0, 0.0),))
+    asked.obstacle_poses[:4] = math.nan
+    free = planner(10.0).plan(support.request(ego(vehicle, 10.0))).states
+    braked = planner(10.0).plan(asked).states
+    assert braked[-1, 3] < free[-1, 3] - 3.0

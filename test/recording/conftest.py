@@ -1,13 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to record, serialised by a library that is not under test."""
+"""Messages and whole runs to record, serialised by a library that is not under test."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.driver.replay import ReplayDriver
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
+from crgame_ros.recording.metadata import TopicQos
+from crgame_ros.recording.writer import BagWriter
+from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
+from crgame_ros.simulation.documents import game_document, objects_document
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.timing.cycle_rows import CycleRows
+from crgame_ros.timing.time_controller import Cycle
+from crgame_ros.vehicle.state import VehicleState
 
 TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 CYCLE_LABEL = 'epoch,n,k,e_n'
@@ -63,3 +81,135 @@ class Samples:
 def samples() -> Samples:
     """Return the maker of messages."""
     return Samples()
+
+
+class RunRecorder:
+    """
+    Makes recordings of offline runs: the messages that the graph would have published.
+
+    :ivar rows: of /timing/cycle, as the last `messages` wrote them.
+    """
+
+    def __init__(self, samples: Samples) -> None:
+        self._samples = samples
+        self.rows = np.empty((0, 0))
+
+    def stamped(self, stamp_ns: int) -> Any:
+        """Make a header."""
+        return self._samples.make('std_msgs/msg/Header', self._samples.make(
+            'builtin_interfaces/msg/Time', *divmod(stamp_ns, 1_000_000_000)), 'map')
+
+    def joints(self, stamp_ns: int, names: Sequence[str], *values: Any) -> bytes:
+        """Serialise a JointTrajectory of one point."""
+        point = self._samples.make(
+            'trajectory_msgs/msg/JointTrajectoryPoint',
+            *(np.array(row, dtype=np.float64).ravel() for row in values), np.zeros(0),
+            self._samples.make('builtin_interfaces/msg/Duration', 0, 0))
+        return self._samples.encode(TRAJECTORY, self.stamped(stamp_ns), list(names), [point])
+
+    def status(self, stamp_ns: int, name: str, message: str, level: int = 0,
+               **values: Any) -> bytes:
+        """Serialise a DiagnosticArray of one status."""
+        pairs = [self._samples.make('diagnostic_msgs/msg/KeyValue', key, str(value))
+                 for key, value in values.items()]
+        status = self._samples.make('diagnostic_msgs/msg/DiagnosticStatus', level, name, message,
+                                    '', pairs)
+        return self._samples.encode('diagnostic_msgs/msg/DiagnosticArray',
+                                    self.stamped(stamp_ns), [status])
+
+    def cycle_rows(self, columns: Sequence[str], rows: Any) -> bytes:
+        """Serialise labelled rows of /timing/cycle."""
+        dimension = 'std_msgs/msg/MultiArrayDimension'
+        layout = self._samples.make('std_msgs/msg/MultiArrayLayout', [
+            self._samples.make(dimension, 'cycles', len(rows), rows.size),
+            self._samples.make(dimension, ','.join(columns), len(columns), len(columns))], 0)
+        return self._samples.encode('std_msgs/msg/Float64MultiArray', layout, rows.ravel())
+
+    def messages(self, result: OfflineResult, *, epoch: int = 0, offset_ns: int = 0,
+                 log_ns: int = 1_700_000_000_000_000_000,
+                 intervals_s: Any = None) -> list[tuple[str, str, int, bytes]]:
+        """
+        Write a run as (topic, type, log time, data), logged 1 ms after its stamps and `log_ns`.
+
+        :param intervals_s: Delta t_eff of each step, the nominal step where None.
+        """
+        setup = result.setup
+        scheduler = replace(setup.scheduler, clock_offset_ns=offset_ns)
+        texts = {'/scenario/xml': setup.loaded.xml_text,
+                 '/scenario/objects': objects_document(setup.descriptions),
+                 '/scenario/game': game_document(
+                     setup, epoch=epoch, clock_offset_ns=offset_ns, real_time_factor=1.0)}
+        found = [(topic, 'std_msgs/msg/String', log_ns, self._samples.string(text))
+                 for topic, text in texts.items()]
+        names = [name for item in setup.vehicle_ids for name in vehicle_joint_names(item)]
+        others = [name for item in setup.obstacles.descriptions
+                  for name in object_joint_names(item.id)]
+        humans = [human.id for human in setup.humans]
+        rows = CycleRows(humans, 1)
+        self.rows = np.zeros((len(result.vehicle_states), len(rows.columns)))
+        for n, states in enumerate(result.vehicle_states):
+            stamp_ns = scheduler.stamp_ns(n)
+            at_ns = log_ns + stamp_ns - offset_ns + 1_000_000
+            if scheduler.is_tick(n):
+                objects = setup.obstacles.states_at(scheduler.k(n))
+                found.append(('/traffic/objects', TRAJECTORY, at_ns, self.joints(
+                    stamp_ns, others, objects.poses, objects.velocities,
+                    np.full_like(objects.poses, np.nan))))
+            joints = np.array([vehicle_to_joints(VehicleState(*state)) for state in states])
+            found.append(('/vehicles/state', TRAJECTORY, at_ns, self.joints(
+                stamp_ns, names, joints[:, 0], joints[:, 1], joints[:, 2])))
+            if n:
+                dt_s = scheduler.dt_s if intervals_s is None else intervals_s[n - 1]
+                cycle = Cycle(n, n * scheduler.dt_s, n * scheduler.dt_s, 0.0, 0.0, dt_s, 0, 0.0)
+                rows.add(epoch, scheduler.k(n), cycle, 0.001, 0.009,
+                         [DriverCommand(*row) for row in result.commands[n]])
+                self.rows[n] = rows.taken()
+                found.append(('/timing/cycle', 'std_msgs/msg/Float64MultiArray', at_ns,
+                              self.cycle_rows(rows.columns, self.rows[n:n + 1])))
+        self.rows = self.rows[1:]
+        return found
+
+    @staticmethod
+    def ours(folder: Path, messages: Sequence[tuple[str, str, int, bytes]]) -> Path:
+        """Record with our own writer; flushed every 100 messages."""
+        now_ns = [0]
+        channels: dict[str, int] = {}
+        with BagWriter(folder, now_ns=lambda: now_ns[0]) as writer:
+            for index, (topic, type_name, log_ns, data) in enumerate(messages):
+                now_ns[0] = index // 100 * 1_000_000_000
+                if topic not in channels:
+                    channels[topic] = writer.add_topic(topic, type_name, TopicQos(10))
+                writer.write(channels[topic], data, log_ns)
+        return folder
+
+    def rosbag2(self, folder: Path, messages: Sequence[tuple[str, str, int, bytes]],
+                storage: StoragePlugin) -> Path:
+        """Record as `ros2 bag record` does."""
+        writer = RosbagsWriter(folder, version=9, storage_plugin=storage)
+        connections: dict[str, Any] = {}
+        with writer:
+            for topic, type_name, log_ns, data in messages:
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(
+                        topic, type_name, typestore=self._samples.store)
+                writer.write(connections[topic], log_ns, data)
+        return folder
+
+
+@pytest.fixture(scope='session')
+def recorder(samples: Samples) -> RunRecorder:
+    """Return the maker of recordings."""
+    return RunRecorder(samples)
+
+
+@pytest.fixture(scope='session')
+def drive() -> Callable[..., OfflineResult]:
+    """Return a function that drives one of our own scenarios offline, with random commands."""
+    def run(name: str, *, duration_s: float = 1.0, avs: tuple[AvSpec, ...] = (),
+            intervals_s: Any = None, seed: int = 0) -> OfflineResult:
+        game = Game(scenarios_directory() / name, humans=(HumanSpec('hv0', 'idle'),), avs=avs)
+        commands = np.random.default_rng(seed).uniform((0, 0, -0.2, 0), (1, 0.2, 0.2, 0),
+                                                       (int(duration_s * 100), 4))
+        return run_offline(build_setup(game), duration_s=duration_s, intervals_s=intervals_s,
+                           drivers={'hv0': ReplayDriver(commands)}, check_drivability=False)
+    return run

@@ -1,0 +1,213 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whole runs from the command line: outputs, exit codes, every way to end, bad input."""
+
+from collections.abc import Iterator
+import json
+import math
+from pathlib import Path
+import signal
+
+import commonroad
+from commonroad.common.file_reader import CommonRoadFileReader
+from commonroad.scenario.obstacle import DynamicObstacle
+from live_support import CUT_IN, is_node, Launcher, SCENARIOS, wait_until
+from lxml import etree
+import numpy as np
+import pytest
+
+from crgame_ros.recording.metadata import read_metadata
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.timing.cycle_rows import CycleTable
+
+DURATION_S = 3.5
+STEPS = 350
+STEP_NS = 10_000_000
+STEPS_PER_TICK = 10
+# CommonRoad vehicle 2 (BMW 320i): the rear axle is so far behind the centre [m].
+REAR_TO_CENTER = 1.4227
+BENCHMARK_ID = 'ZAM_CutIn-1_1_T-1'
+TABLE_I = {'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',
+           'real_time_ratio', 'time_efficiency', 'precision_ratio'}
+PLANS = {'accepted', 'fallback', 'refused', 'skipped', 'latency_ms'}
+NODES = {'sim_node', 'driver_node_hv0', 'planner_node_av0', 'recorder_node', 'drivability_node',
+         'timesync_node'}
+
+
+@pytest.fixture(scope='module')
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Launcher]:
+    """Run the cut-in game to the end of its short duration."""
+    with Launcher([CUT_IN, '--duration', DURATION_S],
+                  tmp_path_factory.mktemp('finished') / 'run') as launcher:
+        assert launcher.wait() == 0, launcher.text
+        yield launcher
+
+
+def _poses(bag: Path) -> dict[int, dict[str, tuple[float, float, float]]]:
+    """Read the rear-axle poses on /vehicles/state by step n of a run whose n = 0 is first."""
+    poses: dict[int, dict[str, tuple[float, float, float]]] = {}
+    with BagReader(bag) as reader:
+        for item in reader.decoded(['/vehicles/state']):
+            stamp = item.message.header.stamp
+            point = item.message.points[0]
+            values = dict(zip(item.message.joint_names, point.positions, strict=True))
+            poses[stamp.sec * 1_000_000_000 + stamp.nanosec] = {
+                name: tuple(values[f'{name}/{joint}'] for joint in ('x', 'y', 'yaw'))
+                for name in {joint.split('/')[0] for joint in values}}
+    start_ns = min(poses)
+    return {(stamp_ns - start_ns) // STEP_NS: value for stamp_ns, value in poses.items()}
+
+
+def _check_outputs(out: Path, benchmark_id: str) -> None:
+    """Check that the four outputs are there and the recording is finished."""
+    assert {path.name for path in out.iterdir()} == {
+        'bag', f'{benchmark_id}.xml', 'timing.json', 'game.yaml'}
+    assert sorted(path.suffix for path in (out / 'bag').iterdir()) == ['.mcap', '.yaml']
+    metadata = read_metadata(out / 'bag')
+    with BagReader(out / 'bag') as reader:
+        assert reader.complete
+        assert reader.message_count == sum(file.message_count for file in metadata.files) > 0
+    CommonRoadFileReader(str(out / f'{benchmark_id}.xml')).open()
+
+
+def test_a_run_leaves_its_four_outputs(finished: Launcher) -> None:
+    """Bag with metadata, scenario, timing report and game; the nodes start once and all end."""
+    _check_outputs(finished.out, BENCHMARK_ID)
+    assert {name for name, _ in finished.started} == NODES
+    assert len(finished.started) == len(NODES)
+    assert not any(is_node(pid) for _, pid in finished.started)
+    assert finished.errors == []
+    assert not finished.says('Traceback|ERROR|WARN')
+
+
+def test_the_timing_report_has_table_one(finished: Launcher) -> None:
+    """`timing.json` has CRG's table I and what the plans did, with plausible numbers."""
+    report = json.loads((finished.out / 'timing.json').read_text())
+    assert set(report) >= TABLE_I
+    assert set(report['real_time_ratio']) == {'final', 'mean', 'min'}
+    assert report['gaps'] == 0
+    plans = report['planners']['av0']
+    assert set(plans) >= PLANS
+    # One request a tick at most, the one of k0 included; nobody refuses our own planner.
+    assert 0 < plans['accepted'] <= STEPS // STEPS_PER_TICK + 1
+    assert plans['refused'] == 0
+    assert plans['latency_ms']['p50'] > 0.0
+
+
+def test_no_step_is_missing_in_the_recording(finished: Launcher) -> None:
+    """Cycles 1 to 350 and states 0 to 350 are there, each once."""
+    numbers: list[int] = []
+    with BagReader(finished.out / 'bag') as reader:
+        for item in reader.decoded(['/timing/cycle']):
+            label = item.message.layout.dim[1].label
+            numbers += CycleTable.from_message(label, item.message.data).column('n').tolist()
+    assert numbers == list(range(1, STEPS + 1))
+    assert sorted(_poses(finished.out / 'bag')) == list(range(STEPS + 1))
+
+
+def test_the_scenario_is_valid_and_true_to_the_recording(finished: Launcher) -> None:
+    """The XML obeys CommonRoad's schema, and every k is within 1 mm of the recorded pose."""
+    path = finished.out / f'{BENCHMARK_ID}.xml'
+    schema = Path(commonroad.__file__).parent / 'scenario_definition' / 'XML_commonRoad_XSD.xsd'
+    etree.XMLSchema(etree.parse(str(schema))).assertValid(etree.parse(str(path)))
+    scenario, problems = CommonRoadFileReader(str(path)).open()
+    poses = _poses(finished.out / 'bag')
+    obstacles = {_vehicle_of(item, poses[0]): item for item in scenario.dynamic_obstacles}
+    assert set(obstacles) == {'hv0', 'av0'}
+    assert len(problems.planning_problem_dict) == len(obstacles)
+    ticks = STEPS // STEPS_PER_TICK
+    for vehicle, obstacle in obstacles.items():
+        assert obstacle.prediction.final_time_step == ticks
+        error = [math.dist(obstacle.state_at_time(k).position,
+                           _center(*poses[k * STEPS_PER_TICK][vehicle]))
+                 for k in range(ticks + 1)]
+        assert max(error) <= 1e-3
+        # Both drive: 26 and 20 m/s for 3.5 s, whatever the pedals do meanwhile.
+        assert math.dist(obstacle.state_at_time(0).position,
+                         obstacle.state_at_time(ticks).position) > 50.0
+
+
+def _center(x: float, y: float, yaw: float) -> tuple[float, float]:
+    return x + REAR_TO_CENTER * math.cos(yaw), y + REAR_TO_CENTER * math.sin(yaw)
+
+
+def _vehicle_of(obstacle: DynamicObstacle, poses: dict[str, tuple[float, float, float]]) -> str:
+    """Find the vehicle that starts where an obstacle does."""
+    return min(poses, key=lambda vehicle: math.dist(obstacle.initial_state.position,
+                                                    _center(*poses[vehicle])))
+
+
+def test_interrupt_ends_a_rerun_in_good_order(finished: Launcher, tmp_path: Path) -> None:
+    """The run's own `game.yaml` starts the same game again; Ctrl-C ends it with all outputs."""
+    game_file = finished.out / 'game.yaml'
+    with Launcher([game_file, '--duration', 60], tmp_path / 'run') as launcher:
+        launcher.wait_for('recording into')
+        wait_until(lambda: _recorded(tmp_path / 'run') > 0, 'a second of recording')
+        launcher.signal(signal.SIGINT)
+        assert launcher.wait() == 0, launcher.text
+        _check_outputs(tmp_path / 'run', BENCHMARK_ID)
+        assert not launcher.says('Traceback|does not end')
+        assert not any(is_node(pid) for _, pid in launcher.started)
+    assert _poses(tmp_path / 'run' / 'bag')[0] == _poses(finished.out / 'bag')[0]
+    first, second = load_game(game_file), load_game(tmp_path / 'run' / 'game.yaml')
+    assert (first.humans, first.avs, first.timing) == (second.humans, second.avs, second.timing)
+
+
+def _recorded(out: Path) -> int:
+    """Count the bytes that the recorder has handed over, beyond the file's beginning."""
+    files = list(out.glob('bag/*.mcap'))
+    return max(0, files[0].stat().st_size - 50_000) if files else 0
+
+
+def test_terminate_ends_a_bare_scenario(shared_scenarios: Path, tmp_path: Path) -> None:
+    """`--scenario` alone runs: a human is placed, the AV gets a planner; SIGTERM ends it well."""
+    with Launcher(['--scenario', shared_scenarios / 'USA_US101-4_1_T-1.xml'],
+                  tmp_path / 'run') as launcher:
+        launcher.wait_for('recording into')
+        wait_until(lambda: _recorded(tmp_path / 'run') > 0, 'a second of recording')
+        launcher.signal(signal.SIGTERM)
+        assert launcher.wait() == 0, launcher.text
+        _check_outputs(tmp_path / 'run', 'USA_US101-4_1_T-1')
+    vehicles = _poses(tmp_path / 'run' / 'bag')[0]
+    assert set(vehicles) == {'hv0', 'av0'}
+    # Beside or behind the AV, as a lane or a car's length allow, and never upon it.
+    assert 2.0 < math.dist(vehicles['hv0'][:2], vehicles['av0'][:2]) < 50.0
+
+
+def test_no_node_outlives_a_killed_launcher(tmp_path: Path) -> None:
+    """After `kill -9` of the launcher the nodes end by themselves, the recorder in good order."""
+    with Launcher([CUT_IN], tmp_path / 'run') as launcher:
+        launcher.wait_for('recording into')
+        nodes = [pid for _, pid in launcher.started]
+        assert len(nodes) == len(NODES)
+        assert all(is_node(pid) for pid in nodes)
+        launcher.signal(signal.SIGKILL)
+        wait_until(lambda: not any(is_node(pid) for pid in nodes), 'the end of every node')
+    with BagReader(tmp_path / 'run' / 'bag') as reader:
+        assert reader.complete
+
+
+BAD_INPUT = {
+    'no such game': (['nowhere.yaml'], r'nowhere\.yaml'),
+    'malformed scenario': (['--scenario', 'cut.xml'], r'cut\.xml'),
+    'no such planner': ([CUT_IN, '--planner', 'clairvoyant'], 'clairvoyant'),
+    'no such driver': ([CUT_IN, '--driver', 'chauffeur'], 'chauffeur'),
+    'negative rate': ([CUT_IN, '--rate', '-1'], '--rate'),
+}
+
+
+@pytest.mark.parametrize('case', BAD_INPUT)
+def test_bad_input_starts_nothing(case: str, tmp_path: Path) -> None:
+    """Exit code 2, one line that names the culprit, no process and no folder."""
+    scenario = (SCENARIOS / f'{BENCHMARK_ID}.xml').read_text()
+    (tmp_path / 'cut.xml').write_text(scenario[:len(scenario) // 2])
+    arguments, named = BAD_INPUT[case]
+    with Launcher(arguments, cwd=tmp_path) as launcher:
+        assert launcher.wait() == 2
+        assert len(launcher.errors) == 1
+        assert launcher.errors[0].startswith('error: ')
+        assert named.replace('\\', '') in launcher.errors[0]
+        assert launcher.lines == []
+    assert [path.name for path in tmp_path.iterdir()] == ['cut.xml']
+    assert np.all([not is_node(pid) for _, pid in launcher.started])

@@ -1,0 +1,189 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A human's vehicle as a whole: energy, limits, stopping, reverse."""
+
+from dataclasses import replace
+import math
+
+import numpy as np
+import pytest
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.vehicle.human_vehicle import HumanVehicle
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from crgame_ros.vehicle.state import VehicleState
+
+VEHICLE = load_vehicle_parameters()
+# Without drivetrain lag, where a closed form is compared with.
+DIRECT = replace(VEHICLE, longitudinal_lag=1e-9)
+RELEASED, THROTTLE = DriverCommand(), DriverCommand(throttle=1.0)
+BRAKE, BACK = DriverCommand(brake=1.0), DriverCommand(throttle=0.5, reverse=True)
+ROLLING_FORCE = 0.012 * VEHICLE.mass * 9.81
+DRAG = 0.5 * 1.225 * 0.29 * 2.11
+
+
+def at_speed(speed: float, **others: float) -> VehicleState:
+    """Put a car at the origin."""
+    return VehicleState(0.0, 0.0, 0.0, speed, **others)
+
+
+def test_coasting_conserves_energy() -> None:
+    """The work of drag and rolling resistance is what kinetic energy is lost, within 0.1 %."""
+    car = HumanVehicle(DIRECT, at_speed(35.0))
+    work, dt = 0.0, 0.01
+    for _ in range(3000):
+        before = car.state
+        after = car.step(RELEASED, dt)
+        middle = 0.5 * (before.speed + after.speed)
+        work += (ROLLING_FORCE + DRAG * middle**2) * (after.x - before.x)
+    lost = 0.5 * VEHICLE.mass * (35.0**2 - car.state.speed**2)
+    assert car.state.speed < 30.0
+    assert work == pytest.approx(lost, rel=1e-3)
+
+
+def test_coasting_follows_its_closed_form() -> None:
+    """Solve m v' = -(c + k v^2): v = sqrt(c/k) tan(atan(v0 sqrt(k/c)) - sqrt(k c) t / m)."""
+    car = HumanVehicle(DIRECT, at_speed(35.0))
+    shape = math.sqrt(ROLLING_FORCE / DRAG)
+    for n in range(1, 6001):
+        state = car.step(RELEASED, 0.01)
+        angle = math.atan(35.0 / shape) - math.sqrt(DRAG * ROLLING_FORCE) * 0.01 * n / VEHICLE.mass
+        assert state.speed == pytest.approx(shape * math.tan(angle), abs=0.005)
+
+
+def test_acceleration_lags_the_pedal() -> None:
+    """From a standstill under constant command: CRG 25's closed form, speed its sum."""
+    car = HumanVehicle(VEHICLE, at_speed(0.0))
+    commanded = ((1.0 - math.exp(-4.0)) * 1.0489 * VEHICLE.mass * 9.81 - ROLLING_FORCE) \
+        / VEHICLE.mass
+    speed = 0.0
+    for n in range(1, 21):
+        state = car.step(THROTTLE, 0.01)
+        expected = commanded * (1.0 - (1.0 - 0.01 / 0.15)**n)
+        speed += 0.01 * expected
+        # Drag, which the closed form leaves out, is below 1 N here.
+        assert state.acceleration == pytest.approx(expected, abs=2e-3)
+        assert state.speed == pytest.approx(speed, abs=1e-3)
+
+
+@pytest.mark.parametrize('command', [
+    RELEASED, BRAKE, DriverCommand(brake=1.0, reverse=True), DriverCommand(steering=0.7)])
+def test_standing_car_does_not_move(command: DriverCommand) -> None:
+    """Neither rolling resistance nor brakes start a motion, however long."""
+    car = HumanVehicle(VEHICLE, at_speed(0.0))
+    for _ in range(500):
+        state = car.step(command, 0.01)
+        assert (state.x, state.y, state.yaw, state.speed, state.acceleration) == (0.0,) * 5
+
+
+def test_braking_stops_within_the_step_and_holds() -> None:
+    """The distance is v^2 / 2 a to a millimetre whatever the step, and the car stays there."""
+    for dt in (0.001, 0.01, 0.05):
+        car = HumanVehicle(replace(DIRECT, drag_coefficient=0.0), at_speed(10.0))
+        while car.state.speed > 0.0:
+            car.step(BRAKE, dt)
+        deceleration = ((1.0 - math.exp(-3.0)) * 11250.0 + ROLLING_FORCE) / VEHICLE.mass
+        assert car.state.x == pytest.approx(100.0 / (2.0 * deceleration), abs=1e-3)
+        assert (car.state.speed, car.state.acceleration, car.state.yaw_rate) == (0.0, 0.0, 0.0)
+        place = car.state.x
+        for _ in range(100):
+            car.step(BRAKE, dt)
+        assert (car.state.x, car.state.speed, car.state.acceleration) == (place, 0.0, 0.0)
+
+
+def test_stop_at_the_end_of_a_step_leaves_no_negative_speed() -> None:
+    """Speeds that a step's braking takes to zero within rounding: 0, never -1e-18."""
+    commanded = -((1.0 - math.exp(-3.0)) * 11250.0 + ROLLING_FORCE) / VEHICLE.mass
+    car = replace(DIRECT, drag_coefficient=0.0)
+    random = np.random.default_rng(31)
+    for dt in random.uniform(0.001, 0.05, 300).tolist():
+        stop = -commanded * dt
+        for speed in (stop, float(np.nextafter(stop, 0.0)), float(np.nextafter(stop, 9.0))):
+            assert HumanVehicle(car, at_speed(speed)).step(BRAKE, dt).speed >= 0.0
+            back = HumanVehicle(car, at_speed(-speed)).step(BRAKE, dt)
+            assert back.speed <= 0.0
+
+
+def test_reverse_is_a_gear_that_engages_at_rest() -> None:
+    """Selected while rolling forwards, it waits for the stop; then throttle drives backwards."""
+    car = HumanVehicle(VEHICLE, at_speed(3.0))
+    for _ in range(50):
+        car.step(DriverCommand(throttle=0.2, reverse=True), 0.01)
+    assert car.gear == 1
+    assert car.state.speed > 3.0
+    while car.state.speed > 0.0:
+        car.step(DriverCommand(brake=1.0, reverse=True), 0.01)
+    place = car.state.x
+    for _ in range(200):
+        car.step(BACK, 0.01)
+        assert car.state.speed <= 0.0
+    assert car.gear == -1
+    assert car.state.speed < -3.0
+    assert car.state.x < place - 3.0
+
+
+def test_brake_stops_a_car_in_reverse() -> None:
+    """It opposes the motion, never reverses it, and forward gear engages at rest."""
+    car = HumanVehicle(VEHICLE, at_speed(-5.0))
+    assert car.gear == -1
+    for _ in range(200):
+        before = car.state.speed
+        car.step(BRAKE, 0.01)
+        assert before <= car.state.speed <= 0.0
+    assert car.state.speed == 0.0
+    car.step(THROTTLE, 0.01)
+    assert car.gear == 1
+    assert car.state.speed > 0.0
+
+
+def test_steering_in_reverse_turns_the_other_way() -> None:
+    """KS: yaw rate v tan(delta) / L changes its sign with v."""
+    left = DriverCommand(steering=0.3)
+    forwards = HumanVehicle(VEHICLE, at_speed(3.0)).step(left, 0.05)
+    backwards = HumanVehicle(VEHICLE, at_speed(-3.0)).step(left, 0.05)
+    assert forwards.yaw > 0.0 > backwards.yaw
+
+
+@pytest.mark.parametrize(('start', 'command', 'limit'), [
+    (49.0, THROTTLE, 50.8), (-12.0, DriverCommand(throttle=1.0, reverse=True), -13.9)])
+def test_speed_reaches_its_limit_and_stays(start: float, command: DriverCommand,
+                                           limit: float) -> None:
+    """50.8 m/s forwards and 13.9 m/s in reverse (vehicle 2)."""
+    car = HumanVehicle(VEHICLE, at_speed(start))
+    for _ in range(1000):
+        car.step(command, 0.01)
+        assert abs(car.state.speed) <= abs(limit) + 1e-12
+    assert car.state.speed == pytest.approx(limit, abs=1e-9)
+    assert car.state.acceleration == pytest.approx(0.0, abs=1e-9)
+
+
+def test_steering_angle_runs_at_the_rate_limit_to_its_target() -> None:
+    """At rest the full wheel asks for 7.85 / 13 rad; 0.4 rad/s get there in 1.51 s."""
+    car = HumanVehicle(VEHICLE, at_speed(0.0))
+    for n in range(1, 201):
+        state = car.step(DriverCommand(steering=1.0), 0.01)
+        assert state.steering_angle == pytest.approx(min(0.004 * n, 7.85 / 13.0), abs=1e-9)
+        assert abs(state.steering_rate) <= 0.4
+    assert state.steering_rate == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_limits_hold_under_any_command(seed: int) -> None:
+    """Whatever the driver does: speed in the gear's direction, angle, rate and yaw in bounds."""
+    random = np.random.default_rng(seed)
+    car = HumanVehicle(VEHICLE, at_speed(random.uniform(0.0, 50.0)))
+    for _ in range(60):
+        command = DriverCommand(*random.uniform((-0.5, -0.5, -1.0), 1.0), bool(random.random() < 0.3))
+        for dt in random.uniform(1e-4, 0.05, 40).tolist():
+            before = car.state
+            state = car.step(command.rounded(), dt)
+            assert state.speed * car.gear >= 0.0
+            assert -13.9 - 1e-9 <= state.speed <= 50.8 + 1e-9
+            assert abs(state.steering_angle) <= 0.91
+            assert abs(state.steering_angle - before.steering_angle) <= 0.4 * dt + 1e-12
+            assert abs(state.acceleration) <= VEHICLE.max_acceleration + 1e-9
+            assert -math.pi < state.yaw <= math.pi
+            assert state.yaw_rate == pytest.approx(
+                state.speed * math.tan(state.steering_angle) / VEHICLE.wheelbase, abs=1e-12)
+            moved = math.hypot(state.x - before.x, state.y - before.y)
+            assert moved <= max(abs(before.speed), abs(state.speed)) * dt + 1e-9
