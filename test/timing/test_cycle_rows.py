@@ -1,0 +1,79 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The rows of /timing/cycle: filled, taken, read again."""
+
+import numpy as np
+import pytest
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.errors import InputError
+from crgame_ros.timing.cycle_rows import CycleRows, CycleTable, TIMING_COLUMNS
+from crgame_ros.timing.time_controller import Cycle
+
+FIRST = Cycle(7, 0.07, 0.0701, 0.0001, 0.0002, 0.0101, 1, 0.3)
+SECOND = Cycle(8, 0.08, 0.0805, 0.0002, 0.0005, 0.0099, 2, 0.4)
+LEFT = DriverCommand(float(np.float32(0.3)), 0.0, float(np.float32(0.1)), False)
+BACK = DriverCommand(0.0, 1.0, -1.0, True)
+
+
+def filled() -> CycleRows:
+    """Fill two cycles of two humans."""
+    rows = CycleRows(('hv0', 'hv1'), 3)
+    rows.add(4, 12, FIRST, 0.002, 0.008, (LEFT, BACK))
+    rows.add(4, 13, SECOND, 0.003, 0.007, (BACK, LEFT))
+    return rows
+
+
+def test_columns_name_what_is_in_them() -> None:
+    """Each value is found under its name after the way through the flat message."""
+    rows = filled()
+    table = CycleTable.from_message(','.join(rows.columns), rows.taken())
+    assert table.rows.shape == (2, 12 + 8)
+    expected = {'epoch': (4, 4), 'n': (7, 8), 'k': (12, 13), 'ideal_s': (0.07, 0.08),
+                'actual_s': (0.0701, 0.0805), 'step_error_s': (0.0001, 0.0002),
+                'cumulative_error_s': (0.0002, 0.0005), 'busy_s': (0.002, 0.003),
+                'sleep_s': (0.008, 0.007), 'dt_eff_s': (0.0101, 0.0099), 'resets': (1, 2),
+                'dropped_s': (0.3, 0.4)}
+    assert tuple(expected) == TIMING_COLUMNS
+    for name, values in expected.items():
+        assert table.column(name).tolist() == list(values)
+    assert table.epoch == 4
+
+
+def test_commands_keep_their_bits() -> None:
+    """Exact reproduction replays them: float32 values pass through unchanged."""
+    rows = filled()
+    table = CycleTable.from_message(','.join(rows.columns), rows.taken())
+    assert table.commands('hv0').tolist() == [list(map(float, LEFT)), list(map(float, BACK))]
+    assert table.commands('hv1').tolist() == [list(map(float, BACK)), list(map(float, LEFT))]
+    with pytest.raises(InputError, match='hv2 took no part'):
+        table.commands('hv2')
+
+
+def test_rows_for_the_metrics() -> None:
+    """Ideal and actual start, busy and dropped, in the order that the metrics take."""
+    rows = filled()
+    table = CycleTable.from_message(','.join(rows.columns), rows.taken())
+    assert table.timing_rows().tolist() == [[0.07, 0.0701, 0.002, 0.3], [0.08, 0.0805, 0.003, 0.4]]
+
+
+def test_taking_empties_the_buffer() -> None:
+    """The buffer is used again, and what was taken stays as it was."""
+    rows = filled()
+    assert not rows.full
+    rows.add(4, 13, FIRST, 0.0, 0.0, (LEFT, BACK))
+    assert rows.full
+    taken = rows.taken()
+    assert len(taken) == 3 * 20
+    assert (rows.count, rows.full, len(rows.taken())) == (0, False, 0)
+    rows.add(5, 1, SECOND, 0.0, 0.0, (BACK, LEFT))
+    assert (taken[0], taken[1]) == (4.0, 7.0)
+    assert rows.taken()[:2].tolist() == [5.0, 8.0]
+
+
+@pytest.mark.parametrize(('label', 'data'), [
+    ('epoch,n', [1.0, 2.0]), ('', []), (','.join(TIMING_COLUMNS), [1.0] * 13)])
+def test_other_messages_are_refused(label: str, data: list[float]) -> None:
+    """Missing columns or rows that are not whole: another version wrote them."""
+    with pytest.raises(InputError, match='/timing/cycle: has other columns'):
+        CycleTable.from_message(label, data)
