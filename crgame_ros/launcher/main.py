@@ -47,7 +47,7 @@ def announce(plan: RunPlan) -> None:
     planners = ', '.join(f'{av.id} planned by {av.spec.planner}' for av in setup.avs)
     say(f'{setup.game.title or setup.loaded.benchmark_id}: '
         + '; '.join(text for text in (drivers, planners) if text))
-    for notice in setup.loaded.notices:
+    for notice in setup.notices:
         say(f'note: {notice}')
     reach = 'open network' if network_is_open() else 'this machine only'
     say(f'ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]} ({reach}); files go to {plan.folder}')

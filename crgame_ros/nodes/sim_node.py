@@ -61,7 +61,7 @@ class SimNode(Node):
             return present
 
     def _told(self, setup: Setup) -> Setup:
-        for notice in setup.loaded.notices:
+        for notice in setup.notices:
             self.get_logger().info(notice)
         self.get_logger().info(
             f'{setup.loaded.benchmark_id}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s), '

@@ -33,6 +33,8 @@ from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState  # noqa: E402
 
 Array = NDArray[np.float64]
 
+# The model's first stretch, from which the target speed is drawn [s].
+FIRST_S = 1.0
 STANDING = 0.05
 LOW_VELOCITY = 4.0
 # The frame is renewed when less than this lies ahead of the vehicle [m].
@@ -104,7 +106,13 @@ class ReactivePlanner(PathPlanner):
         ego = request.ego
         if ego.speed < -STANDING:
             raise PlanningError('the vehicle rolls backwards, which the package cannot plan')
-        target = self._idm.target_speed(request, self._horizon)
+        # A profile that has the whole horizon to change its speed begins gently, and only its
+        # beginning is driven before the next replanning: the target goes on from what the model
+        # does first, so that the beginning brakes as the model does.
+        first = self._idm.target_speed(request, FIRST_S)
+        target = max(0.0, ego.speed + (first - ego.speed) * self._horizon / FIRST_S)
+        if first > ego.speed:
+            target = self._idm.target_speed(request, self._horizon)
         if ego.speed < STANDING and target < 5.0 * STANDING:
             return self.answer(request, self._hold(ego))
         if position.s > self._frame.last - FRAME_RESERVE:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The obstacles of a scenario: what they look like, and where they are at each time step."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 import math
 
@@ -44,13 +45,16 @@ class ScenarioObstacles:
     first and after its last state an obstacle is absent (NaN); static ones are always there.
 
     :param loaded: the scenario.
+    :param without: obstacle ids to leave out.
     :raises InputError: if a shape cannot be used, or there are too many states.
     """
 
-    def __init__(self, loaded: LoadedScenario) -> None:
+    def __init__(self, loaded: LoadedScenario, without: Collection[int] = ()) -> None:
         scenario = loaded.scenario
-        obstacles = [*scenario.static_obstacles, *scenario.environment_obstacle,
-                     *scenario.dynamic_obstacles, *scenario.phantom_obstacle]
+        obstacles = [obstacle for obstacle in (
+            *scenario.static_obstacles, *scenario.environment_obstacle,
+            *scenario.dynamic_obstacles, *scenario.phantom_obstacle)
+            if obstacle.obstacle_id not in without]
         self.time_step_s = loaded.time_step_s
         described = [_describe(obstacle, loaded.source) for obstacle in obstacles]
         self.descriptions: tuple[ObjectDescription, ...] = tuple(d for d, _ in described)

@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass, replace
 import hashlib
+import math
 
 from commonroad.planning.planning_problem import PlanningProblem
 
@@ -11,7 +12,7 @@ from crgame_ros.driver.source import load_timeline, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.scenario.game import AvSpec, Game
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedScenario
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
@@ -19,6 +20,9 @@ from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+
+# A vehicle recorded this close to an AV's start is a recording of the AV [m].
+SAME_PLACE = 1.0
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,7 @@ class Setup:
     :param humans: the humans' vehicles.
     :param avs: the AVs.
     :param scheduler: time grids, with a clock offset of zero.
+    :param notices: remarks for the user, one line each.
     """
 
     game: Game
@@ -85,6 +90,7 @@ class Setup:
     humans: tuple[HumanSetup, ...]
     avs: tuple[AvSetup, ...]
     scheduler: ScenarioScheduler
+    notices: tuple[str, ...] = ()
 
     @property
     def vehicles(self) -> tuple['HumanSetup | AvSetup', ...]:
@@ -121,9 +127,13 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     """
     loaded = load_scenario(game.scenario) if loaded is None else loaded
     network = RoadNetwork(loaded.scenario.lanelet_network)
-    obstacles = ScenarioObstacles(loaded)
     avs = _place_avs(game, loaded, network)
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
+    doubles = _recorded_egos(loaded, avs, k0)
+    obstacles = ScenarioObstacles(loaded, doubles)
+    notices = [*loaded.notices, *(
+        f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'
+        for number, av_id in doubles.items())]
     humans: list[HumanSetup] = []
     for spec in game.humans:
         parameters = load_vehicle_parameters(spec.vehicle)
@@ -136,7 +146,22 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
         timeline = load_timeline(source, game.base).to_text() if source.has_timeline else ''
         humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline))
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
-    return Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler)
+    return Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler, tuple(notices))
+
+
+def _recorded_egos(loaded: LoadedScenario, avs: tuple[AvSetup, ...], k0: int) -> dict[int, str]:
+    """Find recorded vehicles that stand where an AV starts: recordings of that very vehicle."""
+    doubles: dict[int, str] = {}
+    for obstacle in loaded.scenario.dynamic_obstacles:
+        state = obstacle.state_at_time(k0)
+        if state is None:
+            continue
+        x, y = exact_position(state.position)
+        for av in avs:
+            center = av.state.center(av.vehicle.rear_to_center)
+            if math.hypot(x - center[0], y - center[1]) < SAME_PLACE:
+                doubles[obstacle.obstacle_id] = av.id
+    return doubles
 
 
 def _place_avs(
