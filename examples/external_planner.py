@@ -16,7 +16,7 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 WHEELBASE, RATE, SIDE, BODY = 2.579, 0.4, 2.0, 6.0  # steering rate [rad/s], room for two cars [m]
-A, B, HEADWAY, GAP, LATERAL = 1.5, 2.0, 1.5, 2.0, 2.5  # of the IDM; comfortable in a curve [m/s^2]
+A, ROOT, T, S0, GRIP = 1.5, 3.46, 1.5, 2.0, 2.5  # IDM, 2 sqrt(a b); in a curve [m/s^2]
 
 
 class ExternalPlanner(Node):
@@ -42,39 +42,33 @@ class ExternalPlanner(Node):
 
     def on_request(self, request: JointTrajectory) -> None:
         """Answer with a plan on the time grid of the request."""
-        names, now = request.joint_names, request.points[0]
-        own = names.index(f'{self.av}/x')
-        at, (yaw, steering) = complex(*now.positions[own:own + 2]), now.positions[own + 2:own + 4]
-        ahead, dt = cmath.rect(1.0, yaw), request.points[1].time_from_start.nanosec * 1e-9
-        speed = (complex(*now.velocities[own:own + 2]) / ahead).real
-        self.desired = max(self.desired, speed)
-        near = [point for point in self.lanes if abs(point - at) < 20.0 + 4.0 * speed]
-        others = [i for i, name in enumerate(names) if name.endswith('/x') and i != own
-                  and ((complex(*now.positions[i:i + 2]) - at) / ahead).real > 0.0]
-        plan = JointTrajectory(header=request.header, joint_names=names[own:own + 4])
+        names, now, dt = request.joint_names, request.points[0], request.points[1].time_from_start
+        at, (yaw, wheel) = complex(*now.positions[:2]), now.positions[2:4]
+        head, dt = cmath.rect(1.0, yaw), dt.sec + dt.nanosec * 1e-9
+        self.desired = max(self.desired, speed := (complex(*now.velocities[:2]) / head).real)
+        near = {p: lane for p, lane in self.lanes.items() if abs(p - at) < 20.0 + 4.0 * speed}
+        others = [i for i, name in enumerate(names) if name.endswith('/x')
+                  and ((complex(*now.positions[i:i + 2]) - at) / head).real > 0.0]
+        plan = JointTrajectory(header=request.header, joint_names=names[:4])
         for point in request.points:
-            ahead, braking = cmath.rect(1.0, yaw), 0.0
-            aim = at + (4.0 + 0.5 * speed) * ahead
-            way = min(near, default=aim, key=lambda p: (
-                abs(p - aim) + 5.0 * abs(self.lanes[p] - ahead))) - at
-            curvature = 2.0 * (way / ahead).imag / max(1.0, abs(way)) ** 2
-            rate = max(-RATE, min(RATE, (math.atan(WHEELBASE * curvature) - steering) / dt))
+            head, aim = cmath.rect(1.0, yaw), at + cmath.rect(4.0 + 0.5 * speed, yaw)
+            way = min(near, default=aim, key=lambda p: abs(p - aim) + 5 * abs(near[p] - head)) - at
+            curvature = 2.0 * (way / head).imag / max(1.0, abs(way)) ** 2
+            rate = max(-RATE, min(RATE, (math.atan(WHEELBASE * curvature) - wheel) / dt))
+            turn, braking = speed * math.tan(wheel) / WHEELBASE, speed ** 2 * abs(curvature) / GRIP
             for i in others:  # those that are in the way, as predicted for this moment
-                gap = (complex(*point.positions[i:i + 2]) - at) / ahead
+                gap = (complex(*point.positions[i:i + 2]) - at) / head
                 if gap.real > 0.0 and abs(gap.imag - curvature * gap.real ** 2 / 2) < SIDE:
-                    closing = speed - (complex(*point.velocities[i:i + 2]) / ahead).real
-                    wanted = GAP + max(0.0, speed * (HEADWAY + closing / math.sqrt(4 * A * B)))
-                    braking = max(braking, wanted / max(0.1, gap.real - BODY))
-            desired = min(self.desired, math.sqrt(LATERAL / max(abs(curvature), 1e-6)))
-            pull = max(A * (1.0 - (speed / desired) ** 4 - braking ** 2), -8.0, -speed / dt)
-            turn = speed * math.tan(steering) / WHEELBASE
-            force = (pull + 1j * speed * turn) * ahead
+                    t = T + (speed - (complex(*point.velocities[i:i + 2]) / head).real) / ROOT
+                    braking = max(braking, (S0 + max(0.0, speed * t)) / max(0.1, gap.real - BODY))
+            pull = max(A * (1 - (speed / self.desired) ** 4 - braking ** 2), -8.0, -speed / dt)
+            force = (pull + 1j * speed * turn) * head
             plan.points.append(JointTrajectoryPoint(
-                positions=[at.real, at.imag, yaw, steering], time_from_start=point.time_from_start,
-                velocities=[speed * ahead.real, speed * ahead.imag, turn, rate],
+                positions=[at.real, at.imag, yaw, wheel], time_from_start=point.time_from_start,
+                velocities=[speed * head.real, speed * head.imag, turn, rate],
                 accelerations=[force.real, force.imag, math.nan, math.nan]))
             at += cmath.rect((speed + pull * dt / 2) * dt, yaw + turn * dt / 2)
-            yaw, steering, speed = yaw + turn * dt, steering + rate * dt, speed + pull * dt
+            yaw, wheel, speed = yaw + turn * dt, wheel + rate * dt, speed + pull * dt
         self.plans.publish(plan)
 
 

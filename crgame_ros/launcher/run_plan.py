@@ -16,7 +16,7 @@ from crgame_ros.scenario.game_file import build, dump_game, load_game
 from crgame_ros.simulation.setup import build_setup, Setup
 
 DEFAULT_GAME = 'cut_in.yaml'
-# As a planner's name: a process of the user's own answers the requests (docs/external_planners.md).
+# Planner name that stands for a process of the user's own (docs/external_planners.md).
 EXTERNAL = 'external'
 
 

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from datetime import date, datetime, UTC
 from pathlib import Path
 
-from crgame_ros.errors import InputError
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_log import read_run_log
-from crgame_ros.scenario.export import export_scenario, SOURCE_MARK, write_text
-
-_HEAD_BYTES = 4096
+from crgame_ros.scenario.export import export_scenario, scenario_path, write_text
 
 
 @dataclass(frozen=True)
@@ -36,13 +33,6 @@ class ConversionReport:
     problem_ids: dict[str, int]
     notices: tuple[str, ...]
 
-    def as_text(self) -> str:
-        """Write the report for people, in several lines."""
-        vehicles = ', '.join(f'{name} is obstacle {self.obstacle_ids[name]} and planning problem '
-                             f'{number}' for name, number in self.problem_ids.items())
-        return '\n'.join([f'{self.path}: {self.time_steps} time steps; {vehicles}',
-                          *(f'note: {notice}' for notice in self.notices)])
-
 
 def convert(bag: Path, out: Path | None = None, epoch: int | None = None) -> ConversionReport:
     """
@@ -57,11 +47,7 @@ def convert(bag: Path, out: Path | None = None, epoch: int | None = None) -> Con
     """
     log = read_run_log(bag, epoch)
     exported = export_scenario(log, day=_day_of(bag))
-    folder = bag.resolve().parent if out is None else out
-    path = folder if folder.suffix == '.xml' else folder / f'{exported.benchmark_id}.xml'
-    if path.exists() and not _is_ours(path):
-        raise InputError('a file that is no conversion is there already', str(path),
-                         'name another file or folder')
+    path = scenario_path(bag.resolve().parent if out is None else out, exported.benchmark_id)
     write_text(exported.xml_text, path)
     return ConversionReport(path, exported.benchmark_id, int(log.ks[0]), len(log.ks),
                             exported.obstacle_ids, exported.problem_ids, exported.notices)
@@ -70,11 +56,3 @@ def convert(bag: Path, out: Path | None = None, epoch: int | None = None) -> Con
 def _day_of(bag: Path) -> date:
     with BagReader(bag) as reader:
         return datetime.fromtimestamp(reader.start_ns * 1e-9, UTC).date()
-
-
-def _is_ours(path: Path) -> bool:
-    """Tell whether a file was written by a conversion, so that another may replace it."""
-    if not path.is_file():
-        return False
-    with path.open('rb') as stream:
-        return SOURCE_MARK.encode() in stream.read(_HEAD_BYTES)

@@ -27,6 +27,7 @@ from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 
 # Written into every exported file's source, and the mark by which one is known.
 SOURCE_MARK = 'driven in crgame_ros'
+_HEAD_BYTES = 4096
 _ERRORS_TOLD = 3
 _DATE = re.compile(r'\d{4}-\d{2}-\d{2}')
 
@@ -91,17 +92,40 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
     return ExportedScenario(header['benchmarkID'], text, objects.ids, problem_ids, tuple(notices))
 
 
-def write_scenario(log: RunLog, path: Path, **header: Any) -> ExportedScenario:
+def write_scenario(log: RunLog, out: Path, **header: Any) -> ExportedScenario:
     """
     Write a run as a CommonRoad scenario; the file is there whole or not at all.
 
+    :param out: the file (`*.xml`), or the folder for `<benchmark id>.xml`.
     :param header: keyword arguments of `export_scenario`.
     :raises InputError: as `export_scenario`, and if the file cannot be written.
     :raises CrgameError: as `export_scenario`.
     """
     exported = export_scenario(log, **header)
-    write_text(exported.xml_text, path)
+    write_text(exported.xml_text, scenario_path(out, exported.benchmark_id))
     return exported
+
+
+def scenario_path(out: Path, benchmark_id: str) -> Path:
+    """
+    Choose the file to write; an earlier export may be replaced, nothing else.
+
+    :param out: as for `write_scenario`.
+    :raises InputError: if a file that is no export has that name.
+    """
+    path = out if out.suffix == '.xml' else out / f'{benchmark_id}.xml'
+    try:
+        with path.open('rb') as stream:
+            replaceable = SOURCE_MARK.encode() in stream.read(_HEAD_BYTES)
+    except FileNotFoundError:
+        return path
+    except OSError as error:
+        raise InputError(f'cannot be written ({error.strerror})', str(path),
+                         'name another file or folder') from error
+    if not replaceable:
+        raise InputError('a file that is no exported run is there already', str(path),
+                         'name another file or folder')
+    return path
 
 
 def write_text(text: str, path: Path) -> None:

@@ -23,6 +23,7 @@ from crgame_ros.scenario.loading import LoadedScenario
 
 _PARTS = ('location', 'scenarioTags', 'lanelet', 'trafficSign', 'trafficLight', 'intersection')
 _SIMULATED = 'simulated'
+_MESSAGE_LENGTH = 200
 _LOCATION = ('<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude>'
              '<gpsLongitude>999</gpsLongitude></location>')
 # What the schema asks for beside the roads, so that they can be checked alone.
@@ -37,19 +38,21 @@ _PROBLEM = (
 
 
 @functools.cache
-def commonroad_schema() -> etree.XMLSchema:
-    """Load the CommonRoad 2020a schema that commonroad-io brings."""
+def _schema() -> tuple[etree.XMLSchema, frozenset[str]]:
+    """Load the CommonRoad 2020a schema that commonroad-io brings, and the signs that it knows."""
     file = resources.files('commonroad').joinpath(
         'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')
-    return etree.XMLSchema(etree.fromstring(file.read_bytes()))
+    root = etree.fromstring(file.read_bytes())
+    signs = root.iterfind('{*}simpleType[@name="trafficSignID"]/{*}restriction/{*}enumeration')
+    return etree.XMLSchema(root), frozenset(sign.get('value') for sign in signs)
 
 
 def schema_errors(root: etree._Element) -> list[str]:
     """List what the schema finds wrong, empty for a valid scenario."""
-    schema = commonroad_schema()
+    schema, _ = _schema()
     if schema.validate(root):
         return []
-    return [f'line {entry.line}: {entry.message}' for entry in schema.error_log]
+    return [entry.message[:_MESSAGE_LENGTH] for entry in schema.error_log]
 
 
 def network_elements(loaded: LoadedScenario, shift: int,
@@ -66,17 +69,19 @@ def network_elements(loaded: LoadedScenario, shift: int,
     """
     root = guard.parse_hardened(loaded.xml_text, loaded.source)
     if root.get('commonRoadVersion') == '2020a':
-        copied = _completed([deepcopy(child) for tag in _PARTS
-                             for child in root.iterchildren(tag)], shift)
+        copied, remarks = _completed([deepcopy(child) for tag in _PARTS
+                                      for child in root.iterchildren(tag)], shift)
         if not _errors_of(copied):
+            notices += remarks
             return copied
-    rewritten = _completed(_rewritten(loaded), shift)
+    rewritten, remarks = _completed(_rewritten(loaded), shift)
     errors = _errors_of(rewritten)
     if errors:
         raise CrgameError(f'{loaded.source}: the roads cannot be written as a valid scenario '
                           f'({"; ".join(errors[:3])}); correct the scenario and run again')
     notices.append('the roads of the original are not as the CommonRoad 2020a schema has them and '
                    'are written anew from what was read')
+    notices += remarks
     return rewritten
 
 
@@ -97,8 +102,9 @@ def _errors_of(elements: list[etree._Element]) -> list[str]:
     return schema_errors(frame)
 
 
-def _completed(elements: list[etree._Element], shift: int) -> list[etree._Element]:
-    """Add what every scenario must have, and move the lights' cycles."""
+def _completed(elements: list[etree._Element],
+               shift: int) -> tuple[list[etree._Element], list[str]]:
+    """Add what every scenario must have, drop signs that it can't, and move the lights' cycles."""
     if not any(element.tag == 'location' for element in elements):
         elements.insert(0, etree.fromstring(_LOCATION))
     if not any(element.tag == 'scenarioTags' for element in elements):
@@ -109,7 +115,31 @@ def _completed(elements: list[etree._Element], shift: int) -> list[etree._Elemen
     for light in elements:
         for cycle in light.iterchildren('cycle') if light.tag == 'trafficLight' else ():
             _shift_cycle(cycle, shift)
-    return elements
+    return _without_unknown_signs(elements)
+
+
+def _without_unknown_signs(
+    elements: list[etree._Element],
+) -> tuple[list[etree._Element], list[str]]:
+    _, known = _schema()
+    gone: set[str] = set()
+    dropped = 0
+    for sign in elements:
+        parts = sign.findall('trafficSignElement') if sign.tag == 'trafficSign' else []
+        unknown = [part for part in parts if part.findtext('trafficSignID') not in known]
+        for part in unknown:
+            sign.remove(part)
+        dropped += len(unknown)
+        if unknown and len(unknown) == len(parts):
+            gone.add(sign.get('id'))
+    for lanelet in elements if gone else ():
+        for reference in lanelet.findall('.//trafficSignRef'):
+            if reference.get('ref') in gone:
+                reference.getparent().remove(reference)
+    kept = [element for element in elements
+            if element.tag != 'trafficSign' or element.get('id') not in gone]
+    return kept, [f'the schema does not know {dropped} of the traffic signs; they are left out'
+                  ] if dropped else []
 
 
 def _shift_cycle(cycle: etree._Element, shift: int) -> None:
@@ -144,15 +174,4 @@ def _rewritten(loaded: LoadedScenario) -> list[etree._Element]:
         elements += [TrafficSignXMLNode.create_node(sign) for sign in network.traffic_signs]
         elements += [TrafficLightXMLNode.create_node(light) for light in network.traffic_lights]
         elements += [IntersectionXMLNode.create_node(item) for item in network.intersections]
-    for element in elements:
-        for line in element.iterchildren('stopLine'):
-            _complete_stop_line(line)
     return elements
-
-
-def _complete_stop_line(line: etree._Element) -> None:
-    """Give a stop line the marking that the schema asks for."""
-    if line.find('lineMarking') is None:
-        marking = etree.Element('lineMarking')
-        marking.text = 'unknown'
-        line.insert(len(line.findall('point')), marking)

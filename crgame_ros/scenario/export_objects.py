@@ -83,14 +83,14 @@ class ObjectWriter:
         self._parts: dict[str, list[str]] = {group: [] for group in _GROUPS}
         self.vehicle_rows = _vehicle_rows(log)
         self.ids: dict[str, int] = {}
-        seen = [bool(there) for there in np.isfinite(log.object_poses).all(axis=2).any(axis=0)]
-        for item in (item for item, there in zip(log.objects, seen, strict=True) if there):
+        seen = np.flatnonzero(np.isfinite(log.object_poses).all(axis=2).any(axis=0)).tolist()
+        for item in (log.objects[column] for column in seen):
             number = item.id.removeprefix('o')
             self.ids[item.id] = ids.keep(int(number), item.id) if number.isdecimal() \
                 else ids.fresh()
-        if not all(seen):
-            notices.append(f'{seen.count(False)} objects never appeared in the run and are left '
-                           'out')
+        if len(seen) < len(log.objects):
+            notices.append(f'{len(log.objects) - len(seen)} objects never appeared in the run and '
+                           'are left out')
 
     def write(self) -> None:
         """Write all objects, then the driven vehicles."""

@@ -38,9 +38,9 @@ class PlannerRecord:
 
     @property
     def accepted_ratio(self) -> float:
-        """Share of the requests answered by an accepted plan that is no fallback."""
+        """Share of the planner's answers that were accepted and no fallback."""
         good = self.counters.accepted - self.statistics.fallbacks
-        return max(0, good) / max(1, self.counters.requests)
+        return max(0, good) / max(1, self.statistics.plans)
 
 
 @dataclass(frozen=True)

@@ -145,6 +145,9 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
         source = parse_source(spec.driver)
         timeline = load_timeline(source, game.base).to_text() if source.has_timeline else ''
         humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline))
+    if not humans and not avs:
+        raise InputError('has neither humans nor planning problems', loaded.source,
+                         'add a human to the game')
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
     return Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler, tuple(notices))
 

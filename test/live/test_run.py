@@ -111,7 +111,8 @@ def test_no_step_is_missing_in_the_recording(finished: Launcher) -> None:
 def test_the_scenario_is_valid_and_true_to_the_recording(finished: Launcher) -> None:
     """The XML obeys CommonRoad's schema, and every k is within 1 mm of the recorded pose."""
     path = finished.out / f'{BENCHMARK_ID}.xml'
-    schema = Path(commonroad.__file__).parent / 'scenario_definition' / 'XML_commonRoad_XSD.xsd'
+    schema = Path(commonroad.__file__).parent.joinpath(
+        'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')
     etree.XMLSchema(etree.parse(str(schema))).assertValid(etree.parse(str(path)))
     scenario, problems = CommonRoadFileReader(str(path)).open()
     poses = _poses(finished.out / 'bag')

@@ -124,8 +124,8 @@ def test_simulation_that_was_restarted(tmp_path: Path, recorder: Any, drive: Dri
 
 
 @pytest.mark.parametrize(('topic', 'lost', 'ks', 'notice'), [
-    ('/vehicles/state', range(3, 5), range(3), 'scenario step 3 was not recorded: the run is taken '
-     'up to 2 of 10'),
+    ('/vehicles/state', range(3, 5), range(3), 'scenario step 3 was not recorded: the run is '
+     'taken up to 2 of 10'),
     ('/traffic/objects', range(3, 4), range(3), 'scenario step 3 was not recorded: the run is '
      'taken up to 2 of 10'),
     ('/vehicles/state', range(4), range(4, 11), 'the recording begins at scenario step 4 of a run '

@@ -118,15 +118,20 @@ def test_dropped_clip_loses_the_stall() -> None:
 
 
 def test_carry_holds_under_random_load() -> None:
-    """The sum differs from n dt by no more than the present lag, at every cycle."""
+    """
+    The sum follows the wall clock: ahead of n dt by the lag at most, and back after every stall.
+
+    Cycles shorter than dt_min, here of almost no work, run ahead by that until they are paid back.
+    """
     random = np.random.default_rng(41)
-    busy = (random.exponential(6 * MS, 3000) + 80 * MS * (random.random(3000) < 0.01)).astype(int)
-    cycles = busy_loop(TimeController(SPEC, DT), lambda n: int(busy[n]), 3000)
+    busy = (random.exponential(3 * MS, 3000) + 80 * MS * (random.random(3000) < 0.01)).astype(int)
+    spec = replace(SPEC, drift_reset=False)
+    cycles = busy_loop(TimeController(spec, DT), lambda n: int(busy[n]), 3000)
     total = np.cumsum([cycle.dt_eff_s for cycle in cycles])
     lag = np.array([cycle.cumulative_error_s for cycle in cycles])
     owed = total - np.arange(1, 3001) * DT
     assert np.abs(lag).max() > 0.05
-    assert (owed <= lag + 1e-8).all()
+    assert (owed <= lag + 3 * SPEC.dt_min).all()
     on_time = np.convolve(lag < 1e-8, np.ones(30), 'valid') == 30
     assert on_time.any()
     np.testing.assert_allclose(owed[29:][on_time], 0.0, atol=1e-8)
@@ -173,23 +178,28 @@ def test_no_reset_below_the_threshold_or_when_off() -> None:
 
 
 def test_warm_up_suppresses_the_reset() -> None:
-    """Within the first 50 steps a stall is caught up; the step after them would reset."""
-    for step, resets in ((10, 0), (49, 0), (50, 1)):
+    """A stall at the start is caught up; what is left of one after step 50 is a reset there."""
+    for step, reset_at in ((10, None), (45, 51), (60, 61)):
         controller = TimeController(SPEC, DT)
         cycles = busy_loop(controller, lambda n, step=step: 400 * MS if n == step else MS, 200)
-        assert controller.resets == resets
+        resets = [cycle.n for cycle in cycles if cycle.resets]
+        assert (resets[0] if resets else None) == reset_at
         assert cycles[-1].cumulative_error_s == pytest.approx(0.0, abs=1e-8)
+    # 390 ms at step 46, 9 ms less at each step until 51.
+    controller = TimeController(SPEC, DT)
+    busy_loop(controller, lambda n: 400 * MS if n == 45 else MS, 200)
+    assert controller.dropped_s == pytest.approx(0.39 - 5 * 0.009)
 
 
 def test_catch_up_is_bounded() -> None:
-    """Cycles that take 10.5 ms: after 50 late ones in a row the schedule moves, not earlier."""
+    """Cycles that take 10.6 ms: after 50 late ones in a row the schedule moves, not earlier."""
     controller = TimeController(SPEC, DT)
-    cycles = busy_loop(controller, lambda n: 10_500_000, 200)
-    # E_n exceeds one step from n = 21 on; its 50th late cycle is n = 70 with 35 ms of lag.
+    cycles = busy_loop(controller, lambda n: 10_600_000, 200)
+    # E_n exceeds one step from n = 17 on; its 50th late cycle is n = 66 with 39.6 ms of lag.
     resets = [cycle.n for before, cycle in zip(cycles, cycles[1:], strict=False)
               if cycle.resets > before.resets]
-    assert resets == [70, 140]
-    assert controller.dropped_s == pytest.approx(0.070)
+    assert resets == [66, 132, 198]
+    assert controller.dropped_s == pytest.approx(3 * 0.0396)
 
 
 @pytest.mark.parametrize('factor', [0.1, 0.5, 2.0, 10.0])

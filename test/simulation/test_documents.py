@@ -1,0 +1,170 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The run as JSON text: round trips, and garbage from anybody on the bus."""
+
+from collections.abc import Callable
+from dataclasses import asdict, fields, replace
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import simulation_support as support
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.game import DrivabilitySpec
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.simulation.documents import (
+    game_document, objects_document, parse_game_document, parse_objects_document)
+from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+
+@pytest.fixture(scope='module')
+def game() -> Setup:
+    """Load the multi-AV game with its scripted human."""
+    return build_setup(load_game(scenarios_directory() / 'two_avs.yaml'))
+
+
+@pytest.fixture(scope='module')
+def text(game: Setup) -> str:
+    """Write the game after two resets."""
+    return game_document(game, epoch=2, clock_offset_ns=5_000_000_000, real_time_factor=0.5)
+
+
+def test_game_round_trip(game: Setup, text: str) -> None:
+    """What the engine runs is what the others read."""
+    document = parse_game_document(text)
+    assert document.epoch == 2
+    assert document.scenario_sha256 == game.loaded.sha256
+    assert document.scheduler == replace(game.scheduler, clock_offset_ns=5_000_000_000)
+    assert document.drivability == DrivabilitySpec()
+    assert [entry['id'] for entry in (*document.humans, *document.avs)] == ['hv0', 'av0', 'av1']
+    for setup, entry in zip(game.vehicles, (*document.humans, *document.avs), strict=True):
+        assert entry['state'] == list(setup.state)
+        assert VehicleParameters(**entry['vehicle']) == replace(setup.vehicle, steering_ratio='')
+    assert document.content['real_time_factor'] == 0.5
+    assert document.content['benchmark_id'] == 'C-ZAM_TwoAvs-1_1_T-1'
+    assert document.content['dt_ns'] == 10_000_000
+    assert document.content['duration'] == 20.0
+    assert document.content['timing'] == asdict(game.game.timing)
+
+
+def test_scripted_driver_travels_as_text(game: Setup, text: str) -> None:
+    """No shared file system is needed to drive the human."""
+    human = parse_game_document(text).humans[0]
+    assert human['driver'] == game.game.humans[0].driver
+    assert human['timeline'] == game.humans[0].timeline
+    assert len(human['timeline']) > 100
+
+
+def test_vehicle_by_id(text: str) -> None:
+    """Humans and AVs; None for everybody else."""
+    document = parse_game_document(text)
+    assert document.vehicle('av1') == document.avs[1]
+    assert document.vehicle('hv0') == document.humans[0]
+    assert document.vehicle('hv1') is None
+
+
+def test_transform_is_written(two_avs: LoadedScenario) -> None:
+    """Delta psi and d of CRG 6-8, in this order."""
+    moved = support.moved(two_avs, 10.0, (0.0, 0.4), 0.1)
+    setup = build_setup(support.game_of(moved, avs=support.av_of('idm', spawn='lanelet')), moved)
+    content = json.loads(game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    transform = setup.avs[0].transform
+    assert not transform.is_identity
+    assert content['avs'][0]['transform'] == [
+        transform.yaw_offset, transform.offset_x, transform.offset_y]
+
+
+def test_endless_game_and_unlimited_steering_are_valid_json(
+        cut_in: LoadedScenario) -> None:
+    """Infinity is no JSON: a duration and a steering rate without limit become null."""
+    setup = support.setup_of(cut_in)
+    free = replace(setup.avs[0], vehicle=replace(setup.avs[0].vehicle,
+                                                 max_steering_rate=math.inf))
+    text = game_document(replace(setup, avs=(free,)), epoch=0, clock_offset_ns=0,
+                         real_time_factor=1.0)
+    assert 'Infinity' not in text
+    assert json.loads(text)['duration'] is None
+    assert json.loads(text)['avs'][0]['vehicle']['max_steering_rate'] is None
+    assert parse_game_document(text).avs[0]['vehicle']['max_steering_rate'] == math.inf
+
+
+def without(key: str) -> Callable[[dict[str, Any]], None]:
+    """Remove a key."""
+    return lambda content: content.pop(key)
+
+
+def with_value(key: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    """Set a key."""
+    return lambda content: content.update({key: value})
+
+
+@pytest.mark.parametrize('spoil', [
+    *(without(key) for key in ('epoch', 'scenario_sha256', 'dt_c_ns', 'steps_per_tick', 'k0',
+                               'clock_offset_ns', 'humans', 'avs', 'drivability')),
+    with_value('epoch', 'soon'), with_value('dt_c_ns', 0), with_value('steps_per_tick', -1),
+    with_value('k0', math.nan), with_value('clock_offset_ns', math.inf), with_value('avs', 7),
+    with_value('humans', ['hv0']), with_value('humans', [{'id': 'hv0'}]),
+    with_value('drivability', {'colour': 'red'}), with_value('drivability', None)])
+def test_spoilt_game_is_refused(text: str, spoil: Callable[[dict[str, Any]], None]) -> None:
+    """One error that names the topic, never a bare exception."""
+    content = json.loads(text)
+    spoil(content)
+    with pytest.raises(InputError, match='/scenario/game: is no game document'):
+        parse_game_document(json.dumps(content))
+
+
+GARBAGE = ['', 'no json', '[]', '7', 'null', '{}', '"text"', '[' * 100_000, '\x00', '[[[]]]',
+           '[{}]', '[null]']
+
+
+@pytest.mark.parametrize('garbage', GARBAGE, ids=range(len(GARBAGE)))
+def test_garbage_is_refused(garbage: str) -> None:
+    """Whatever arrives on either topic."""
+    with pytest.raises(InputError, match='/scenario/game'):
+        parse_game_document(garbage)
+    if garbage not in ('[]', '{}', '"text"'):
+        with pytest.raises(InputError, match='/scenario/objects'):
+            parse_objects_document(garbage)
+
+
+def test_objects_round_trip(traffic: LoadedScenario) -> None:
+    """Every description, and a polygon and a circle as well."""
+    described = (
+        *support.setup_of(traffic, [support.BESIDE]).descriptions,
+        ObjectDescription('o7', 'building', Role.STATIC,
+                          Shape.polygon(((0.0, 0.0), (2.0, 0.1), (1.0, 3.3)))),
+        ObjectDescription('o8', 'pedestrian', Role.RECORDED, Shape.circle(0.3)))
+    assert parse_objects_document(objects_document(described)) == described
+    entry = json.loads(objects_document(described))[0]
+    assert (entry['id'], entry['role'], entry['reference_point']) == ('hv0', 'human', 'rear_axle')
+    assert entry['rear_to_center'] == pytest.approx(1.4227, abs=1e-4)
+    assert json.loads(objects_document(described))[-1]['reference_point'] == 'center'
+
+
+@pytest.mark.parametrize(('key', 'value'), [
+    ('role', 'ghost'), ('shape', {}), ('shape', None), ('rear_to_center', 'far'),
+    ('shape', {'kind': 'rectangle', 'length': -1.0, 'width': 2.0, 'vertices': []}),
+    ('shape', {'kind': 'polygon', 'length': 1.0, 'width': 2.0, 'vertices': [[1.0]]})])
+def test_spoilt_objects_are_refused(key: str, value: Any) -> None:
+    """An object that could not be drawn or avoided."""
+    item = ObjectDescription('o1', 'car', Role.RECORDED, Shape.rectangle(4.0, 2.0))
+    entries = json.loads(objects_document([item]))
+    entries[0][key] = value
+    with pytest.raises(InputError):
+        parse_objects_document(json.dumps(entries))
+
+
+def test_vehicle_entry_has_every_parameter(text: str) -> None:
+    """A planner in another process rebuilds the parameters from the text alone."""
+    entry = parse_game_document(text).avs[0]['vehicle']
+    assert entry.keys() == {field.name for field in fields(VehicleParameters)}
+    # A path of this machine says nothing to another one.
+    assert str(Path.cwd()) not in json.dumps(entry)
