@@ -130,6 +130,8 @@ def _offline(values: argparse.Namespace) -> int:
 
 def _convert(values: argparse.Namespace) -> int:
     from crgame_ros.recording.conversion import convert
+    if values.out is not None:
+        values.out.mkdir(parents=True, exist_ok=True)
     report = convert(values.bag, values.out)
     for notice in report.notices:
         print(f'note: {notice}')

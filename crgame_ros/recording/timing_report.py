@@ -3,7 +3,7 @@
 """`timing.json`: what a recorded run says of its timing, its planners and its violations."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 import json
 from pathlib import Path
 from typing import Any
@@ -79,6 +79,7 @@ class _Collector:
         self._lasting: dict[str, set[str]] = defaultdict(set)
         self._asked_ns: dict[tuple[str, int], int] = {}
         self._latencies_ms: dict[str, list[float]] = defaultdict(list)
+        self._first_latency_ms: dict[str, float] = {}
         self._answers: dict[str, int] = defaultdict(int)
         self._plan_times_ms: dict[str, list[float]] = defaultdict(list)
         self._statuses: dict[str, dict[str, str]] = {}
@@ -104,8 +105,14 @@ class _Collector:
     def _take_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1
         asked_ns = self._asked_ns.pop((av, stamp_ns), None)
-        if asked_ns is not None:
-            self._latencies_ms[av].append((log_time_ns - asked_ns) * 1e-6)
+        if asked_ns is None:
+            return
+        latency_ms = (log_time_ns - asked_ns) * 1e-6
+        if stamp_ns == self._run.game.scheduler.clock_offset_ns:
+            # The run waits for this answer, and the planner for its imports.
+            self._first_latency_ms[av] = latency_ms
+        else:
+            self._latencies_ms[av].append(latency_ms)
 
     def _take_status(self, status: Any) -> None:
         values = _values(status)
@@ -133,6 +140,7 @@ class _Collector:
         report['fallback'] = _count(node, 'fallbacks')
         report['plan_time_ms'] = _spread(self._plan_times_ms[name])
         report['latency_ms'] = _spread(self._latencies_ms[av])
+        report['first_latency_ms'] = self._first_latency_ms.get(av)
         return report
 
 
@@ -145,9 +153,9 @@ def _count(values: dict[str, str], key: str) -> int | None:
     return int(text) if text.isdecimal() else None
 
 
-def _spread(samples: Sequence[float] | Iterable[float]) -> dict[str, float] | None:
+def _spread(samples: Sequence[float]) -> dict[str, float] | None:
     """Give median, 99th percentile and maximum; None of nothing."""
-    values = np.fromiter(samples, dtype=np.float64)
+    values = np.array(samples)
     if not len(values):
         return None
     return {'p50': float(np.percentile(values, 50)), 'p99': float(np.percentile(values, 99)),

@@ -34,7 +34,10 @@ class SimControl:
         self.reset_wanted = False
         self.stop_wanted = False
         self._declare()
+        # Read at every cycle, so kept beside the parameter.
+        self.real_time_factor = float(self._value('real_time_factor'))
         node.add_on_set_parameters_callback(self._on_parameters)
+        node.add_post_set_parameters_callback(self._after_parameters)
         endpoints = Endpoints(node)
         for name, callback in (('/sim/start', self._on_start), ('/sim/pause', self._on_pause),
                                ('/sim/step', self._on_step), ('/sim/reset', self._on_reset),
@@ -103,11 +106,6 @@ class SimControl:
         """How long to wait for planners and companions [s]."""
         return float(self._value('planner_timeout'))
 
-    @property
-    def real_time_factor(self) -> float:
-        """Simulated seconds per wall second that are asked for."""
-        return float(self._value('real_time_factor'))
-
     def first_game(self) -> Game:
         """
         Load the game that the command line names.
@@ -155,6 +153,11 @@ class SimControl:
                     return SetParametersResult(successful=False, reason=str(error))
                 self._chosen = parameter.name
         return SetParametersResult(successful=True)
+
+    def _after_parameters(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == 'real_time_factor':
+                self.real_time_factor = float(parameter.value)
 
     def _on_start(self, _: Any, response: Any) -> Any:
         self.paused = False

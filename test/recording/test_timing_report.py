@@ -114,7 +114,7 @@ def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     result = drive(TWO_AVS, duration_s=0.1, avs=tuple(
         AvSpec(f'av{i}', 'constant-velocity') for i in range(2)))
     messages = documents(recorder, result) + cycles(recorder, {}, {}, 20)
-    messages += planner_messages(recorder, {0: 3.0, 1: 5.0, 2: 4.0, 3: 40.0})
+    messages += planner_messages(recorder, {0: 300.0, 1: 5.0, 2: 4.0, 3: 40.0, 4: 3.0})
     series = recorder.joints(0, ['av0/x'], [0.0], [0.0], [0.0])
     # The first request was sent twice before it was answered; the second time counts.
     messages += [('/av0/plan_request', TRAJECTORY, START - 500_000_000, series),
@@ -140,6 +140,8 @@ def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     # numpy's quantiles of 3, 4, 5, 40: (4 + 5) / 2 and 5 + 0.97 * 35.
     assert av0['latency_ms'] == pytest.approx({'p50': 4.5, 'p99': 38.95, 'max': 40.0})
     assert av0['plan_time_ms'] == pytest.approx({'p50': 3.0, 'p99': 7.9, 'max': 8.0})
+    # The run waits for the first plan: what the planner took to start is told apart.
+    assert av0['first_latency_ms'] == pytest.approx(300.0)
     silent = report['planners']['av1']
     assert silent == dict.fromkeys(av0) | {'plans': 0}
 

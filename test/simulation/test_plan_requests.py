@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a planner is told of the others' future, in each of the three modes (CRG III-A1c)."""
 
+import copy
 from dataclasses import replace
 import math
 
@@ -76,11 +77,22 @@ def test_plans_mode_tells_the_other_avs_plan(two_avs: LoadedScenario) -> None:
     assert np.isnan(columns_of(request, 'av1', request.positions)[1:]).all()
 
 
+def braking_later(loaded: LoadedScenario, k: int) -> LoadedScenario:
+    """Let every recorded vehicle, which all drive along x, brake at 4 m/s^2 from step k on."""
+    scenario = copy.deepcopy(loaded.scenario)
+    for obstacle in scenario.dynamic_obstacles:
+        for state in obstacle.prediction.trajectory.state_list:
+            elapsed = max(0, state.time_step - k) * 0.1
+            state.position = state.position - (2.0 * elapsed**2, 0.0)
+    return replace(loaded, scenario=scenario)
+
+
 def test_recorded_mode_tells_the_true_future(traffic: LoadedScenario) -> None:
     """Point i is the recorded pose at k + i; by default it is not."""
     requests = {}
+    braking = braking_later(traffic, 10)
     for mode in ('recorded', 'constant'):
-        setup = support.setup_of(traffic, prediction=PredictionSpec(mode))
+        setup = support.setup_of(braking, prediction=PredictionSpec(mode))
         run = HandDriven(setup)
         run.drive(30)
         requests[mode] = run.result.requests['av0']
@@ -93,20 +105,20 @@ def test_recorded_mode_tells_the_true_future(traffic: LoadedScenario) -> None:
     np.testing.assert_array_equal(requests['recorded'].positions[0, 4:],
                                   requests['constant'].positions[0, 4:])
     difference = requests['recorded'].positions[30, 4:] - requests['constant'].positions[30, 4:]
-    assert np.nanmax(np.abs(difference)) > 1.0
+    # From k = 10 to the end of the horizon, k = 33, they brake for 2.3 s: 2 * 2.3^2 m.
+    assert np.nanmin(difference) == pytest.approx(-2.0 * 2.3**2, abs=0.1)
 
 
 def test_constant_mode_does_not_look_ahead(traffic: LoadedScenario) -> None:
     """Change the future of every recorded car: the request at k stays bit for bit the same."""
-    setup = support.setup_of(traffic)
-    run = HandDriven(setup)
-    request = run.result.requests['av0']
-    obstacles = setup.obstacles
-    obstacles.poses[1:] += 5.0
-    obstacles.velocities[1:] *= 0.5
-    again = HandDriven(replace(setup, obstacles=obstacles)).result.requests['av0']
+    request = HandDriven(support.setup_of(traffic)).result.requests['av0']
+    # Velocities lead to the next pose, so the next one is known; nothing after it.
+    other = HandDriven(support.setup_of(braking_later(traffic, 1)))
+    again = other.result.requests['av0']
     assert again.positions.tobytes() == request.positions.tobytes()
     assert again.velocities.tobytes() == request.velocities.tobytes()
+    other.drive(30)
+    assert np.nanmin(other.result.objects.velocities[:, 0]) < 18.0
 
 
 @pytest.mark.parametrize(('horizon', 'points'), [(3.0, 31), (0.1, 2), (5.0, 51), (0.25, 3)])
