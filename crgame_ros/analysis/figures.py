@@ -84,7 +84,7 @@ class _View:
 
     def of(self, points: Array) -> Array:
         """Map points (N, 2) from map."""
-        mapped: Array = (points - self._origin) @ self._turn
+        mapped: Array = np.asarray((points - self._origin) @ self._turn, dtype=np.float64)
         return mapped
 
 

@@ -24,7 +24,7 @@ _PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'real
 
 def timing_report(bag: Path, epoch: int | None = None) -> dict[str, Any]:
     """
-    Report on a recorded run; keys and metrics are defined in `docs/timing.md`.
+    Report on a recorded run; `docs/recordings.md` and `docs/timing.md` define the keys.
 
     :param bag: a recording, finished or cut off.
     :param epoch: which run, where the recording holds several; None for the last.

@@ -17,7 +17,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, String
 
 from crgame_ros.planner.joints import (
-    JointSeries, object_joint_names, vehicle_joint_names, vehicle_to_joints)
+    JointSeries,
+    object_joint_names,
+    vehicle_joint_names,
+    vehicle_to_joints,
+)
 from crgame_ros.ros.contract import load_contract
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import MAP, SeriesMessage, set_time, StateMessage, to_time
