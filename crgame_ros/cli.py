@@ -60,6 +60,8 @@ def _build_parser() -> argparse.ArgumentParser:
     convert = commands.add_parser('convert', help='recording to CommonRoad scenario')
     convert.add_argument('bag', type=Path, help='folder or file of the recording')
     convert.add_argument('--out', type=Path, help='folder for the scenario (default: beside)')
+    convert.add_argument('--epoch', type=int, help='which run of a recording that holds several '
+                         '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
     recover = commands.add_parser('recover', help='finish a killed recording')
     recover.add_argument('bag', type=Path, help='folder or .mcap file')
@@ -132,7 +134,7 @@ def _convert(values: argparse.Namespace) -> int:
     from crgame_ros.recording.conversion import convert
     if values.out is not None:
         values.out.mkdir(parents=True, exist_ok=True)
-    report = convert(values.bag, values.out)
+    report = convert(values.bag, values.out, values.epoch)
     for notice in report.notices:
         print(f'note: {notice}')
     print(report.path)

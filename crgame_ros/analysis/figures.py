@@ -104,7 +104,8 @@ def _footprint(axes: Axes, view: _View, description: ObjectDescription, center: 
 
 
 def _times(result: OfflineResult) -> Array:
-    return np.arange(len(result.vehicle_states)) * result.setup.scheduler.dt_s
+    return np.asarray(np.arange(len(result.vehicle_states)) * result.setup.scheduler.dt_s,
+                      dtype=np.float64)
 
 
 def _profile(axes: Axes, result: OfflineResult, column: StateColumn, label: str) -> None:

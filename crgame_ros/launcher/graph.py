@@ -34,7 +34,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
                  nice=COMPANION_NICE, restart=True),
         NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
         NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True)]
-    waiting = ', '.join(f'"{name}"' for name in sorted({spec.executable for spec in companions}))
+    waiting = ', '.join(f'"{spec.name}"' for spec in companions)
     simulation = NodeSpec('sim_node', 'sim_node', {
         'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
         'realtime_priority': str(request.realtime_priority).lower(),

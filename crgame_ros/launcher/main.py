@@ -69,8 +69,12 @@ def finish(plan: RunPlan) -> int:
     # A reset begins another bag, a recorder that was started again too.
     bags = sorted(path for path in plan.folder.glob(f'{plan.bag.name}*') if path.is_dir())
     steps: list[Callable[[], object]] = [partial(recover, bag) for bag in bags]
-    steps += [lambda: write_timing_report(plan.bag, plan.folder / 'timing.json'),
-              lambda: convert(plan.bag, plan.folder)]
+    for bag in bags:
+        # The first bag gives the run's files their names, later ones their own.
+        suffix = bag.name.removeprefix(plan.bag.name)
+        timing = plan.folder / f'timing{suffix}.json'
+        scenario = plan.folder / f'{bag.name}.xml' if suffix else plan.folder
+        steps += [partial(write_timing_report, bag, timing), partial(convert, bag, scenario)]
     for step in steps:
         try:
             step()

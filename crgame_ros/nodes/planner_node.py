@@ -57,6 +57,7 @@ class PlannerNode(Node):
         self._adapter: PlannerAdapter | None = None
         self._reader: RequestReader | None = None
         self._frames_skipped = False
+        self._waiting: JointTrajectory | None = None
         self._subscriptions_kept = [
             endpoints.subscription('/scenario/xml', self._on_xml),
             endpoints.subscription('/scenario/objects', self._on_objects),
@@ -89,6 +90,10 @@ class PlannerNode(Node):
         except CrgameError as error:
             self._adapter = None
             self.get_logger().error(f'{self._vehicle_id}: {error}')
+            return
+        waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            self._on_request(waiting)
 
     def _prepare(self) -> None:
         """Set the planner up once text, game and objects belong together."""
@@ -125,6 +130,7 @@ class PlannerNode(Node):
 
     def _on_request(self, message: JointTrajectory) -> None:
         if self._adapter is None or self._reader is None or self._game is None:
+            self._waiting = message
             return
         try:
             request = self._reader.read(
@@ -132,6 +138,7 @@ class PlannerNode(Node):
         except InputError as error:
             # A request of the game before or after this one: its documents are on their way.
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            self._waiting = message
             return
         plan = self._adapter.plan(request)
         series = plan_to_joints(plan, self._vehicle_id, self._game.scheduler.time_step_ns)

@@ -33,7 +33,7 @@ class RequestReader:
         self._vehicle_id = vehicle_id
         self._objects = objects
         self._scheduler = scheduler
-        self._names: tuple[str, ...] = ()
+        self._names: tuple[str, ...] | None = None
         self._ids: tuple[str, ...] = ()
         self._columns = np.empty((0, 3), dtype=np.intp)
         self._to_center = np.empty(0)
@@ -58,7 +58,6 @@ class RequestReader:
         velocities = series.velocities[:, self._columns]
         shifted = self._to_center != 0.0
         if shifted.any():
-            poses, velocities = poses.copy(), velocities.copy()
             yaw, reach = poses[:, shifted, 2], self._to_center[shifted]
             yaw_rate = velocities[:, shifted, 2]
             poses[:, shifted, 0] += reach * np.cos(yaw)

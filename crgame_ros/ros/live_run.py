@@ -122,7 +122,7 @@ class LiveRun:
             if outcome is not None:
                 return outcome
             now_ns = time.monotonic_ns()
-            if not connected and self._outputs.subscribed_by(self._control.companions):
+            if not connected and not self._outputs.missing(self._control.companions):
                 connected = True
                 self._outputs.publish_step(self.simulation, result)
                 resend_ns = now_ns + int(RESEND_S * NS_PER_S)
@@ -139,7 +139,7 @@ class LiveRun:
         return None
 
     def _tell_who_is_missing(self, connected: bool, unanswered: set[str]) -> None:
-        missing = [] if connected else ['companion nodes ' + ', '.join(self._control.companions)]
+        missing = [] if connected else sorted(self._outputs.missing(self._control.companions))
         missing += [f'the planner of {av_id}' for av_id in sorted(unanswered)]
         self._node.get_logger().warning(
             f'starting without {" and ".join(missing)}: '

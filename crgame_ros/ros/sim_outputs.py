@@ -12,6 +12,7 @@ from geometry_msgs.msg import AccelStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, String
@@ -201,19 +202,32 @@ class SimOutputs:
         header = Header(stamp=to_time(stamp_ns), frame_id=MAP)
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
-    def subscribed_by(self, companions: Sequence[str]) -> bool:
-        """Tell whether every companion that consumes a topic of each step is connected to it."""
-        watched = {'/clock': [self._clock], '/vehicles/state': [self._state],
-                   '/traffic/objects': [self._objects], '/timing/cycle': [self._cycle],
-                   '/<av>/plan_request': list(self._requests.values())}
-        for name, publishers in watched.items():
-            # There is a driver node for each human; of all others a topic has one each.
-            expected = sum(len(self._setup.humans) if item == 'driver_node' else 1
-                           for item in load_contract().topic(name).consumers
-                           if item in companions)
-            if any(item.get_subscription_count() < expected for item in publishers):
-                return False
-        return True
+    def missing(self, companions: Sequence[str]) -> set[str]:
+        """
+        Find the companions that are not connected to a topic of each step that they consume.
+
+        :param companions: names of nodes, `planner_node_av0`, or of their executables.
+        """
+        contract = load_contract()
+        found: set[str] = set()
+        for name, publishers in {
+                '/clock': {'': self._clock}, '/vehicles/state': {'': self._state},
+                '/traffic/objects': {'': self._objects}, '/timing/cycle': {'': self._cycle},
+                '/<av>/plan_request': self._requests}.items():
+            consumers = contract.topic(name).consumers
+            for vehicle_id, publisher in publishers.items():
+                expected = {item for item in companions if _consumes(item, consumers, vehicle_id)}
+                found |= expected - self._connected(publisher, expected)
+        return found
+
+    def _connected(self, publisher: Publisher, expected: set[str]) -> set[str]:
+        """Find who is connected to a topic; all or none, for the middleware tells no names."""
+        names = [info.node_name for info in
+                 self._node.get_subscriptions_info_by_topic(publisher.topic_name)]
+        if publisher.get_subscription_count() < len(names):
+            return set()
+        return {item for item in expected
+                if any(name == item or name.startswith(f'{item}_') for name in names)}
 
     def wait_until_received(self) -> None:
         """Wait for the subscribers to acknowledge what was published, with a limit."""
@@ -229,3 +243,11 @@ class SimOutputs:
         publishers += [item for vehicle in self._vehicles for item in vehicle.publishers]
         for publisher in publishers:
             self._node.destroy_publisher(publisher)
+
+
+def _consumes(companion: str, consumers: Sequence[str], vehicle_id: str) -> bool:
+    """Tell whether a node, named after its executable and vehicle, consumes a topic."""
+    stem, _, vehicle = companion.partition('_node_')
+    executable = f'{stem}_node' if vehicle else companion
+    return executable in consumers and (
+        not vehicle or not vehicle_id or vehicle == vehicle_id)

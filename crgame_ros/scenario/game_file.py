@@ -29,6 +29,9 @@ from crgame_ros.scenario.game import (
 T = TypeVar('T')
 MAX_BYTES = 1 << 20
 PREFIX = {'humans': 'hv', 'avs': 'av'}
+# Values in messages: YAML aliases can make a short file a huge value.
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel = 2
 # Lower and upper bounds of numbers, by their name.
 BOUNDS: dict[str, tuple[float, float]] = {
     'rate': (1.0, 10000.0), 'duration': (0.0, math.inf), 'horizon': (0.1, 60.0),
@@ -173,23 +176,23 @@ def _checked(value: Any, hint: Any, name: str, where: str) -> Any:
         if origin is Literal:
             if value in get_args(option):
                 return value
-            raise InputError(f'"{name}" is {reprlib.repr(value)}', where,
+            raise InputError(f'"{name}" is {_SHORT.repr(value)}', where,
                              'use one of ' + ', '.join(map(str, get_args(option))))
         plain = origin or option
         if isinstance(plain, type) and isinstance(value, plain):
             return value
     names = ' or '.join(getattr(option, '__name__', str(option)) for option in options)
-    raise InputError(f'"{name}" is {reprlib.repr(value)}', where, f'give a {names}')
+    raise InputError(f'"{name}" is {_SHORT.repr(value)}', where, f'give a {names}')
 
 
 def _number(value: Any, kind: type, name: str, where: str) -> float | int:
     allowed = int | float if kind is float else int
     if isinstance(value, bool) or not isinstance(value, allowed) or value != value:
-        raise InputError(f'"{name}" is {reprlib.repr(value)}', where, 'give a number')
+        raise InputError(f'"{name}" is {_SHORT.repr(value)}', where, 'give a number')
     low, high = BOUNDS.get(name, (-math.inf, math.inf))
     largest = math.inf if name == 'duration' else sys.float_info.max
     if not max(low, -largest) <= value <= min(high, largest):
-        raise InputError(f'"{name}" is {reprlib.repr(value)}', where,
+        raise InputError(f'"{name}" is {_SHORT.repr(value)}', where,
                          f'give a number from {low:g} to {high:g}')
     return kind(value)
 

@@ -137,6 +137,9 @@ def _describe(obstacle: Obstacle, source: str) -> tuple[ObjectDescription, tuple
         if obstacle.prediction is None:
             raise InputError('a phantom obstacle has no occupancy set', where, 'remove it')
         shape = obstacle.prediction.occupancy_set[0].shape
+        if isinstance(shape, Rectangle):
+            # Occupancies stand turned in the map, the pose turns the footprint.
+            shape = Rectangle(shape.length, shape.width)
     try:
         footprint, offset = convert_shape(shape)
     except InputError as error:

@@ -12,8 +12,14 @@ import pytest
 from crgame_ros.errors import InputError
 from crgame_ros.planner.interface import Plan
 from crgame_ros.planner.joints import (
-    JointSeries, object_joint_names, plan_from_joints, plan_to_joints, vehicle_joint_names,
-    vehicle_to_joints, vehicles_from_joints)
+    JointSeries,
+    object_joint_names,
+    plan_from_joints,
+    plan_to_joints,
+    vehicle_joint_names,
+    vehicle_to_joints,
+    vehicles_from_joints,
+)
 from crgame_ros.vehicle.state import StateColumn, VehicleState
 
 STEP_NS = 100_000_000

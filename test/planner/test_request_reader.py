@@ -11,7 +11,11 @@ import pytest
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.planner.joints import (
-    JointSeries, object_joint_names, vehicle_joint_names, vehicle_to_joints)
+    JointSeries,
+    object_joint_names,
+    vehicle_joint_names,
+    vehicle_to_joints,
+)
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler

@@ -7,26 +7,31 @@ import sys
 
 import pytest
 
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.game_file import load_game
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-import simulation_support as support  # noqa: E402, I001
+
+def scenario_of(game: str) -> LoadedScenario:
+    """Load the scenario of one of the package's own games."""
+    return load_scenario(load_game(scenarios_directory() / f'{game}.yaml').scenario)
 
 
 @pytest.fixture(scope='session')
 def cut_in() -> LoadedScenario:
     """Load a straight motorway with one planning problem and no obstacle."""
-    return load_scenario(support.scenario_file('cut_in'))
+    return scenario_of('cut_in')
 
 
 @pytest.fixture(scope='session')
 def two_avs() -> LoadedScenario:
     """Load a curved motorway with two planning problems."""
-    return load_scenario(support.scenario_file('two_avs'))
+    return scenario_of('two_avs')
 
 
 @pytest.fixture(scope='session')
 def traffic() -> LoadedScenario:
     """Load a motorway with one planning problem and recorded obstacles."""
-    return load_scenario(support.scenario_file('traffic'))
+    return scenario_of('traffic')

@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.driver.command import DriverCommand
-from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.interface import Plan
 from crgame_ros.planner.joints import JointSeries, plan_to_joints, vehicles_from_joints
 from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, PoseSpawn, TimingSpec
-from crgame_ros.scenario.game_file import load_game
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import build_setup, Setup
@@ -26,11 +24,6 @@ from crgame_ros.vehicle.state import VehicleState
 Array = NDArray[np.float64]
 DT, DT_C, N = 0.01, 0.1, 10
 BESIDE = HumanSpec('hv0', 'idle', spawn=PoseSpawn(-20.0, 3.75, 0.0, 15.0))
-
-
-def scenario_file(game: str) -> Path:
-    """Find the scenario of one of the package's own games."""
-    return load_game(scenarios_directory() / f'{game}.yaml').scenario
 
 
 def game_of(loaded: LoadedScenario, humans: Sequence[HumanSpec] = (), **fields: Any) -> Game:

@@ -52,6 +52,18 @@ def test_answer_clears_the_busy_flag(run: HandDriven) -> None:
     assert av.busy
 
 
+def test_overdue_answer_leaves_the_planner_busy(run: HandDriven) -> None:
+    """It belongs to the request before the one that is out; the plan itself is welcome."""
+    first = run.result.requests['av0']
+    run.drive(100, plans=False)
+    second = run.result.requests['av0']
+    av = run.simulation.avs[0]
+    assert run.simulation.offer_plan('av0', support.answer(first)) is None
+    assert av.busy
+    assert run.simulation.offer_plan('av0', support.answer(second)) is None
+    assert not av.busy
+
+
 def test_refused_answer_is_an_answer(run: HandDriven) -> None:
     """A planner that answers nonsense is asked again at the next tick."""
     request = run.result.requests['av0']
@@ -109,7 +121,8 @@ def one_state(request: JointSeries) -> JointSeries:
 
 
 BAD = [
-    (spoilt(nan_in_the_middle), 'y of state 7 is nan'), (spoilt(jump), 'jump of 2.00 m at state 5'),
+    (spoilt(nan_in_the_middle), 'y of state 7 is nan'),
+    (spoilt(jump), 'jump of 2.00 m at state 5'),
     (spoilt(elsewhere), 'the first state is 1.00 m from the vehicle'),
     (spoilt(too_fast), 'speed of .* beyond the limit'),
     (spoilt(too_tight), 'lateral acceleration of 80.00'),
@@ -189,6 +202,16 @@ def test_without_any_plan_it_brakes_from_the_start(run: HandDriven) -> None:
     assert states[-1].speed == 0.0
     assert states[-1].x - start.x == pytest.approx(50.0, abs=1e-6)
     assert run.simulation.avs[0].plan_age_steps(700) is None
+
+
+def test_stop_is_a_stop_from_any_speed(cut_in: LoadedScenario) -> None:
+    """Speed exactly 0, never a rounding error behind it, after v^2 / 8 m."""
+    for speed in np.random.default_rng(81).uniform(0.1, 2.0, 30).tolist():
+        run = HandDriven(support.setup_of(support.moved(cut_in, speed)))
+        start = run.simulation.avs[0].state.x
+        states = run.drive(60, plans=False)
+        assert min(state.speed for state in states) == 0.0
+        assert states[-1].x - start == pytest.approx(speed**2 / 8.0, abs=1e-9)
 
 
 def test_recovery_when_plans_return(run: HandDriven) -> None:

@@ -20,7 +20,11 @@ from crgame_ros.scenario.game_file import load_game
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.simulation.documents import (
-    game_document, objects_document, parse_game_document, parse_objects_document)
+    game_document,
+    objects_document,
+    parse_game_document,
+    parse_objects_document,
+)
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.parameters import VehicleParameters
 

@@ -117,7 +117,7 @@ def test_constant_mode_does_not_look_ahead(traffic: LoadedScenario) -> None:
     again = other.result.requests['av0']
     assert again.positions.tobytes() == request.positions.tobytes()
     assert again.velocities.tobytes() == request.velocities.tobytes()
-    other.drive(30)
+    other.drive(150)
     assert np.nanmin(other.result.objects.velocities[:, 0]) < 18.0
 
 

@@ -26,7 +26,7 @@ def test_replanning_period(time_step: float, dt: float, period: int) -> None:
     (0.1, 3.0, 1, Fraction(100_000_000))])
 def test_step_divides_the_scenario_step_exactly(time_step: float, rate: float, period: int,
                                                 dt_ns: Fraction) -> None:
-    """Where the rate doesn't divide, dt becomes dt_c / N: 33.3 ms instead of 1/30 s off the grid."""
+    """Where the rate doesn't divide, dt becomes dt_c / N: 14.29 ms for 70 Hz."""
     scheduler = ScenarioScheduler.from_rate(time_step, rate)
     assert scheduler.steps_per_tick == period
     assert scheduler.dt_s == pytest.approx(float(dt_ns) * 1e-9, rel=1e-15)

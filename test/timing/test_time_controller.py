@@ -81,7 +81,8 @@ def test_stall_is_caught_up() -> None:
     errors = np.array([cycle.cumulative_error_s for cycle in cycles])
     assert errors[100] == pytest.approx(0.05)
     # Each of the following cycles gains 9 ms: 41, 32, 23, 14, 5, then back on schedule.
-    np.testing.assert_allclose(errors[101:107], (0.041, 0.032, 0.023, 0.014, 0.005, 0.0), atol=1e-8)
+    np.testing.assert_allclose(
+        errors[101:107], (0.041, 0.032, 0.023, 0.014, 0.005, 0.0), atol=1e-8)
     np.testing.assert_allclose(errors[107:], 0.0, atol=1e-8)
     assert cycles[-1].resets == 0
 
@@ -108,6 +109,14 @@ def test_carried_clip_returns_to_n_dt() -> None:
     assert effective.sum() == pytest.approx(400 * DT, abs=1e-8)
     # The rest of the stall follows at once: 50 ms each until 200 ms are made up for.
     np.testing.assert_allclose(effective[100:103], 0.05)
+
+
+def test_shortest_interval_while_catching_up() -> None:
+    """Cycles of no work at all after a stall integrate dt_min each, and the sum is n dt again."""
+    cycles = busy_loop(TimeController(SPEC, DT), lambda n: 100 * MS if n == 100 else 0, 200)
+    effective = np.array([cycle.dt_eff_s for cycle in cycles])
+    assert effective.min() == SPEC.dt_min
+    assert effective.sum() == pytest.approx(200 * DT, abs=1e-8)
 
 
 def test_dropped_clip_loses_the_stall() -> None:
@@ -162,7 +171,8 @@ def test_reset_re_anchors_and_counts() -> None:
     # The original schedule stays known: ideal and actual start of the moved schedule.
     assert at_reset.ideal_s == pytest.approx(101 * DT + 0.39)
     assert at_reset.actual_s == pytest.approx(at_reset.ideal_s)
-    np.testing.assert_allclose([cycle.cumulative_error_s for cycle in cycles[101:]], 0.0, atol=1e-8)
+    np.testing.assert_allclose(
+        [cycle.cumulative_error_s for cycle in cycles[101:]], 0.0, atol=1e-8)
     # The dropped time isn't integrated either: the human is where n dt says.
     assert sum(cycle.dt_eff_s for cycle in cycles) == pytest.approx(200 * DT, abs=1e-8)
 

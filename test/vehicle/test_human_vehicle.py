@@ -76,6 +76,21 @@ def test_standing_car_does_not_move(command: DriverCommand) -> None:
         assert (state.x, state.y, state.yaw, state.speed, state.acceleration) == (0.0,) * 5
 
 
+def test_acceleration_does_not_linger_at_rest() -> None:
+    """A car placed at rest with a lagged acceleration: static friction holds it all the same."""
+    for command in (RELEASED, BRAKE):
+        state = HumanVehicle(VEHICLE, at_speed(0.0, acceleration=2.0)).step(command, 0.01)
+        assert (state.x, state.speed, state.acceleration) == (0.0, 0.0, 0.0)
+
+
+def test_wheels_turn_for_the_whole_step_in_which_the_car_stops() -> None:
+    """0.02 m/s are braked away in 2 ms of 10; the wheels turn at 0.4 rad/s for all of them."""
+    car = HumanVehicle(DIRECT, at_speed(0.02))
+    state = car.step(DriverCommand(brake=1.0, steering=1.0), 0.01)
+    assert state.speed == 0.0
+    assert state.steering_angle == pytest.approx(0.004)
+
+
 def test_braking_stops_within_the_step_and_holds() -> None:
     """The distance is v^2 / 2 a to a millimetre whatever the step, and the car stays there."""
     for dt in (0.001, 0.01, 0.05):
@@ -173,7 +188,8 @@ def test_limits_hold_under_any_command(seed: int) -> None:
     random = np.random.default_rng(seed)
     car = HumanVehicle(VEHICLE, at_speed(random.uniform(0.0, 50.0)))
     for _ in range(60):
-        command = DriverCommand(*random.uniform((-0.5, -0.5, -1.0), 1.0), bool(random.random() < 0.3))
+        pedals_and_wheel = random.uniform((-0.5, -0.5, -1.0), 1.0)
+        command = DriverCommand(*pedals_and_wheel, bool(random.random() < 0.3))
         for dt in random.uniform(1e-4, 0.05, 40).tolist():
             before = car.state
             state = car.step(command.rounded(), dt)

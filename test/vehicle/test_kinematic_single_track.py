@@ -73,8 +73,8 @@ def test_straight_line_is_exact() -> None:
     """Without steering s = v t + a t^2 / 2, to rounding, in any direction."""
     end = drive((1.0, 2.0, 0.7, 5.0, 0.0), 1.5, 0.0, 4.0, 13)
     distance = 5.0 * 4.0 + 0.5 * 1.5 * 16.0
-    np.testing.assert_allclose(end, (1.0 + distance * math.cos(0.7), 2.0 + distance * math.sin(0.7),
-                                     0.7, 11.0, 0.0), rtol=1e-13)
+    place = 1.0 + distance * math.cos(0.7), 2.0 + distance * math.sin(0.7)
+    np.testing.assert_allclose(end, (*place, 0.7, 11.0, 0.0), rtol=1e-13)
 
 
 def test_equals_the_textbook_step() -> None:

@@ -1,0 +1,104 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Write docs/interfaces.md, the tables of the contract, from msg_defs/interfaces.yaml."""
+
+import argparse
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+import re
+
+from crgame_ros.ros.contract import Contract, load_contract, Qos, Topic
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / 'msg_defs' / 'interfaces.yaml'
+TARGET = ROOT / 'docs' / 'interfaces.md'
+NOTICE = """\
+Made from the contract, [msg_defs/interfaces.yaml](../msg_defs/interfaces.yaml), by
+`scripts/make_interface_docs.py`: edit that file, not this one. The code creates its endpoints from
+the contract, and a test compares a running graph with it. All messages are of standard packages:
+nothing has to be built to take part. `external` stands for whoever else listens or answers. The
+history of every topic is keep last."""
+
+
+def document(source: Path = SOURCE) -> str:
+    """Give the whole page for a contract file."""
+    contract = load_contract(source)
+    general, trajectories = _comments(source.read_text(encoding='utf-8'))
+    parts = ['# Interfaces', NOTICE, *general, '## Vehicles and objects in a JointTrajectory',
+             *trajectories, '## Topics', _overview(contract)]
+    parts += [_details(topic) for topic in contract.topics.values()]
+    parts += ['## Services', 'All are offered by `sim_node`.', _services(contract),
+              '## Parameters', 'These may be set while the node runs.',
+              _parameters(contract)]
+    return '\n\n'.join(parts) + '\n'
+
+
+def _comments(text: str) -> tuple[list[str], list[str]]:
+    """Give the file's two explanations: at its head, and that of trajectories as a table."""
+    head, trajectories = (
+        [line[1:].removeprefix(' ') for line in block.splitlines()]
+        for block in re.findall(r'^#[^\n]*(?:\n#[^\n]*)+', text, re.MULTILINE)[:2])
+    paragraphs = '\n'.join(head).split('\n\n')
+    general = [_escaped(paragraph).replace('\n', ' ') for paragraph in paragraphs[2:]]
+    rows: list[list[str]] = []
+    for line in trajectories[1:]:
+        label, _, text = line.strip().partition('  ')
+        if text:
+            rows.append([label, text.strip()])
+        else:
+            rows[-1][1] += f' {label}'
+    return general, [_table(('field', 'meaning'), (
+        (', '.join(map(_code, label.split(', '))), _escaped(text)) for label, text in rows))]
+
+
+def _overview(contract: Contract) -> str:
+    return _table(('topic', 'type', 'QoS', 'rate [Hz]', 'from', 'to', 'recorded'), (
+        (_code(topic.name), _code(topic.type_name), _qos(topic.qos), _escaped(topic.rate),
+         ', '.join(topic.producers), ', '.join(topic.consumers), 'yes' if topic.record else 'no')
+        for topic in contract.topics.values()))
+
+
+def _qos(qos: Qos) -> str:
+    return f'{qos.reliability}, {qos.durability}, depth {qos.depth}'.replace('_', ' ')
+
+
+def _details(topic: Topic) -> str:
+    rows = ((_code(field), _escaped(meaning)) for field, meaning in topic.fields.items())
+    return f'### {_code(topic.name)}\n\n' + _table(('field', 'meaning'), rows)
+
+
+def _services(contract: Contract) -> str:
+    return _table(('service', 'type', 'what it does'), (
+        (_code(service.name), _code(service.type_name), _escaped(service.what))
+        for service in contract.services.values()))
+
+
+def _parameters(contract: Contract) -> str:
+    return _table(('node', 'parameter', 'type', 'meaning'), (
+        (_code(node), _code(name), row['type'], _escaped(row['what']))
+        for node, parameters in contract.parameters.items() for name, row in parameters.items()))
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ['---'] * len(head), *rows]
+    return '\n'.join(f'| {" | ".join(cells)} |' for cells in lines)
+
+
+def _code(text: str) -> str:
+    return f'`{text}`'
+
+
+def _escaped(text: str) -> str:
+    """Keep placeholders and bars from being read as markup."""
+    return text.replace('<', '&lt;').replace('|', '\\|')
+
+
+def main() -> None:
+    """Write the page and name it."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    TARGET.write_text(document(), encoding='utf-8')
+    print(TARGET)
+
+
+if __name__ == '__main__':
+    main()

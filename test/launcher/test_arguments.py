@@ -1,0 +1,58 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line of run.sh."""
+
+from pathlib import Path
+
+import pytest
+
+from crgame_ros.errors import InputError
+from crgame_ros.launcher.arguments import parse_arguments, RunRequest
+
+
+def test_without_arguments() -> None:
+    """Everything is left to the game, in real time."""
+    assert parse_arguments([]) == RunRequest()
+    assert parse_arguments([]).real_time_factor == 1.0
+
+
+def test_every_argument() -> None:
+    """As the README lists them."""
+    request = parse_arguments([
+        'games/mine.yaml', '--scenario', 'road.xml', '--driver', 'evdev:Logitech G29',
+        '--planner', 'idm', '--planner', 'mine.py:Mine', '--duration', '20', '--rate', '200',
+        '--real-time-factor', '0.5', '--headless', '--realtime-priority', '--out', 'there'])
+    assert request == RunRequest(
+        Path('games/mine.yaml'), Path('road.xml'), 'evdev:Logitech G29', ('idm', 'mine.py:Mine'),
+        20.0, 200.0, 0.5, True, True, Path('there'))
+
+
+@pytest.mark.parametrize(('arguments', 'named'), [
+    (['--duration', 'long'], 'argument --duration: long is no number'),
+    (['--duration', '0'], 'argument --duration: 0 is not above 0'),
+    (['--duration', '-3'], 'argument --duration'), (['--duration', 'nan'], 'argument --duration'),
+    (['--duration', 'inf'], 'argument --duration'), (['--rate', '0'], 'argument --rate'),
+    (['--rate', '-5'], 'argument --rate'), (['--rate'], 'argument --rate: expected one'),
+    (['--real-time-factor', '0.05'], 'not within 0.1 to 10'),
+    (['--real-time-factor', '11'], 'not within 0.1 to 10'),
+    (['--real-time-factor', 'nan'], 'not within'), (['--colour', 'red'], '--colour'),
+    (['one.yaml', 'two.yaml'], 'two.yaml'), (['--headless=yes'], '--headless')])
+def test_bad_argument_is_refused(arguments: list[str], named: str) -> None:
+    """One line that names the argument, exit code 2, no usage text in between."""
+    with pytest.raises(InputError) as caught:
+        parse_arguments(arguments)
+    assert named in str(caught.value)
+    assert str(caught.value).startswith('command line: ')
+    assert str(caught.value).endswith('see --help')
+    assert caught.value.exit_code == 2
+
+
+def test_help_teaches(capsys: pytest.CaptureFixture[str]) -> None:
+    """It ends with code 0 and shows examples, driver sources and planners."""
+    with pytest.raises(SystemExit) as caught:
+        parse_arguments(['--help'])
+    assert caught.value.code == 0
+    text = capsys.readouterr().out
+    assert text.startswith('usage: run.sh')
+    for word in ('examples:', 'replay:BAG', 'idm', 'reactive', '--real-time-factor'):
+        assert word in text

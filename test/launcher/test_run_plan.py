@@ -1,0 +1,176 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From the command line to a checked run and its folder."""
+
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+from crgame_ros.errors import InputError
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_game, plan_run
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.game import HumanSpec
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.setup import build_setup
+
+SCENARIOS = scenarios_directory()
+CUT_IN, TWO_AVS = SCENARIOS / 'cut_in.yaml', SCENARIOS / 'two_avs.yaml'
+CUT_IN_XML = SCENARIOS / 'ZAM_CutIn-1_1_T-1.xml'
+NOON = datetime(2026, 3, 4, 12, 5, 6)
+PLANNER = """\
+from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
+
+
+class Mine(ConstantVelocityPlanner):
+    name = 'mine'
+"""
+
+
+def noon() -> datetime:
+    """Stand in for the wall clock."""
+    return NOON
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Start every test where nothing is."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_without_arguments_it_is_the_cut_in() -> None:
+    """The game of the README's first command, as its file says."""
+    assert effective_game(RunRequest()) == load_game(CUT_IN)
+
+
+def test_scenario_alone() -> None:
+    """One human who is placed near the first AV; each planning problem becomes an AV."""
+    game = effective_game(RunRequest(scenario=CUT_IN_XML))
+    assert (game.scenario, game.humans, game.avs) == (CUT_IN_XML, (HumanSpec('hv0'),), None)
+
+
+def test_overrides() -> None:
+    """What the command line says goes before the game file; all else stays."""
+    before = load_game(TWO_AVS)
+    game = effective_game(RunRequest(TWO_AVS, CUT_IN_XML, 'idle', (), 7.0, 250.0))
+    assert game.scenario == CUT_IN_XML
+    assert game.humans[0].driver == 'idle'
+    assert game.humans[0].spawn == before.humans[0].spawn
+    assert (game.duration, game.timing.rate) == (7.0, 250.0)
+    assert (game.avs, game.title, game.seed) == (before.avs, before.title, before.seed)
+
+
+def test_driver_file_is_relative_to_the_present_directory(tmp_path: Path) -> None:
+    """Unlike one in the game file, which is relative to that; device names are no files."""
+    for given, expected in (('keys:mine.yaml', f'keys:{tmp_path}/mine.yaml'),
+                            ('replay:runs/one/bag', f'replay:{tmp_path}/runs/one/bag'),
+                            ('evdev:Logitech G29', 'evdev:Logitech G29'), ('auto', 'auto')):
+        assert effective_game(RunRequest(driver=given)).humans[0].driver == expected
+
+
+@pytest.mark.parametrize('rate', [0.5, 20_000.0])
+def test_rate_is_bounded_as_in_the_file(rate: float) -> None:
+    """From 1 to 10000 Hz."""
+    with pytest.raises(InputError, match='--rate: "rate" is .* from 1 to 10000'):
+        effective_game(RunRequest(rate_hz=rate))
+
+
+def test_driver_for_nobody_is_refused(tmp_path: Path) -> None:
+    """The game has no human: the argument would have no effect."""
+    path = tmp_path / 'alone.yaml'
+    path.write_text(f'scenario: {CUT_IN_XML}\nhumans: []\n', encoding='utf-8')
+    assert effective_game(RunRequest(path)).humans == ()
+    with pytest.raises(InputError, match='--driver: the game has no human'):
+        effective_game(RunRequest(path, driver='idle'))
+
+
+def test_folder_is_named_by_time_and_scenario(tmp_path: Path) -> None:
+    """runs/<time>_<benchmark id>; a second run in the same second gets a number."""
+    names = [plan_run(RunRequest(CUT_IN), noon).folder for _ in range(3)]
+    stem = '20260304-120506_ZAM_CutIn-1_1_T-1'
+    assert names == [tmp_path / 'runs' / f'{stem}{suffix}' for suffix in ('', '_2', '_3')]
+    assert all(folder.is_dir() for folder in names)
+
+
+def test_given_folder_is_used(tmp_path: Path) -> None:
+    """Also where it exists, as long as it holds no recording."""
+    (tmp_path / 'mine').mkdir()
+    plan = plan_run(RunRequest(CUT_IN, out=Path('mine')), noon)
+    assert plan.folder == tmp_path / 'mine'
+    assert plan.bag == tmp_path / 'mine' / 'bag'
+    plan.bag.mkdir()
+    with pytest.raises(InputError, match='holds a recording already; choose another folder'):
+        plan_run(RunRequest(CUT_IN, out=Path('mine')), noon)
+
+
+def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    """A file stands in its place."""
+    (tmp_path / 'file').write_text('', encoding='utf-8')
+    with pytest.raises(InputError, match='file/run: cannot be made .*--out'):
+        plan_run(RunRequest(CUT_IN, out=Path('file/run')), noon)
+
+
+def test_written_game_is_the_run() -> None:
+    """The game in the folder gives the same vehicles, AVs spelled out as they were found."""
+    plan = plan_run(RunRequest(scenario=CUT_IN_XML, planners=('constant-velocity',),
+                               driver='idle', duration_s=3.0), noon)
+    again = build_setup(load_game(plan.game_file))
+    assert [human.state for human in again.humans] == [
+        human.state for human in plan.setup.humans]
+    assert [(av.id, av.state, av.spec) for av in again.avs] == [
+        (av.id, av.state, av.spec) for av in plan.setup.avs]
+    assert again.avs[0].spec.planner == 'constant-velocity'
+    assert again.avs[0].spec.planning_problem == 100
+    assert again.game.duration == 3.0
+    assert again.scheduler == plan.setup.scheduler
+
+
+def test_one_planner_serves_all_and_several_go_in_order() -> None:
+    """--planner once, or once for each AV."""
+    for planners, expected in (((), ['idm', 'idm']),
+                               (('constant-velocity',), ['constant-velocity'] * 2),
+                               (('constant-velocity', 'idm'), ['constant-velocity', 'idm'])):
+        plan = plan_run(RunRequest(TWO_AVS, planners=planners), noon)
+        assert [av.spec.planner for av in plan.setup.avs] == expected
+
+
+def test_options_belong_to_their_planner(tmp_path: Path) -> None:
+    """Another planner doesn't get them; the same one keeps them."""
+    path = tmp_path / 'game.yaml'
+    path.write_text(f'scenario: {CUT_IN_XML}\navs: [{{planner: idm, options: {{v0: 15.0}}}}]\n',
+                    encoding='utf-8')
+    for planners, options in (((), {'v0': 15.0}), (('idm',), {'v0': 15.0}),
+                              (('constant-velocity',), {})):
+        plan = plan_run(RunRequest(path, planners=planners, driver='idle'), noon)
+        assert plan.setup.avs[0].spec.options == options
+
+
+def test_planner_of_the_users_own(tmp_path: Path) -> None:
+    """A file named from here is written down so that it is found from anywhere."""
+    (tmp_path / 'mine.py').write_text(PLANNER, encoding='utf-8')
+    plan = plan_run(RunRequest(CUT_IN, planners=('mine.py:Mine',)), noon)
+    written = load_game(plan.game_file)
+    assert written.avs is not None
+    assert written.avs[0].planner == f'{tmp_path}/mine.py:Mine'
+
+
+@pytest.mark.parametrize(('request_', 'named'), [
+    (RunRequest(Path('none.yaml')), 'none.yaml: cannot read the game file'),
+    (RunRequest(scenario=Path('none.xml')), 'none.xml'),
+    (RunRequest(scenario=CUT_IN), 'cut_in.yaml'),
+    (RunRequest(driver='telepathy'), 'no driver source'),
+    (RunRequest(driver='keys:none.yaml'), 'none.yaml'),
+    (RunRequest(planners=('none',)), 'there is no planner "none"'),
+    (RunRequest(planners=('none.py:Mine',)), 'there is no file none.py'),
+    (RunRequest(planners=('idm', 'idm')), '--planner: 2 planners for 1 AVs')])
+def test_bad_request_ends_before_anything_is_made(tmp_path: Path, request_: RunRequest,
+                                                  named: str) -> None:
+    """Exit code 2, one line, no folder."""
+    with pytest.raises(InputError) as caught:
+        plan_run(request_, noon)
+    assert named in str(caught.value)
+    assert caught.value.exit_code == 2
+    assert '\n' not in str(caught.value)
+    assert not (tmp_path / 'runs').exists()

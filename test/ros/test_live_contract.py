@@ -1,0 +1,230 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A running graph has exactly the endpoints of the contract.
+
+DDS tells type, reliability and durability of an endpoint to others, not its depth, so the depth is
+no part of this comparison.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+import time
+
+from live_support import Launcher, PATIENCE_S, SCENARIOS, wait_until
+import pytest
+from rcl_interfaces.srv import DescribeParameters, ListParameters
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+import yaml
+
+from crgame_ros.ros.contract import load_contract, Topic
+
+TESTER = 'tester'
+# What every ROS node has of its own accord.
+OF_EVERY_NODE = {'/rosout', '/parameter_events'}
+SERVICES_OF_EVERY_NODE = {
+    'describe_parameters', 'get_parameter_types', 'get_parameters', 'get_type_description',
+    'list_parameters', 'set_parameters', 'set_parameters_atomically'}
+# Subscriptions that exist only while a game needs them: (topic, node).
+ONLY_WITH_A_JOY_NODE = ('/<hv>/joy', 'driver_node')
+ONLY_WITH_DRIVABILITY_STOP = ('/<v>/drivability', 'sim_node')
+OPTIONAL = frozenset({ONLY_WITH_A_JOY_NODE, ONLY_WITH_DRIVABILITY_STOP})
+PARAMETER_TYPES = {'bool': 1, 'integer': 2, 'double': 3, 'string': 4}
+
+Endpoint = tuple[str, str, str, str, str]
+
+
+@dataclass(frozen=True)
+class Case:
+    """
+    A game and what the graph of it must have.
+
+    :param humans: ids of the humans' vehicles.
+    :param avs: ids of the AVs.
+    :param used: which optional subscriptions the game needs.
+    """
+
+    humans: tuple[str, ...]
+    avs: tuple[str, ...]
+    used: frozenset[tuple[str, str]]
+
+    def nodes(self, executable: str, vehicle: str) -> list[str]:
+        """Name the processes of an executable that serve a vehicle; all of them without one."""
+        groups = {'driver_node': self.humans, 'planner_node': self.avs}
+        if executable not in groups:
+            return [executable]
+        served = [item for item in groups[executable] if vehicle in ('', item)]
+        return [f'{executable}_{item}' for item in served]
+
+    def publishers(self, topic: Topic) -> set[Endpoint]:
+        """List the publishers that a topic must have."""
+        return self._endpoints(topic, topic.producers, frozenset())
+
+    def subscriptions(self, topic: Topic) -> set[Endpoint]:
+        """List the subscriptions that a topic must have."""
+        executables = tuple(name for name in topic.consumers if name != 'external')
+        return self._endpoints(topic, executables, OPTIONAL - self.used)
+
+    def _endpoints(self, topic: Topic, executables: tuple[str, ...],
+                   unused: frozenset[tuple[str, str]]) -> set[Endpoint]:
+        found = set()
+        for name in topic.names(self.humans, self.avs):
+            vehicle = name.split('/')[1] if topic.placeholder else ''
+            for executable in executables:
+                pair = (topic.name, executable)
+                # Only a human's violation may end the run.
+                idle = pair == ONLY_WITH_DRIVABILITY_STOP and vehicle not in self.humans
+                if pair not in unused and not idle:
+                    found |= {(name, node, topic.type_name, topic.qos.reliability,
+                               topic.qos.durability) for node in self.nodes(executable, vehicle)}
+        return found
+
+
+PLAIN = Case(('hv0',), ('av0',), frozenset())
+FULL = Case(('hv0',), ('av0', 'av1'), OPTIONAL)
+
+
+def _full_game(folder: Path) -> Path:
+    """Write a game of two AVs that needs every optional endpoint."""
+    game = yaml.safe_load((SCENARIOS / 'two_avs.yaml').read_text())
+    game['scenario'] = str(SCENARIOS / game['scenario'])
+    game['humans'][0]['driver'] = 'joy'
+    game['drivability']['stop'] = True
+    path = folder / 'full.yaml'
+    path.write_text(yaml.safe_dump(game))
+    return path
+
+
+@dataclass
+class Graph:
+    """A running graph, seen by a node of the test's own."""
+
+    case: Case
+    node: Node
+    executor: SingleThreadedExecutor
+
+    def publishers(self) -> set[Endpoint]:
+        """Give every publisher but those that each node has."""
+        return self._endpoints(self.node.get_publishers_info_by_topic)
+
+    def subscriptions(self) -> set[Endpoint]:
+        """Give every subscription but those that each node has."""
+        return self._endpoints(self.node.get_subscriptions_info_by_topic)
+
+    def _endpoints(self, look_up: object) -> set[Endpoint]:
+        assert callable(look_up)
+        return {_endpoint(name, info) for name, _ in self.node.get_topic_names_and_types()
+                if name not in OF_EVERY_NODE for info in look_up(name) if info.node_name != TESTER}
+
+    def services(self) -> set[tuple[str, str, str]]:
+        """Give every service but those that each node has: node, name, type."""
+        return {(node, name, kind) for node in self.node.get_node_names() if node != TESTER
+                for name, kinds in self.node.get_service_names_and_types_by_node(node, '/')
+                if name.rpartition('/')[2] not in SERVICES_OF_EVERY_NODE for kind in kinds}
+
+    def ask(self, kind: type, name: str, **fields: object) -> object:
+        """Call a service."""
+        client = self.node.create_client(kind, name)
+        assert client.wait_for_service(PATIENCE_S), name
+        future = client.call_async(kind.Request(**fields))
+        self.executor.spin_until_future_complete(future, PATIENCE_S)
+        self.node.destroy_client(client)
+        assert future.done(), name
+        return future.result()
+
+
+def _endpoint(name: str, info: TopicEndpointInfo) -> Endpoint:
+    profile = info.qos_profile
+    return (name, info.node_name, info.topic_type, profile.reliability.name.lower(),
+            profile.durability.name.lower())
+
+
+@pytest.fixture(scope='module', params=[PLAIN, FULL], ids=['plain', 'full'])
+def graph(request: pytest.FixtureRequest,
+          tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+    """Start a game and look at its graph once it drives."""
+    folder = tmp_path_factory.mktemp('contract')
+    game = SCENARIOS / 'cut_in.yaml' if request.param is PLAIN else _full_game(folder)
+    with Launcher([game, '--duration', 120], folder / 'run') as launcher:
+        launcher.wait_for('recording into')
+        context = Context()
+        rclpy.init(context=context, domain_id=launcher.domain)
+        node = rclpy.create_node(TESTER, context=context)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        try:
+            yield Graph(request.param, node, executor)
+        finally:
+            executor.shutdown()
+            node.destroy_node()
+            context.try_shutdown()
+
+
+def _settled(look: object, expected: set[tuple[str, ...]]) -> set[tuple[str, ...]]:
+    """Look until the expected is seen, or has not been for a while; give what is seen."""
+    assert callable(look)
+    until_s = time.monotonic() + 20.0
+    while (seen := look()) != expected and time.monotonic() < until_s:
+        time.sleep(0.1)
+    return set(seen)
+
+
+def _compare(seen: set[tuple[str, ...]], expected: set[tuple[str, ...]]) -> None:
+    missing, undeclared = sorted(expected - seen), sorted(seen - expected)
+    assert not missing and not undeclared, f'missing: {missing}\nundeclared: {undeclared}'
+
+
+def test_nodes_are_those_of_the_game(graph: Graph) -> None:
+    """One process each; a driver for each human and a planner for each AV, named after them."""
+    case = graph.case
+    expected = {('sim_node',), ('recorder_node',), ('drivability_node',), ('timesync_node',),
+                *((f'driver_node_{item}',) for item in case.humans),
+                *((f'planner_node_{item}',) for item in case.avs), (TESTER,)}
+    _compare(_settled(lambda: {(name,) for name in graph.node.get_node_names()}, expected),
+             expected)
+    names = graph.node.get_node_names()
+    assert len(names) == len(set(names))
+
+
+def test_publishers_are_the_declared_producers(graph: Graph) -> None:
+    """Topic, node, type and QoS of every publisher: all that is declared, nothing else."""
+    expected = {item for topic in load_contract().topics.values()
+                for item in graph.case.publishers(topic)}
+    assert len(expected) > 20
+    _compare(_settled(graph.publishers, expected), expected)
+
+
+def test_subscriptions_are_the_declared_consumers(graph: Graph) -> None:
+    """The same of every subscription; the optional ones exactly where the game needs them."""
+    expected = {item for topic in load_contract().topics.values()
+                for item in graph.case.subscriptions(topic)}
+    assert len(expected) > 20
+    _compare(_settled(graph.subscriptions, expected), expected)
+
+
+def test_services_are_the_declared_ones(graph: Graph) -> None:
+    """`sim_node` alone offers services beside those that every node has."""
+    expected = {('sim_node', service.name, service.type_name)
+                for service in load_contract().services.values()}
+    _compare(_settled(graph.services, expected), expected)
+
+
+def test_parameters_that_may_be_set_are_the_declared_ones(graph: Graph) -> None:
+    """All other parameters of our nodes are read-only, so that setting them is refused."""
+    seen, expected = set(), {
+        (node, name, str(PARAMETER_TYPES[row['type']]))
+        for node, rows in load_contract().parameters.items() for name, row in rows.items()}
+    nodes = {item.node_name for name in ('/diagnostics', '/clock')
+             for item in graph.node.get_publishers_info_by_topic(name)}
+    wait_until(lambda: 'sim_node' in graph.node.get_node_names(), 'sim_node')
+    for node in sorted(nodes):
+        names = graph.ask(ListParameters, f'/{node}/list_parameters').result.names
+        described = graph.ask(DescribeParameters, f'/{node}/describe_parameters', names=names)
+        seen |= {(node, item.name, str(item.type)) for item in described.descriptors
+                 if not item.read_only and item.name != 'use_sim_time'}
+    _compare(seen, expected)
