@@ -61,6 +61,19 @@ class Footprint:
         return shapely.Polygon(self._outline @ np.array(((cos, sin), (-sin, cos))) + (x, y))
 
 
+def triangle_corners(polygons: shapely.Geometry | NDArray[np.object_]) -> list[list[float]]:
+    """
+    Cut polygons into triangles that cover exactly the same area.
+
+    :param polygons: one valid geometry, or an array of them.
+    :return: x and y of the three corners of each triangle.
+    """
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons))
+    # The ring of a triangle is closed: its first corner comes again.
+    corners: list[list[float]] = shapely.get_coordinates(triangles).reshape(-1, 8)[:, :6].tolist()
+    return corners
+
+
 def _outline(shape: Shape) -> NDArray[np.float64]:
     if shape.kind == 'polygon':
         return np.array(shape.vertices)
@@ -73,12 +86,10 @@ def _outline(shape: Shape) -> NDArray[np.float64]:
     return radius * np.column_stack((np.cos(angles), np.sin(angles)))
 
 
-def _triangulate(shape: Shape) -> list[tuple[float, ...]]:
+def _triangulate(shape: Shape) -> list[list[float]]:
     polygon = shapely.make_valid(shapely.Polygon(shape.vertices)) \
         if len(shape.vertices) > 2 else shapely.Polygon()
     if polygon.area == 0.0:
         raise InputError(f'a polygon of {len(shape.vertices)} corners has no area', 'shape',
                          'give at least three corners that are not in one line')
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    return [tuple(shapely.get_coordinates(triangle)[:3].ravel().tolist())
-            for triangle in triangles]
+    return triangle_corners(polygon)

@@ -5,22 +5,27 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 import math
-from types import SimpleNamespace
 
 from commonroad.scenario.lanelet import LaneletNetwork
 from commonroad_dc import pycrcc
-from commonroad_dc.boundary.boundary import create_road_boundary_obstacle
 import numpy as np
+from numpy.typing import NDArray
 import shapely
 
-from crgame_ros.drivability.footprint import Footprint
-from crgame_ros.drivability.road_surface import lanelet_polygons, road_surface, seam_patches
+from crgame_ros.drivability.footprint import Footprint, triangle_corners
+from crgame_ros.drivability.road_surface import (
+    lanelet_polygons,
+    polygons_of,
+    road_surface,
+    seam_patches,
+)
 from crgame_ros.geometry.shape import Shape
 
-# Building time grows with the square of the number: 30 ms for 150 polygons, 15 s for 2,000.
 TILE_POLYGONS = 150
 # How far the boundary object reaches beyond the road [m]; nothing is detected beyond.
 BOUNDARY_MARGIN = 2000.0
+# Smaller pieces make more triangles to build, larger ones more to check [m].
+PIECE_SIZE = 20.0
 
 
 @dataclass(frozen=True)
@@ -139,24 +144,44 @@ def _is_off(tile: _Tile, footprint: Footprint, x: float, y: float, yaw: float) -
 
 def _triangulated_outside(pieces: list[shapely.Polygon]) -> pycrcc.ShapeGroup:
     """
-    Triangulate everything outside the pieces by the drivability checker.
+    Triangulate everything outside the pieces, up to `BOUNDARY_MARGIN` around them.
 
-    The checker merges the lanelets of a section by the outermost bounds, which cuts off parts
-    of the road where neighbours differ in length (a ramp beside its motorway), and fails on
-    neighbours that are missing. Handing it every polygon as a lanelet without neighbours avoids
-    both.
+    The outlines and triangulations that the drivability checker builds itself merge the lanelets
+    of a section by the outermost bounds, which cuts off parts of the road where neighbours differ
+    in length (a ramp beside its motorway).
     """
+    boundary = pycrcc.ShapeGroup()
     if not pieces:
-        return pycrcc.ShapeGroup()
-    lanelets = [_lone_lanelet(index, piece) for index, piece in enumerate(pieces)]
-    network = SimpleNamespace(lanelets=lanelets, find_lanelet_by_id=lanelets.__getitem__)
-    return create_road_boundary_obstacle(
-        SimpleNamespace(lanelet_network=network), method='aligned_triangulation',
-        return_scenario_obstacle=False, boundary_margin=BOUNDARY_MARGIN)
+        return boundary
+    surface = road_surface(pieces, ())
+    inner = shapely.box(*surface.bounds)
+    # Mitred, so that the frame has straight sides and its triangles stay out of the inner box.
+    frame = inner.buffer(BOUNDARY_MARGIN, join_style='mitre').difference(inner)
+    for corners in triangle_corners(np.array([frame, *_cut(inner.difference(surface))])):
+        boundary.add_shape(pycrcc.Triangle(*corners))
+    return boundary
 
 
-def _lone_lanelet(index: int, piece: shapely.Polygon) -> SimpleNamespace:
-    ring = shapely.get_coordinates(piece.exterior)[:-1]
-    half = len(ring) // 2
-    return SimpleNamespace(lanelet_id=index, adj_left=None, adj_right=None,
-                           left_vertices=ring[:half], right_vertices=ring[half:][::-1])
+def _cut(area: shapely.Geometry) -> list[shapely.Polygon]:
+    """
+    Halve an area until its pieces are small or rectangular.
+
+    Triangles are sought by their extents: a long one across a bend would be tested in vain by
+    every check there.
+    """
+    done: list[shapely.Polygon] = []
+    pending = np.array(polygons_of(area), dtype=object)
+    while len(pending):
+        bounds = shapely.bounds(pending)
+        size = bounds[:, 2:] - bounds[:, :2]
+        large = (size.max(axis=1) > PIECE_SIZE) \
+            & (shapely.area(pending) < (1.0 - 1e-9) * size.prod(axis=1))
+        done += pending[~large].tolist()
+        rows, axis = np.flatnonzero(large), size[large].argmax(axis=1)
+        middle = bounds[rows, axis] + 0.5 * size[rows, axis]
+        low, high = bounds.copy(), bounds.copy()
+        low[rows, axis + 2] = high[rows, axis] = middle
+        halves = shapely.box(*np.concatenate((low[rows], high[rows])).T)
+        pending = np.array(polygons_of(shapely.intersection(np.tile(pending[rows], 2), halves)),
+                           dtype=object)
+    return done

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from commonroad.scenario.lanelet import Lanelet
 import numpy as np
+from numpy.typing import NDArray
 import shapely
 
 # Converted maps leave slits between neighbouring lanelets, a few millimetres to centimetres
@@ -26,17 +27,17 @@ def lanelet_polygons(lanelets: Iterable[Lanelet], origin: tuple[float, float]
     rings = [np.vstack((lanelet.left_vertices, lanelet.right_vertices[::-1]))
              for lanelet in lanelets]
     shapes = [shapely.make_valid(shapely.Polygon(ring[:, :2] - origin)) for ring in rings]
-    return [part for shape in shapes for part in _polygons(shape)]
+    return [part for shape in shapes for part in polygons_of(shape)]
 
 
 def seam_patches(surface: shapely.Geometry) -> list[shapely.Polygon]:
     """Find polygons that cover every slit and hole in a surface narrower than `SEAM_WIDTH`."""
-    gaps = _polygons(_closed(surface).difference(surface))
+    gaps = polygons_of(_closed(surface).difference(surface))
     # A hole of rounding width is lost in the difference, so holes are judged one by one.
     gaps += [hole for hole in _holes(surface) if _is_narrow(hole)]
     # The outline of a gap is widened, not the gap: a polygon of rounding width widens to nothing.
     covers = shapely.union_all([*gaps, *(gap.exterior.buffer(PATCH_OVERLAP) for gap in gaps)])
-    return [shapely.Polygon(cover.exterior) for cover in _polygons(covers)]
+    return [shapely.Polygon(cover.exterior) for cover in polygons_of(covers)]
 
 
 def road_surface(polygons: Sequence[shapely.Polygon],
@@ -47,9 +48,17 @@ def road_surface(polygons: Sequence[shapely.Polygon],
     surface = shapely.MultiPolygon([
         shapely.Polygon(part.exterior, [hole.exterior for hole in _holes(part)
                                         if not _is_narrow(hole)])
-        for part in _polygons(united)])
+        for part in polygons_of(united)])
     shapely.prepare(surface)
     return surface
+
+
+def polygons_of(geometry: shapely.Geometry | NDArray[np.object_]) -> list[shapely.Polygon]:
+    """Pick the polygons with an area out of a geometry, or out of an array of them."""
+    parts = shapely.get_parts(shapely.get_parts(geometry))
+    is_polygon = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
+    polygons: list[shapely.Polygon] = parts[is_polygon & (shapely.area(parts) > 0.0)].tolist()
+    return polygons
 
 
 def _closed(surface: shapely.Geometry) -> shapely.Geometry:
@@ -61,10 +70,6 @@ def _is_narrow(hole: shapely.Polygon) -> bool:
     return bool(hole.buffer(-0.5 * SEAM_WIDTH).is_empty)
 
 
-def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
-    return [part for part in shapely.get_parts(shapely.get_parts(geometry)).tolist()
-            if isinstance(part, shapely.Polygon) and part.area > 0.0]
-
-
 def _holes(geometry: shapely.Geometry) -> list[shapely.Polygon]:
-    return [shapely.Polygon(ring) for polygon in _polygons(geometry) for ring in polygon.interiors]
+    return [shapely.Polygon(ring)
+            for polygon in polygons_of(geometry) for ring in polygon.interiors]

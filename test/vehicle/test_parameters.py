@@ -93,5 +93,5 @@ def test_other_content_is_refused(tmp_path: Path, content: bytes, named: str) ->
 
 def test_unknown_name_is_refused() -> None:
     """The remedy says where the names are."""
-    with pytest.raises(InputError, match='trabant.yaml: cannot read the vehicle .*config/'):
+    with pytest.raises(InputError, match='trabant.yaml: cannot read the vehicle .*; name a file'):
         load_vehicle_parameters('trabant')

@@ -1,0 +1,48 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How often each planner answers with a plan of its own, in our games and published scenarios."""
+
+import argparse
+from pathlib import Path
+import time
+
+import numpy as np
+
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_game, with_planners
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+
+
+def report(name: str, request: RunRequest, planner: str) -> None:
+    """Run one game with one planner and print its row."""
+    setup = with_planners(build_setup(effective_game(request)), (planner,))
+    result = run_offline(setup, clock_s=time.perf_counter)
+    violations = sorted({item.vehicle_id for item in result.violations if not item.is_valid})
+    for av_id, record in result.planners.items():
+        p50, p99 = np.percentile(record.statistics.durations_s, [50, 99]) * 1e3
+        print(f'{name:34}{planner:18}{av_id:5}{record.accepted_ratio:9.1%}{p50:8.1f}{p99:8.1f}'
+              f'  {", ".join(violations):12}'
+              + '; '.join(f'{count} x {why}' for why, count in record.statistics.reasons.items()),
+              flush=True)
+
+
+def main() -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('scenarios', nargs='*', type=Path, help='CommonRoad files, 10 s each')
+    parser.add_argument('--planner', nargs='+', default=['idm', 'reactive'])
+    values = parser.parse_args()
+    print(f'{"":34}{"planner":18}{"AV":5}{"real":>9}{"p50 ms":>8}{"p99 ms":>8}  violations by')
+    games = [path for path in sorted(scenarios_directory().glob('*.yaml'))
+             if path.name.count('.') == 1]
+    for planner in values.planner:
+        for game in games:
+            report(game.stem, RunRequest(game=game), planner)
+        for path in values.scenarios:
+            report(path.stem, RunRequest(scenario=path, driver='idle', duration_s=10.0), planner)
+
+
+if __name__ == '__main__':
+    main()
