@@ -9,9 +9,9 @@ import math
 from xml.etree import ElementTree
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -73,7 +73,7 @@ class ExternalPlanner(Node):
 
 
 if __name__ == '__main__':
-    rclpy.init()
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
+    rclpy.init(signal_handler_options=SignalHandlerOptions.SIGINT)
+    with suppress(KeyboardInterrupt):
         rclpy.spin(ExternalPlanner())
     rclpy.try_shutdown()

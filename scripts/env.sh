@@ -173,8 +173,8 @@ _crgame_make() {
         return 1
     fi
     if ! compgen -G "$venv/lib/python*/site-packages/polygon3-*.dist-info" >/dev/null; then
-        _crgame_say 'polygon3 did not compile: no road compliance, no planners reactive and' \
-            'idm-package; apt install gcc python3-dev, remove .venv and start again'
+        _crgame_say 'polygon3 did not compile: no planners reactive and idm-package;' \
+            'apt install gcc python3-dev, remove .venv and start again'
     fi
     _crgame_stamp
 }

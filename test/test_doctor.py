@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The checks of `crgame doctor` on this machine and on machines made up from files."""
 
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 import os
 from pathlib import Path
 import re
@@ -53,6 +53,28 @@ def test_packages_are_compared_with_their_pins(tmp_path: Path) -> None:
     assert summary.detail == '1 as pinned, 3 not'
     assert checks[0].remedy == 'pip install --no-deps numpy==0.1'
     assert version('numpy') in checks[0].detail
+
+
+def test_missing_polygon3_is_no_failure(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Only two planners need the package that compiles; any other failure beside it counts."""
+    requirements = tmp_path / 'requirements.txt'
+    requirements.write_text('# CommonRoad\npolygon3==3.0.9.1\n')
+
+    def absent(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor, 'version', absent)
+    check = check_packages(requirements)[1]
+    assert (check.name, check.status) == ('polygon3', 'warn')
+    assert 'gcc' in check.remedy
+    (tmp_path / 'needs_polygon.py').write_text('import sys\n'
+                                               'sys.modules["Polygon"] = None\n'
+                                               'import commonroad_dc.boundary.boundary\n')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path), prepend=os.pathsep)
+    check = check_imports(('json', 'needs_polygon'))
+    assert check.status == 'warn'
+    assert 'gcc' in check.remedy
+    assert check_imports(('no_such_module', 'needs_polygon')).status == 'fail'
 
 
 def test_import_failures_are_named() -> None:

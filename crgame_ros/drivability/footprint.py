@@ -61,17 +61,16 @@ class Footprint:
         return shapely.Polygon(self._outline @ np.array(((cos, sin), (-sin, cos))) + (x, y))
 
 
-def triangle_corners(polygons: shapely.Geometry | NDArray[np.object_]) -> list[list[float]]:
+def triangle_corners(polygons: shapely.Geometry | NDArray[np.object_]) -> NDArray[np.float64]:
     """
     Cut polygons into triangles that cover exactly the same area.
 
     :param polygons: one valid geometry, or an array of them.
-    :return: x and y of the three corners of each triangle.
+    :return: (n, 3, 2) corners of the triangles.
     """
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons))
     # The ring of a triangle is closed: its first corner comes again.
-    corners: list[list[float]] = shapely.get_coordinates(triangles).reshape(-1, 8)[:, :6].tolist()
-    return corners
+    return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
 
 
 def _outline(shape: Shape) -> NDArray[np.float64]:
@@ -92,4 +91,5 @@ def _triangulate(shape: Shape) -> list[list[float]]:
     if polygon.area == 0.0:
         raise InputError(f'a polygon of {len(shape.vertices)} corners has no area', 'shape',
                          'give at least three corners that are not in one line')
-    return triangle_corners(polygon)
+    corners: list[list[float]] = triangle_corners(polygon).reshape(-1, 6).tolist()
+    return corners

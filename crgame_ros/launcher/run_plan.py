@@ -107,14 +107,14 @@ def _check_planner(spec: AvSpec) -> None:
 
 def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
     """Write the AVs into the game as they were found, with the planners asked for."""
-    if len(planners) > max(1, len(setup.avs)):
+    if len(planners) > 1 and len(planners) != len(setup.avs):
         raise InputError(f'{len(planners)} planners for {len(setup.avs)} AVs', '--planner',
                          'give one for all, or one for each')
     avs = []
     for index, av in enumerate(setup.avs):
         spec: AvSpec = av.spec
         if planners:
-            name = planners[0] if len(planners) == 1 else planners[min(index, len(planners) - 1)]
+            name = planners[index if len(planners) > 1 else 0]
             spec = replace(spec, planner=name,
                            options=spec.options if name == spec.planner else {})
         avs.append(replace(av, spec=spec))

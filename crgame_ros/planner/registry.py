@@ -87,6 +87,11 @@ def _from_module(target: str, name: str) -> Any:
     try:
         module = importlib.import_module(module_name)
     except Exception as error:
+        if isinstance(error, ImportError) and error.name == 'Polygon':
+            # The packages behind two planners import it; it has no wheels.
+            raise InputError('needs the package polygon3, which did not compile',
+                             f'planner {name}',
+                             'apt install gcc python3-dev, then delete .venv') from error
         raise InputError(f'cannot import {module_name} ({type(error).__name__}: {error})',
                          f'planner {name}', 'check the name and what it imports') from error
     return _attribute(module, attribute, name)

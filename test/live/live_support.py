@@ -74,6 +74,8 @@ class Launcher:
     def _read(stream: IO[str], lines: list[str]) -> None:
         for line in stream:
             lines.append(line.rstrip('\n'))
+            # pytest shows it with the test that fails.
+            print(line, end='')
 
     @property
     def pid(self) -> int:

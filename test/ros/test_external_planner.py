@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator
 from contextlib import contextmanager
 import json
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -46,7 +47,6 @@ def test_example_is_short_and_needs_ros_only() -> None:
             assert node.level == 0 and node.module is not None
             imported.add(node.module.partition('.')[0])
     assert imported - set(sys.stdlib_module_names) == ALLOWED_IMPORTS
-    assert 'crgame' not in text
 
 
 def test_external_planner_gets_no_planner_node(tmp_path: Path) -> None:
@@ -79,8 +79,7 @@ def test_options_of_an_external_planner_are_refused(tmp_path: Path) -> None:
 
 @contextmanager
 def external_planner(domain: int, vehicle: str, end: signal.Signals) -> Iterator[None]:
-    """Run the example, outside the tree; a signal must end it with code 0 and without a word."""
-    import os
+    """Run the example outside the tree; Ctrl-C must end it well, SIGTERM at once."""
     environment = {key: value for key, value in os.environ.items() if key != 'PYTHONPATH'}
     process = subprocess.Popen(
         [sys.executable, str(EXAMPLE), '--ros-args', '-p', f'vehicle:={vehicle}'],
@@ -91,7 +90,8 @@ def external_planner(domain: int, vehicle: str, end: signal.Signals) -> Iterator
         assert process.poll() is None, process.communicate()[0]
         process.send_signal(end)
         said, _ = process.communicate(timeout=PATIENCE_S)
-        assert (process.returncode, said) == (0, '')
+        assert process.returncode == {signal.SIGINT: 0, signal.SIGTERM: -signal.SIGTERM}[end]
+        assert 'Traceback' not in said
     finally:
         if process.poll() is None:
             process.kill()
