@@ -41,5 +41,5 @@ class BareLoop:
 
     def stop(self) -> None:
         """End the process."""
-        self._process.terminate()
+        self._process.kill()
         self._process.join()

@@ -54,9 +54,10 @@ def paired_run(game: Path, planners: Sequence[str], blocks: int, block_s: float,
     arguments = [str(game), '--duration', '100000']
     for planner in planners:
         arguments += ['--planner', planner]
+    # Forked before rclpy starts threads and takes signals over.
+    bare = BareLoop(setup.scheduler.dt_s)
     graph = LiveGraph(folder / 'ours', arguments)
     control = RemoteControl()
-    bare = BareLoop(setup.scheduler.dt_s)
     try:
         control.wait_until_running()
         control.deafen()

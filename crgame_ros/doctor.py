@@ -38,7 +38,7 @@ MODULES = (
     'commonroad_rp.reactive_planner', 'mcap.writer', 'mcap_ros2.decoder', 'rosbags.highlevel',
 )
 # For polygon3, which is compiled and which only the planners reactive and idm-package need.
-COMPILE_REMEDY = 'apt install gcc python3-dev, remove .venv and start again'
+COMPILE_FIX = 'apt install gcc python3-dev, remove .venv and start again'
 PROBE_TIMEOUT_S = 60.0
 PROBE_TOPIC = 'crgame_doctor'
 PROBE_MESSAGES = 20
@@ -126,8 +126,7 @@ def check_packages(requirements: Path) -> list[Check]:
     for group, name, wanted in read_pins(requirements):
         if name.startswith('ros-') and ros_wheels_prefix() is None:
             continue
-        remedy = f'pip install --no-deps {name}=={wanted}' if name != 'polygon3' \
-            else COMPILE_REMEDY
+        remedy = COMPILE_FIX if name == 'polygon3' else f'pip install --no-deps {name}=={wanted}'
         try:
             found = version(name)
         except PackageNotFoundError:
@@ -160,7 +159,7 @@ def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
         return Check('imports', 'ok', f'{len(modules)} modules import')
     detail = '; '.join(f'{name}: {error}' for name, (error, _) in errors.items())
     if all(absent == 'Polygon' for _, absent in errors.values()):
-        return Check('imports', 'warn', detail, COMPILE_REMEDY)
+        return Check('imports', 'warn', detail, COMPILE_FIX)
     return Check('imports', 'fail', detail, 'remove .venv and start again')
 
 

@@ -10,7 +10,8 @@ import time
 from types import FrameType
 
 from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
-from crgame_ros.launcher.run_plan import EXTERNAL, RunPlan
+from crgame_ros.launcher.run_plan import RunPlan
+from crgame_ros.planner.registry import EXTERNAL
 
 # The time that a node gets to end in good order [s].
 GRACE_S = 5.0

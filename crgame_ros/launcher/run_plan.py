@@ -10,14 +10,12 @@ from pathlib import Path
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.registry import create_planner
+from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.scenario.game_file import build, dump_game, load_game
 from crgame_ros.simulation.setup import build_setup, Setup
 
 DEFAULT_GAME = 'cut_in.yaml'
-# Planner name that stands for a process of the user's own (docs/external_planners.md).
-EXTERNAL = 'external'
 
 
 @dataclass(frozen=True)

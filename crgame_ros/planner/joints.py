@@ -119,7 +119,7 @@ def plan_to_joints(plan: Plan, vehicle_id: str, time_step_ns: int) -> JointSerie
 
 def plan_from_joints(series: JointSeries, vehicle_id: str, time_step_ns: int) -> Plan:
     """
-    Read a plan from joints, whoever sent them.
+    Read a plan from joints, whoever sent them; accelerations may be left out (NaN).
 
     :param vehicle_id: the AV that the plan must be for.
     :param time_step_ns: Delta t_c [ns], the grid that the points must be on.
@@ -136,4 +136,8 @@ def plan_from_joints(series: JointSeries, vehicle_id: str, time_step_ns: int) ->
         raise InputError('time_from_start is off the grid', where,
                          f'space the points {time_step_ns / 1e9:g} s apart, the first at 0')
     states = vehicles_from_joints(series.positions, series.velocities, series.accelerations)
+    column = states[:, StateColumn.ACCELERATION]
+    if np.isnan(series.accelerations).all() and len(states) > 1:
+        # Accelerations may be left out: they follow from the speeds.
+        column[:] = np.gradient(states[:, StateColumn.SPEED], time_step_ns * 1e-9)
     return Plan(series.stamp_ns, states)

@@ -16,6 +16,8 @@ from typing import Any, get_args, get_origin, get_type_hints, Literal, Union
 from crgame_ros.errors import InputError
 from crgame_ros.planner.interface import Planner
 
+# As a planner's name: a process of the user's own answers (docs/external_planners.md).
+EXTERNAL = 'external'
 ENTRY_POINTS = 'crgame_ros.planners'
 # Imported when asked for: the packages behind two of them cost seconds.
 BUILT_IN = {
@@ -66,6 +68,9 @@ def planner_class(name: str) -> type[Planner]:
                 else _from_module(name, name))
     else:
         points = [point for point in entry_points(group=ENTRY_POINTS) if point.name == name]
+        if not points and name == EXTERNAL:
+            raise InputError('an external planner answers live runs only', 'planner',
+                             'start the run with ./run.sh, or name a planner')
         if not points:
             raise InputError(f'there is no planner "{name}"', 'planner',
                              f'known are {", ".join(planner_names())}, or give module:Class or '

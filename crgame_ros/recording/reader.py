@@ -122,7 +122,7 @@ class BagReader:
             decode = {_BIG_ENDIAN: codec.deserialize_cdr_be,
                       _LITTLE_ENDIAN: codec.deserialize_cdr_le}[data[:2]]
             message, end = decode(data[_HEADER_BYTES:], 0, codec.cls, self._types)
-            # The middleware may reserve more than a message needs; what is left over means nothing.
+            # The middleware may reserve more than a message needs; the rest means nothing.
             if end + _HEADER_BYTES > len(data):
                 raise ValueError(f'it needs {end + _HEADER_BYTES} bytes and has {len(data)}')
             return message

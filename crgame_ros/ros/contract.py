@@ -98,15 +98,17 @@ def load_contract(path: Path | None = None) -> Contract:
     """
     path = share_directory() / 'msg_defs' / 'interfaces.yaml' if path is None else path
     content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    profiles = {name: Qos(**values) for name, values in content['qos'].items()}
-    topics = {}
-    for name, row in content['topics'].items():
-        try:
+    topics, services, profiles = {}, {}, {}
+    name = 'qos'
+    try:
+        for name, row in content['qos'].items():
+            profiles[name] = Qos(**row)
+        for name, row in content['topics'].items():
             topics[name] = _topic(name, row, profiles)
-        except (KeyError, TypeError) as error:
-            raise InputError(f'{error} is missing or wrong', f'{path}: {name}') from error
-    services = {name: Service(name, row['type'], row['what'])
-                for name, row in content['services'].items()}
+        for name, row in content['services'].items():
+            services[name] = Service(name, row['type'], row['what'])
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f'{error} is missing or wrong', f'{path}: {name}') from error
     return Contract(topics, services, content['parameters'])
 
 

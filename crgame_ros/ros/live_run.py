@@ -16,6 +16,7 @@ from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.sim_control import SimControl
 from crgame_ros.ros.sim_inputs import SimInputs
 from crgame_ros.ros.sim_outputs import SimOutputs
+from crgame_ros.ros.start_gate import StartGate
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.time_controller import TimeController
@@ -24,7 +25,6 @@ NS_PER_S = 1_000_000_000
 # How often the executor looks for service calls [Hz], and the least time left for it [ns].
 SERVICE_RATE = 20.0
 SERVICE_SLACK_NS = 1_500_000
-RESEND_S = 0.5
 # The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
 WAKE_UP_NS = 120_000
 SETTLE_NS = 200_000_000
@@ -91,6 +91,7 @@ class LiveRun:
             now_ns = time.monotonic_ns()
             self._controller.start(now_ns)
             self._controller.resume(now_ns, self._control.real_time_factor)
+            self._inputs.forgive(now_ns)
             return self._loop()
         finally:
             gc.enable()
@@ -111,39 +112,17 @@ class LiveRun:
             self._executor.spin_once(timeout_sec=0.02)
 
     def _wait_for_companions(self, result: StepResult) -> Outcome | None:
-        """Publish step 0 until every companion is connected and every planner has answered."""
-        deadline_ns = time.monotonic_ns() + int(self._control.planner_timeout_s * NS_PER_S)
-        unanswered = set(result.requests)
-        connected = False
-        resend_ns = 0
-        while not connected or unanswered or self._stands_still():
+        """Stay at step 0 until everybody is there, or an order ends it."""
+        control = self._control
+        gate = StartGate(self._outputs, self._inputs, self.simulation, result,
+                         control.companions, self._take_plan, self._node.get_logger().warning)
+        while not gate.is_open(time.monotonic_ns(), control.planner_timeout_s) \
+                or self._stands_still():
             self._executor.spin_once(timeout_sec=0.005)
             outcome = self._ordered_end()
             if outcome is not None:
                 return outcome
-            now_ns = time.monotonic_ns()
-            if not connected and not self._outputs.missing(self._control.companions):
-                connected = True
-                self._outputs.publish_step(self.simulation, result)
-                resend_ns = now_ns + int(RESEND_S * NS_PER_S)
-            if connected and now_ns >= resend_ns:
-                resend_ns = now_ns + int(RESEND_S * NS_PER_S)
-                for av_id in unanswered:
-                    self._outputs.resend(av_id, result)
-            unanswered -= {av_id for av_id in unanswered if self._take_plan(av_id)}
-            if now_ns > deadline_ns and (not connected or unanswered):
-                self._tell_who_is_missing(connected, unanswered)
-                if not connected:
-                    self._outputs.publish_step(self.simulation, result)
-                connected, unanswered = True, set()
         return None
-
-    def _tell_who_is_missing(self, connected: bool, unanswered: set[str]) -> None:
-        missing = [] if connected else sorted(self._outputs.missing(self._control.companions))
-        missing += [f'the planner of {av_id}' for av_id in sorted(unanswered)]
-        self._node.get_logger().warning(
-            f'starting without {" and ".join(missing)}: '
-            f'no answer in {self._control.planner_timeout_s:g} s')
 
     def _ordered_end(self) -> Outcome | None:
         control = self._control
@@ -162,6 +141,7 @@ class LiveRun:
             reason = self.simulation.offer_plan(av_id, plan)
         except InputError as error:
             reason = str(error)
+            self.simulation.refuse_malformed_plan(av_id, reason)
         if reason is not None:
             self._diagnostics.refusal(av_id, reason)
         return reason is None
@@ -202,8 +182,7 @@ class LiveRun:
             self._executor.spin_once(timeout_sec=0.02)
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)
-        for seat in self._inputs.seats:
-            seat.forgive(now_ns)
+        self._inputs.forgive(now_ns)
 
     def _wait(self) -> None:
         """Serve orders now and then, and wait until the next cycle is due (CRG 11)."""

@@ -24,6 +24,7 @@ class Seat:
     """
 
     def __init__(self, human_id: str, commands: PolledSubscription, clock_offset_ns: int) -> None:
+        self.id = human_id
         self._where = f'/{human_id}/driver_command'
         self._commands = commands
         self._watchdog = SeatWatchdog()
@@ -48,8 +49,8 @@ class Seat:
         if self._heard_ns is not None:
             self._heard_ns = now_ns
 
-    def command(self, now_ns: int, dt_s: float, speed: float) -> DriverCommand:
-        """Give the command for this cycle; released, then gentle braking, after a loss."""
+    def listen(self, now_ns: int) -> bool:
+        """Take the latest command that has come; tell whether there was any so far."""
         message = self._commands.latest()
         if message is not None and from_time(message.header.stamp) < self._clock_offset_ns:
             self.outdated += 1
@@ -59,6 +60,11 @@ class Seat:
                 self._heard_ns = now_ns
             except InputError:
                 self.malformed += 1
+        return self._heard_ns is not None
+
+    def command(self, now_ns: int, dt_s: float, speed: float) -> DriverCommand:
+        """Give the command for this cycle; released, then gentle braking, after a loss."""
+        self.listen(now_ns)
         if self._heard_ns is None:
             self._heard_ns = now_ns
         age_s = (now_ns - self._heard_ns) * NS
@@ -87,6 +93,11 @@ class SimInputs:
         if setup.game.drivability.stop:
             self._drivability = {human.id: endpoints.polled('/<v>/drivability', human.id)
                                  for human in setup.humans}
+
+    def forgive(self, now_ns: int) -> None:
+        """Begin to count the silence of every driver now."""
+        for seat in self.seats:
+            seat.forgive(now_ns)
 
     def take_plan(self, av_id: str) -> JointSeries | None:
         """

@@ -144,8 +144,7 @@ class SimOutputs:
             return
         stamp_ns = simulation.scheduler.stamp_ns(result.n)
         states = simulation.states
-        set_time(self._clock_message.clock, stamp_ns)
-        self._clock.publish(self._clock_message)
+        self.publish_clock(stamp_ns)
         if result.objects is not None:
             message = self._objects_message
             message.positions[:] = result.objects.poses.ravel()
@@ -159,6 +158,11 @@ class SimOutputs:
             for vehicle, state in zip(self._vehicles, states, strict=True):
                 if vehicle.wanted:
                     vehicle.publish(state, stamp_ns)
+
+    def publish_clock(self, stamp_ns: int) -> None:
+        """Publish the time of a step; again, if drivers may not have heard it."""
+        set_time(self._clock_message.clock, stamp_ns)
+        self._clock.publish(self._clock_message)
 
     def resend(self, av_id: str, result: StepResult) -> None:
         """Send a request again to a planner that may not have been there the first time."""

@@ -102,6 +102,12 @@ class AutonomousVehicle:
             self.counters.last_refusal = reason
         return reason
 
+    def refuse_malformed(self, reason: str) -> None:
+        """Count an answer that could not even be read; the planner may be asked again."""
+        self._busy_since = None
+        self.counters.refused += 1
+        self.counters.last_refusal = reason
+
     def _refusal(self, series: JointSeries, n: int) -> str | None:
         asked = self._asked.get(series.stamp_ns)
         request_n = self._scheduler.tick_of_stamp(series.stamp_ns)

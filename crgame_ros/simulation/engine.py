@@ -79,6 +79,10 @@ class Simulation:
         """
         return self._av_by_id[av_id].offer(plan, self.n + 1)
 
+    def refuse_malformed_plan(self, av_id: str, reason: str) -> None:
+        """Count a planner's answer that could not be read."""
+        self._av_by_id[av_id].refuse_malformed(reason)
+
     def step(self, dt_eff_s: float, commands: Sequence[DriverCommand]) -> StepResult:
         """
         Advance from n to n + 1.

@@ -1,0 +1,109 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded human again: offline to the last bit, and live against another planner."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from live_support import CUT_IN, Launcher
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+from crgame_ros.planner.joints import vehicle_to_joints
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_log import read_cycles, replay_inputs
+from crgame_ros.ros.messages import from_time
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.replay import recorded_inputs
+from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.vehicle.state import VehicleState
+
+# Long enough for the throttle (0 to 0.6 s) and the first steering (4.0 to 4.4 s) of the script.
+DURATION_S, STEPS = 4.6, 460
+STEP_NS = 10_000_000
+
+
+@pytest.fixture(scope='module')
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Record the cut-in live, at twice its pace."""
+    folder = tmp_path_factory.mktemp('replay') / 'run'
+    with Launcher([CUT_IN, '--duration', DURATION_S, '--real-time-factor', 2],
+                  folder) as launcher:
+        assert launcher.wait() == 0, launcher.text
+    yield folder
+
+
+def _published(bag: Path, vehicle_id: str) -> dict[int, NDArray[np.float64]]:
+    """Read positions and velocities (2, 4) of a vehicle's joints by step, as published."""
+    found = {}
+    with BagReader(bag) as reader:
+        for item in reader.decoded(['/vehicles/state']):
+            first = list(item.message.joint_names).index(f'{vehicle_id}/x')
+            point = item.message.points[0]
+            found[from_time(item.message.header.stamp)] = np.array(
+                (point.positions[first:first + 4], point.velocities[first:first + 4]))
+    start_ns = min(found)
+    return {(stamp_ns - start_ns) // STEP_NS: value for stamp_ns, value in found.items()}
+
+
+def _replay_setup(folder: Path) -> Setup:
+    game = load_game(folder / 'game.yaml')
+    human = replace(game.humans[0], driver=f'replay:{folder / "bag"}')
+    return build_setup(replace(game, humans=(human,)))
+
+
+def _joints(result: OfflineResult) -> NDArray[np.float64]:
+    """Give the human's (n + 1, 2, 4) joint positions and velocities."""
+    return np.array([vehicle_to_joints(VehicleState(*row))[:2]
+                     for row in result.states_of('hv0').tolist()])
+
+
+def test_recorded_human_is_reproduced_offline_to_the_last_bit(recorded: Path) -> None:
+    """
+    With the recorded commands and intervals, every published state comes out again exactly.
+
+    Not so with the nominal interval: the measured ones differ from it, and only they are right.
+    """
+    published = _published(recorded / 'bag', 'hv0')
+    assert sorted(published) == list(range(STEPS + 1))
+    setup = _replay_setup(recorded)
+    drivers, intervals_s = recorded_inputs(setup)
+    assert len(intervals_s) == STEPS
+    assert len(np.unique(intervals_s)) > STEPS // 2
+    result = run_offline(setup, duration_s=DURATION_S, drivers=drivers, intervals_s=intervals_s)
+    live = np.array([published[n] for n in range(STEPS + 1)])
+    assert np.array_equal(_joints(result), live)
+    # It steers: the lateral motion is not the trivial one of a straight road.
+    assert np.abs(live[-1, 0, 2] - live[0, 0, 2]) > 0.01
+    nominal = run_offline(setup, duration_s=DURATION_S, drivers=drivers)
+    assert not np.array_equal(_joints(nominal), live)
+    # Clipping carries over, so that the sum of the intervals is the simulated time but for jitter.
+    assert intervals_s.sum() == pytest.approx(DURATION_S, abs=0.1)
+    again = run_offline(setup, duration_s=DURATION_S, drivers=drivers, intervals_s=intervals_s)
+    assert again.state_hash == result.state_hash != nominal.state_hash
+
+
+def test_recorded_human_drives_live_against_another_planner(recorded: Path,
+                                                            tmp_path: Path) -> None:
+    """`--driver replay:BAG` gives the recorded commands to the cycles they were recorded for."""
+    seconds = 2.0
+    with Launcher([recorded / 'game.yaml', '--driver', f'replay:{recorded / "bag"}', '--planner',
+                   'constant-velocity', '--duration', seconds], tmp_path / 'run') as launcher:
+        assert launcher.wait() == 0, launcher.text
+    first = replay_inputs(recorded / 'bag').commands['hv0']
+    second = read_cycles(tmp_path / 'run' / 'bag').commands('hv0')
+    assert len(second) == 200
+    # A busy machine may hand a command to a later cycle, but never another than was recorded:
+    # within the 0.2 s after which a seat would let go.
+    same = [np.all(first[max(0, n - 20):n + 1] == row, axis=1).any()
+            for n, row in enumerate(second)]
+    assert np.mean(same) > 0.9
+    assert second[:, 0].max() > 0.9
+    # The other planner keeps its speed, whatever the human does; IDM had accelerated.
+    before, after = (_published(folder / 'bag', 'av0') for folder in (recorded, tmp_path / 'run'))
+    assert after[200][1, 0] == pytest.approx(after[0][1, 0], abs=1e-6)
+    assert before[200][1, 0] > before[0][1, 0] + 0.5
+    assert load_game(tmp_path / 'run' / 'game.yaml').avs[0].planner == 'constant-velocity'
