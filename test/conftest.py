@@ -9,6 +9,7 @@ import pytest
 
 from crgame_ros.ros.environment import free_domain_id, prepare_environment
 
+LONGEST_ID = 100
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -19,6 +20,13 @@ def pytest_configure() -> None:
     paths = os.environ.get('PYTHONPATH', '').split(os.pathsep)
     if str(ROOT) not in paths:
         os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(ROOT), *paths]))
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Name long values by their length: a line of megabytes chokes whoever reads the output."""
+    if isinstance(val, str | bytes) and len(val) > LONGEST_ID:
+        return f'{argname} of {len(val)}'
+    return None
 
 
 @pytest.fixture(scope='session')

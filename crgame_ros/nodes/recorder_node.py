@@ -159,7 +159,8 @@ class RecorderNode(Node):
         except RecordingError as error:
             self._tell(error)
             return
-        self.get_logger().info(f'{writer.message_count} messages in {writer.folder}')
+        if writer.failed is None:
+            self.get_logger().info(f'{writer.message_count} messages in {writer.folder}')
 
 
 def main(args: list[str] | None = None) -> None:

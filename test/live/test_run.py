@@ -100,10 +100,15 @@ def test_the_timing_report_has_table_one(finished: Launcher) -> None:
 def test_no_step_is_missing_in_the_recording(finished: Launcher) -> None:
     """Cycles 1 to 350 and states 0 to 350 are there, each once."""
     numbers: list[int] = []
+    throttle: list[float] = []
     with BagReader(finished.out / 'bag') as reader:
         for item in reader.decoded(['/timing/cycle']):
             label = item.message.layout.dim[1].label
-            numbers += CycleTable.from_message(label, item.message.data).column('n').tolist()
+            table = CycleTable.from_message(label, item.message.data)
+            numbers += table.column('n').tolist()
+            throttle += table.commands('hv0')[:, 0].tolist()
+    # The driver is awaited: its key counts from the first cycle on, by CRG's 1.8/s.
+    assert throttle[0] == pytest.approx(1.8 * 0.01, abs=1e-6)
     assert numbers == list(range(1, STEPS + 1))
     assert sorted(_poses(finished.out / 'bag')) == list(range(STEPS + 1))
 
