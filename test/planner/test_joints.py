@@ -131,9 +131,12 @@ def test_empty_plan_is_refused() -> None:
         plan_from_joints(series, 'av0', STEP_NS)
 
 
-def test_steering_without_accelerations_is_read() -> None:
-    """An external planner may leave accelerations out: they are NaN, which the check refuses."""
+def test_accelerations_left_out_follow_from_the_speeds() -> None:
+    """An external planner may leave accelerations out; of a uniform motion they are exact."""
+    speeds = 10.0 - 2.0 * 0.1 * np.arange(4)
     series = replace(good(), accelerations=np.full((4, 4), np.nan))
+    series.positions[:, 2] = 0.3
+    series.velocities[:, 0], series.velocities[:, 1] = speeds * np.cos(0.3), speeds * np.sin(0.3)
     states = plan_from_joints(series, 'av0', STEP_NS).states
-    assert np.isnan(states[:, StateColumn.ACCELERATION]).all()
-    assert np.isfinite(np.delete(states, StateColumn.ACCELERATION, axis=1)).all()
+    assert states[:, StateColumn.ACCELERATION] == pytest.approx(-2.0, abs=1e-9)
+    assert np.isfinite(states).all()
