@@ -3,6 +3,7 @@
 """planner_node: one AV's planner in its own process (CRG III-B, the worker of algorithm 2)."""
 
 from collections.abc import Mapping
+import gc
 import math
 import time
 
@@ -21,7 +22,7 @@ from crgame_ros.planner.joints import plan_to_joints
 from crgame_ros.planner.registry import create_planner
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_joint_trajectory, MAP, to_joint_trajectory, to_time
+from crgame_ros.ros.messages import from_joint_trajectory, MAP, SeriesMessage, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.spinning import spin
 from crgame_ros.scenario.loading import parse_scenario
@@ -33,6 +34,9 @@ from crgame_ros.simulation.documents import (
 )
 from crgame_ros.simulation.setup import scenario_digest
 from crgame_ros.vehicle.parameters import VehicleParameters
+
+# Garbage is collected after an answer, never in the middle of planning one.
+COLLECT_EVERY = 10
 
 
 class PlannerNode(Node):
@@ -57,6 +61,7 @@ class PlannerNode(Node):
         self._adapter: PlannerAdapter | None = None
         self._reader: RequestReader | None = None
         self._frames_skipped = False
+        self._message: SeriesMessage | None = None
         self._waiting: JointTrajectory | None = None
         self._subscriptions_kept = [
             endpoints.subscription('/scenario/xml', self._on_xml),
@@ -123,6 +128,9 @@ class PlannerNode(Node):
             objects, game.scheduler.time_step_s, game.scheduler.k0, int(game.content['seed'])))
         self._reader = RequestReader(self._vehicle_id, objects, game.scheduler)
         self._adapter, self._game, self._ready_for = adapter, game, key
+        gc.collect()
+        gc.freeze()
+        gc.disable()
         if failure is None:
             self.get_logger().info(f'{self._vehicle_id}: planner {name} is ready')
         else:
@@ -142,10 +150,14 @@ class PlannerNode(Node):
             return
         plan = self._adapter.plan(request)
         series = plan_to_joints(plan, self._vehicle_id, self._game.scheduler.time_step_ns)
-        self._plans.publish(to_joint_trajectory(series))
+        if self._message is None or not self._message.fits(series):
+            self._message = SeriesMessage(series.names, series.times_ns)
+        self._plans.publish(self._message.fill(series))
         if not self._frames_skipped and self._paths.get_subscription_count():
             self._paths.publish(_path(plan))
         self._report(request.k, plan)
+        if self._adapter.statistics.plans % COLLECT_EVERY == 0:
+            gc.collect()
 
     def _report(self, k: int, plan: Plan) -> None:
         """Tell of a fallback at once, and of the counts every ten requests."""

@@ -118,6 +118,7 @@ class SeriesMessage:
     """
 
     def __init__(self, names: Sequence[str], times_ns: NDArray[np.int64]) -> None:
+        self._names = tuple(names)
         nowhere = np.full((len(times_ns), len(names)), np.nan)
         self.message = to_joint_trajectory(
             JointSeries(0, tuple(names), times_ns, nowhere, nowhere, nowhere))
@@ -125,6 +126,10 @@ class SeriesMessage:
             tuple(np.frombuffer(values) for values in (
                 point.positions, point.velocities, point.accelerations))
             for point in self.message.points]
+
+    def fits(self, series: JointSeries) -> bool:
+        """Tell whether a series has this message's joints and number of points."""
+        return len(self._views) == len(series.times_ns) and self._names == series.names
 
     def fill(self, series: JointSeries) -> JointTrajectory:
         """Take a series of the same joints and times over, and give the message."""
