@@ -65,6 +65,8 @@ class LiveRun:
         self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
         duration_s = control.duration_s or setup.game.duration
         self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
+        # At high rates half a step has to do, or nobody could ever stop the run.
+        self._service_slack_ns = min(SERVICE_SLACK_NS, 0.5 * self._dt_s * NS_PER_S)
         self._service_every = max(1, round(1.0 / self._dt_s / SERVICE_RATE))
         self._second = max(1, round(1.0 / self._dt_s))
         self._setup = setup
@@ -189,7 +191,7 @@ class LiveRun:
         deadline_ns = self._controller.deadline_ns()
         self._sleep_from_ns = time.monotonic_ns()
         left_ns = deadline_ns - self._sleep_from_ns
-        if left_ns > SERVICE_SLACK_NS and self.simulation.n % self._service_every == 0:
+        if left_ns > self._service_slack_ns and self.simulation.n % self._service_every == 0:
             self._executor.spin_once(timeout_sec=0)
             left_ns = deadline_ns - time.monotonic_ns()
         if left_ns > WAKE_UP_NS:
