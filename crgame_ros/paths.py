@@ -35,3 +35,8 @@ def config_directory() -> Path:
 def scenarios_directory() -> Path:
     """Find the directory of the package's own scenarios and game files."""
     return share_directory() / 'scenarios'
+
+
+def default_game() -> Path:
+    """Find the game that runs when none is named."""
+    return scenarios_directory() / 'cut_in.yaml'

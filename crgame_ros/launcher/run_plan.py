@@ -9,13 +9,11 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
-from crgame_ros.paths import scenarios_directory
+from crgame_ros.paths import default_game
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.scenario.game_file import build, dump_game, load_game
 from crgame_ros.simulation.setup import build_setup, Setup
-
-DEFAULT_GAME = 'cut_in.yaml'
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ def effective_game(request: RunRequest) -> Game:
     elif request.scenario is not None:
         game = Game(request.scenario, humans=(HumanSpec('hv0'),))
     else:
-        game = load_game(scenarios_directory() / DEFAULT_GAME)
+        game = load_game(default_game())
     if request.game is not None and request.scenario is not None:
         game = replace(game, scenario=request.scenario)
     if request.driver is not None:

@@ -19,14 +19,13 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.spinning import poll
-from crgame_ros.scenario.loading import parse_scenario
+from crgame_ros.scenario.loading import parse_scenario, scenario_digest
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.documents import (
     GameDocument,
     parse_game_document,
     parse_objects_document,
 )
-from crgame_ros.simulation.setup import scenario_digest
 
 PERIOD_S = 0.005
 HEARTBEAT_S = 1.0

@@ -25,14 +25,13 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_joint_trajectory, MAP, SeriesMessage, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.spinning import spin
-from crgame_ros.scenario.loading import parse_scenario
+from crgame_ros.scenario.loading import parse_scenario, scenario_digest
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.simulation.documents import (
     GameDocument,
     parse_game_document,
     parse_objects_document,
 )
-from crgame_ros.simulation.setup import scenario_digest
 from crgame_ros.vehicle.parameters import VehicleParameters
 
 # Garbage is collected after an answer, never in the middle of planning one.

@@ -53,11 +53,6 @@ class PathPlanner(Planner):
         self._context = context
         self._plan_path(initial_state(context))
 
-    @property
-    def driving_path(self) -> DrivingPath:
-        """The path that the planner follows at present."""
-        return self._driving
-
     @abstractmethod
     def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
         """Prepare for a new path."""

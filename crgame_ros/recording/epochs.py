@@ -4,12 +4,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import hashlib
 from itertools import pairwise
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.scenario.loading import scenario_digest
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.simulation.documents import (
     GAME_TOPIC,
@@ -112,7 +112,7 @@ def _documents(reader: BagReader) -> dict[str, list[_Text]]:
 
 def _scenario_of(game: GameDocument, texts: Sequence[_Text], reader: BagReader) -> str:
     for _, text in reversed(texts):
-        if hashlib.sha256(text.encode('utf-8')).hexdigest() == game.scenario_sha256:
+        if scenario_digest(text) == game.scenario_sha256:
             return text
     raise InputError(f'{XML_TOPIC} is that of another run', str(reader.path),
                      'record from before the start of the run')

@@ -11,13 +11,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from crgame_ros.errors import InputError
-from crgame_ros.paths import scenarios_directory
+from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.scenario.game import Game
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
-
-DEFAULT_GAME = 'cut_in.yaml'
 
 
 class SimControl:
@@ -132,7 +130,7 @@ class SimControl:
 
     def _game(self, path: str) -> Game:
         if not path:
-            return load_game(scenarios_directory() / DEFAULT_GAME)
+            return load_game(default_game())
         return Game(Path(path)) if self._chosen == 'scenario' else load_game(Path(path))
 
     def _allowed(self, name: str) -> Path:

@@ -87,9 +87,14 @@ def parse_scenario(xml_text: str, source: str) -> LoadedScenario:
                              f'{source}, lanelet {lanelet.lanelet_id}', 'correct its bounds')
     if not exact:
         notices.append('the scenario has no planning problem: the human drives alone')
-    digest = hashlib.sha256(xml_text.encode('utf-8')).hexdigest()
+    digest = scenario_digest(xml_text)
     return LoadedScenario(scenario, exact, xml_text, digest, str(scenario.scenario_id),
                           float(scenario.dt), tuple(f'{source}: {n}' for n in notices), source)
+
+
+def scenario_digest(xml_text: str) -> str:
+    """Give the SHA-256 by which a game names its scenario's text."""
+    return hashlib.sha256(xml_text.encode('utf-8')).hexdigest()
 
 
 def exact_position(position: NDArray[np.float64] | Shape) -> NDArray[np.float64]:

@@ -3,7 +3,6 @@
 """Everything that a run needs, resolved: a game with its scenario loaded and vehicles placed."""
 
 from dataclasses import dataclass, replace
-import hashlib
 import math
 
 from commonroad.planning.planning_problem import PlanningProblem
@@ -201,8 +200,3 @@ def _place_avs(
         avs.append(AvSetup(replace(spec, planning_problem=number), parameters, state, transform,
                            problems[number]))
     return tuple(avs)
-
-
-def scenario_digest(xml_text: str) -> str:
-    """Give the SHA-256 by which a game names its scenario's text."""
-    return hashlib.sha256(xml_text.encode('utf-8')).hexdigest()

@@ -15,9 +15,9 @@ from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.game import AvSpec, HumanSpec, LaneletSpawn, PoseSpawn
 from crgame_ros.scenario.game_file import load_game
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario, scenario_digest
 from crgame_ros.scenario.objects import Role
-from crgame_ros.simulation.setup import build_setup, scenario_digest
+from crgame_ros.simulation.setup import build_setup
 
 REACH = 1.4227170936
 
