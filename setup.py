@@ -10,7 +10,7 @@ from setuptools import find_packages, setup
 
 PACKAGE = 'crgame_ros'
 NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'timesync_node',
-         'recorder_node')
+         'recorder_node', 'marker_node', 'cockpit_node')
 DATA_DIRECTORIES = ('launch', 'config', 'scenarios', 'msg_defs')
 # Relative paths only: setuptools refuses absolute ones in data_files.
 ROOT = Path(__file__).resolve().parent
@@ -66,12 +66,13 @@ setup(
     license='Apache-2.0',
     python_requires='>=3.11,<3.13',
     packages=find_packages(exclude=['test', 'test.*']),
-    package_data={PACKAGE: ['py.typed']},
+    package_data={PACKAGE: ['py.typed', 'cockpit/page/*', 'cockpit/page/**/*']},
     data_files=data_files(),
     zip_safe=False,
     # What is imported, at the versions of requirements.txt. Those that other packages need in turn
     # are in requirements.txt only: it is the way to a set of versions known to work.
     install_requires=[
+        'aiohttp>=3.14,<4',
         'commonroad-clcs==2025.2.0',
         'commonroad-drivability-checker==2025.4.0',
         'commonroad-idm-planner==0.2.1',
@@ -85,6 +86,7 @@ setup(
         'mcap>=1.6,<2',
         'mcap-ros2-support>=0.6,<1',
         'numpy>=2.4,<2.5',
+        'plotly>=7.1,<8',
         'pyyaml>=6.0.3,<7',
         'ros-jazzy-common-interfaces==5.3.6',
         'ros-jazzy-rclpy[fastrtps]==7.1.6',
@@ -94,7 +96,8 @@ setup(
         'zstandard>=0.25,<1',
     ],
     extras_require={'test': [
-        'mypy>=2.4,<3', 'pytest>=7.4,<8', 'ruff>=0.17.5,<0.18', 'types-PyYAML>=6.0.12,<7',
+        'mypy>=2.4,<3', 'pytest>=7.4,<8', 'ruff>=0.17.5,<0.18', 'selenium>=4.51,<5',
+        'types-PyYAML>=6.0.12,<7',
     ]},
     entry_points={
         'console_scripts': [

@@ -24,9 +24,11 @@ class LiveGraph:
 
     :param folder: folder of the run.
     :param arguments: further arguments of the launcher.
+    :param headless: without the cockpit.
     """
 
-    def __init__(self, folder: Path, arguments: Sequence[str]) -> None:
+    def __init__(self, folder: Path, arguments: Sequence[str], *,
+                 headless: bool = True) -> None:
         prepare_environment()
         self.folder = folder
         self.domain = free_domain_id()
@@ -37,9 +39,9 @@ class LiveGraph:
         self._log.parent.mkdir(parents=True, exist_ok=True)
         self._stream = self._log.open('wb')
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'crgame_ros.launcher.main', '--headless', '--out', str(folder),
-             *arguments], stdout=self._stream, stderr=subprocess.STDOUT, env=environment,
-            start_new_session=True)
+            [sys.executable, '-m', 'crgame_ros.launcher.main', '--out', str(folder),
+             *(['--headless'] if headless else []), *arguments], stdout=self._stream,
+            stderr=subprocess.STDOUT, env=environment, start_new_session=True)
 
     @property
     def running(self) -> bool:
@@ -51,6 +53,16 @@ class LiveGraph:
         text = self._log.read_text(encoding='utf-8', errors='replace')
         return {name: int(pid) for name, pid in re.findall(
             r'^(\S+): process (\d+)$', text, re.MULTILINE)}
+
+    def page(self) -> str:
+        """Wait for the address of the cockpit."""
+        until_s = time.monotonic() + START_LIMIT_S
+        while time.monotonic() < until_s:
+            text = self._log.read_text(encoding='utf-8', errors='replace')
+            if (found := re.search(r'the cockpit is at (http://\S+)', text)) is not None:
+                return found[1]
+            time.sleep(0.05)
+        sys.exit(f'the cockpit did not start; its output is in {self._log}')
 
     def wait(self) -> dict[str, Any]:
         """Wait for the end of the run and give its timing report."""

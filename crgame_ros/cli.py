@@ -85,8 +85,21 @@ def _add_offline(parser: argparse.ArgumentParser) -> None:
     add('--duration', type=float, metavar='S', help='simulated seconds')
     add('--latency', type=int, default=0, metavar='L',
         help='simulation steps between a request and its plan (default: 0)')
+    add('--trigger', type=_trigger, action='append', default=[], metavar='NAME@S',
+        help='trigger an event of the game so many seconds after the start; may be repeated')
     add('--out', type=Path, metavar='DIR', help='write the run as a CommonRoad scenario there')
     parser.set_defaults(command=_offline)
+
+
+def _trigger(text: str) -> tuple[str, float]:
+    name, _, seconds = text.rpartition('@')
+    try:
+        time_s = float(seconds)
+    except ValueError:
+        time_s = -1.0
+    if not name or not 0.0 <= time_s < 1e9:
+        raise InputError(f'is "{text[:60]}"', '--trigger', 'give NAME@SECONDS')
+    return name, time_s
 
 
 def _offline(values: argparse.Namespace) -> int:
@@ -95,7 +108,7 @@ def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.recording.run_log import run_log_of
     from crgame_ros.scenario.export import write_scenario
     from crgame_ros.simulation.offline import run_offline
-    from crgame_ros.simulation.replay import recorded_inputs
+    from crgame_ros.simulation.replay import recorded_inputs, with_replayed_events
     from crgame_ros.simulation.setup import build_setup
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
@@ -103,10 +116,13 @@ def _offline(values: argparse.Namespace) -> int:
                          duration_s=values.duration,
                          planners=(values.planner,) if values.planner else ())
     setup = with_planners(build_setup(effective_game(request)), request.planners)
+    setup = with_replayed_events(setup)
     drivers, intervals_s = recorded_inputs(setup)
+    triggers = [(round(time_s / setup.scheduler.dt_s), name) for name, time_s in values.trigger]
     start_s = time.perf_counter()
     result = run_offline(setup, latency_steps=values.latency, drivers=drivers,
-                         intervals_s=intervals_s, clock_s=time.perf_counter)
+                         intervals_s=intervals_s, clock_s=time.perf_counter,
+                         triggers=triggers)
     wall_s = time.perf_counter() - start_s
     simulated_s = (len(result.vehicle_states) - 1) * setup.scheduler.dt_s
     report = {
@@ -119,6 +135,8 @@ def _offline(values: argparse.Namespace) -> int:
                     'fallbacks': record.statistics.fallbacks,
                     'reasons': dict(record.statistics.reasons)}
             for av_id, record in result.planners.items()},
+        'events': [{'name': event.name, 'n': event.n, 'k': event.k, 'by': event.by}
+                   for event in result.fired],
         'violations': [{'vehicle': item.vehicle_id, 'n': item.n, 'hit': list(item.hit),
                         'off_road': item.off_road}
                        for item in result.violations if not item.is_valid]}

@@ -19,7 +19,6 @@ from typing import Literal
 from crgame_ros.paths import share_directory
 from crgame_ros.ros.environment import (
     free_domain_id,
-    listening_beyond_loopback,
     loopback_profile,
     network_is_open,
     prepare_environment,
@@ -40,9 +39,6 @@ MODULES = (
 # For polygon3, which is compiled and which only the planners reactive and idm-package need.
 COMPILE_FIX = 'apt install gcc python3-dev, remove .venv and start again'
 PROBE_TIMEOUT_S = 60.0
-PROBE_TOPIC = 'crgame_doctor'
-PROBE_MESSAGES = 20
-DISCOVERY_TIMEOUT_S = 15.0
 JITTER_SLEEPS = 200
 JITTER_PERIOD_NS = 5_000_000
 # Above this the host, not the program, decides the timing: a twentieth of a 10 ms cycle.
@@ -222,7 +218,7 @@ def check_discovery() -> list[Check]:
     environment = dict(os.environ, ROS_DOMAIN_ID=str(free_domain_id()))
     environment['PYTHONPATH'] = os.pathsep.join(
         [str(Path(__file__).parents[1]), environment.get('PYTHONPATH', '')]).rstrip(os.pathsep)
-    command = [sys.executable, '-m', 'crgame_ros.doctor']
+    command = [sys.executable, '-m', 'crgame_ros.ros.talk_probe']
     with subprocess.Popen([*command, 'talk'], env=environment, stdin=subprocess.PIPE,
                           stderr=subprocess.DEVNULL) as talker:
         try:
@@ -285,50 +281,6 @@ def check_clock(sleeps: int = JITTER_SLEEPS) -> Check:
                  'close other programs; a virtual machine may need processors of its own')
 
 
-def talk() -> None:
-    """Publish the steady clock's time until terminated: the other process of the exchange."""
-    import rclpy
-    from std_msgs.msg import Int64
-
-    rclpy.init()
-    node = rclpy.create_node('crgame_doctor_talker')
-    publisher = node.create_publisher(Int64, PROBE_TOPIC, 1)
-    deadline = time.monotonic() + DISCOVERY_TIMEOUT_S
-    while rclpy.ok() and time.monotonic() < deadline:
-        publisher.publish(Int64(data=time.monotonic_ns()))
-        time.sleep(0.02)
-    node.destroy_node()
-    rclpy.try_shutdown()
-
-
-def listen() -> None:
-    """Print as JSON when the first message came, the median delay and the open ports."""
-    import rclpy
-    from std_msgs.msg import Int64
-
-    rclpy.init()
-    started_ns = time.monotonic_ns()
-    node = rclpy.create_node('crgame_doctor_listener')
-    sent_ns, received_ns = [], []
-
-    def take(message: Int64) -> None:
-        received_ns.append(time.monotonic_ns())
-        sent_ns.append(message.data)
-
-    node.create_subscription(Int64, PROBE_TOPIC, take, 1)
-    while (len(sent_ns) < PROBE_MESSAGES
-           and time.monotonic_ns() - started_ns < DISCOVERY_TIMEOUT_S * 1e9):
-        rclpy.spin_once(node, timeout_sec=0.1)
-    beyond = listening_beyond_loopback()
-    node.destroy_node()
-    rclpy.try_shutdown()
-    if len(sent_ns) < PROBE_MESSAGES:
-        sys.exit(f'{len(sent_ns)} messages from another process in {DISCOVERY_TIMEOUT_S:.0f} s')
-    delays_us = [(end - start) * 1e-3 for start, end in zip(sent_ns, received_ns, strict=True)]
-    print(json.dumps({'first_s': (received_ns[0] - started_ns) * 1e-9,
-                      'median_us': statistics.median(delays_us), 'beyond_loopback': beyond}))
-
-
 def _run(command: list[str],
          environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
     """Run a command to its end, which a time-out makes a failure."""
@@ -343,8 +295,3 @@ def _run(command: list[str],
 def _last_line(text: str) -> str:
     """Return the last line that is not empty."""
     return next((line for line in reversed(text.splitlines()) if line.strip()), 'no message')
-
-
-if __name__ == '__main__':
-    prepare_environment()
-    {'talk': talk, 'listen': listen}[sys.argv[1]]()

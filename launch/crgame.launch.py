@@ -40,7 +40,10 @@ def nodes(context: LaunchContext) -> list:
         parameters=[{'game': value('game'), 'wait_for': waiting}])
     end = RegisterEventHandler(OnProcessExit(
         target_action=simulation, on_exit=[EmitEvent(event=Shutdown(reason='the game ended'))]))
-    return [*companions, simulation, end]
+    # Nobody waits for it: it draws for people.
+    markers = Node(package='crgame_ros', executable='marker_node', respawn=True,
+                   prefix='nice -n 10')
+    return [*companions, simulation, markers, end]
 
 
 def generate_launch_description() -> LaunchDescription:

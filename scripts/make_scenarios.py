@@ -5,12 +5,13 @@
 import argparse
 from pathlib import Path
 
+from scenario_crossing import crossing
 from scenario_motorways import cut_in, lane_change, merge, traffic, two_avs
 from scenario_towns import intersection, parked_cars, roundabout_, t_junction
 from scenario_xml import write
 
 SCENARIOS = (cut_in, lane_change, merge, t_junction, intersection, roundabout_, parked_cars,
-             two_avs, traffic)
+             two_avs, traffic, crossing)
 
 
 def main() -> None:

@@ -27,6 +27,7 @@ from crgame_ros.doctor import (
     read_pins,
 )
 from crgame_ros.ros.environment import PROFILE_VARIABLES
+from crgame_ros.ros.talk_probe import DISCOVERY_TIMEOUT_S
 
 
 def test_python_of_this_run_is_fit() -> None:
@@ -128,7 +129,7 @@ def test_two_processes_discover_each_other() -> None:
     match = re.fullmatch(r'first message after ([\d.]+) s, then (\d+) us a message',
                          discovery.detail)
     assert match is not None
-    assert 0.0 < float(match[1]) < doctor.DISCOVERY_TIMEOUT_S
+    assert 0.0 < float(match[1]) < DISCOVERY_TIMEOUT_S
     assert int(match[2]) > 0
     assert (ports.status, ports.detail) == ('ok', 'DDS listens at loopback only')
 

@@ -27,11 +27,13 @@ if TYPE_CHECKING:
     from crgame_ros.driver.evdev_device import EvdevDevice
 
 JOY_TIMEOUT_S = 0.5
+# Drives in the browser; its node speaks for the seat itself.
+COCKPIT = 'cockpit'
 
 _FORMS = {
-    'auto': 'auto', 'idle': 'idle', 'evdev': 'evdev or evdev:NAME', 'keys': 'keys:FILE',
-    'joy': 'joy or joy:FILE', 'replay': 'replay:BAG'}
-_WITHOUT_ARGUMENT = {'auto', 'idle', 'evdev', 'joy'}
+    'auto': 'auto', 'cockpit': 'cockpit', 'idle': 'idle', 'evdev': 'evdev or evdev:NAME',
+    'keys': 'keys:FILE', 'joy': 'joy or joy:FILE', 'replay': 'replay:BAG'}
+_WITHOUT_ARGUMENT = {'auto', 'cockpit', 'idle', 'evdev', 'joy'}
 _WITH_ARGUMENT = {'evdev', 'keys', 'joy', 'replay'}
 
 
@@ -40,7 +42,7 @@ class SourceSpec:
     """
     A source as the game or the command line names it.
 
-    :param kind: auto, idle, evdev, keys, joy or replay.
+    :param kind: auto, cockpit, idle, evdev, keys, joy or replay.
     :param argument: device name, file or bag; empty for `auto`, `idle`, the best evdev device
         and the external joy node.
     """
@@ -114,6 +116,10 @@ class DriverSource(ABC):
         :param n: the cycle, never less than the one asked for last (`reset` begins anew).
         :param dt_s: length of a cycle in simulation time [s].
         """
+
+    def drives(self, n: int) -> bool:
+        """Tell whether an AV's seat is taken in cycle n; while not, it follows its plan."""
+        return True
 
     def poll(self, now_s: float) -> bool:
         """

@@ -23,9 +23,11 @@ examples:
   ./run.sh scenarios/merge.yaml --driver evdev    drive the merge yourself
   ./run.sh --scenario FILE.xml --planner reactive --duration 30
   ./run.sh --driver replay:runs/NAME/bag          the same human against another planner
+  ./run.sh --replay runs/NAME/bag                 look at a recording, with a time line
 
-driver sources: auto (wheel, gamepad or keyboard, whichever is found), evdev[:NAME], keys:FILE,
-joy:FILE (scripted), joy (an external joy node), replay:BAG, idle.
+driver sources: cockpit (the run waits for somebody in the browser), auto (wheel, gamepad or
+keyboard, whichever is found), evdev[:NAME], keys:FILE, joy:FILE (scripted), joy (an external joy
+node), replay:BAG, idle. Whoever they are, somebody in the browser can take the seat.
 planners: idm, idm-package, reactive, constant-velocity, a registered name, module:Class or
 file.py:Class."""
 
@@ -42,6 +44,9 @@ class RunRequest:
     :param duration_s: simulated time [s]
     :param rate_hz: simulation rate [Hz]
     :param headless: without the cockpit.
+    :param port: of the cockpit's page; the next free one when it is taken.
+    :param listen: address on which the page is served beyond this machine, with a token.
+    :param replay: recording to show in the page; nothing is simulated then.
     :param realtime_priority: SCHED_FIFO for the simulation.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
@@ -54,6 +59,9 @@ class RunRequest:
     rate_hz: float | None = None
     real_time_factor: float = 1.0
     headless: bool = False
+    port: int = 8080
+    listen: str | None = None
+    replay: Path | None = None
     realtime_priority: bool = False
     out: Path | None = None
 
@@ -79,7 +87,14 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         help="simulation rate in Hz (default: the game's, else 100)")
     add('--real-time-factor', type=_factor, default=1.0, metavar='F',
         help='simulated seconds per second, 0.1 to 10 (default: 1)')
-    add('--headless', action='store_true', help='no display')
+    add('--headless', action='store_true', help='without the cockpit, the page in the browser')
+    add('--port', type=_port, default=8080, metavar='P',
+        help='port of the page (default: 8080, or the next free one)')
+    add('--listen', metavar='ADDRESS',
+        help='serve the page to other machines too, for instance on 0.0.0.0; who comes needs the '
+        'token in the printed address')
+    add('--replay', type=Path, metavar='BAG',
+        help='show a recording in the page instead of running a game; goes with --port, --listen')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--out', type=Path, metavar='DIR',
@@ -95,7 +110,12 @@ def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunReq
     """
     values = vars(build_parser(program).parse_args(list(arguments)))
     values['planners'] = tuple(values['planners'])
-    return RunRequest(**values)
+    request = RunRequest(**values)
+    if request.replay is not None and request != RunRequest(
+            port=request.port, listen=request.listen, replay=request.replay):
+        raise InputError('shows a recording and runs no game', '--replay',
+                         'give nothing but --port and --listen with it')
+    return request
 
 
 def _positive(text: str) -> float:
@@ -103,6 +123,12 @@ def _positive(text: str) -> float:
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is not above 0')
     return value
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f'{text} is no port from 1 to 65535')
+    return int(text)
 
 
 def _factor(text: str) -> float:

@@ -10,37 +10,13 @@ import time
 from types import FrameType
 
 from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
-from crgame_ros.launcher.run_plan import RunPlan
-from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.launcher.node_specs import Roster
 
 # The time that a node gets to end in good order [s].
 GRACE_S = 5.0
 # The recorder takes in what the others said last [s].
 DRAIN_S = 0.3
 MAX_RESTARTS = 5
-COMPANION_NICE = 5
-
-
-def node_specs(plan: RunPlan) -> list[NodeSpec]:
-    """List the nodes of a run; sim_node comes last, for it waits for the others."""
-    setup, request = plan.setup, plan.request
-    drivers = [NodeSpec('driver_node', f'driver_node_{human.id}', {'vehicle': human.id},
-                        restart=True) for human in setup.humans]
-    planners = [NodeSpec('planner_node', f'planner_node_{av.id}', {'vehicle': av.id},
-                         nice=COMPANION_NICE, restart=True)
-                for av in setup.avs if av.spec.planner != EXTERNAL]
-    companions = [
-        *planners, *drivers,
-        NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
-                 nice=COMPANION_NICE, restart=True),
-        NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
-        NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True)]
-    waiting = ', '.join(f'"{spec.name}"' for spec in companions)
-    simulation = NodeSpec('sim_node', 'sim_node', {
-        'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
-        'realtime_priority': str(request.realtime_priority).lower(),
-        'wait_for': f'[{waiting}]'})
-    return [simulation, *companions]
 
 
 class Graph:
@@ -49,10 +25,13 @@ class Graph:
 
     :param specs: the nodes; the first is the one whose end ends the run.
     :param say: prints one line.
+    :param roster: tells of further vehicles, which get their nodes.
     """
 
-    def __init__(self, specs: Sequence[NodeSpec], say: Callable[[str], None]) -> None:
+    def __init__(self, specs: Sequence[NodeSpec], say: Callable[[str], None],
+                 roster: Roster | None = None) -> None:
         self._say = say
+        self._roster = roster
         self._selector = selectors.DefaultSelector()
         self._signal: int | None = None
         self._restarts: dict[str, int] = {}
@@ -75,6 +54,7 @@ class Graph:
             while self._signal is None and self._nodes[first].exit_code() is None:
                 self._relay(0.1)
                 self._look_after(first)
+                self._welcome()
             return self._end(first)
         finally:
             for node in self._nodes.values():
@@ -123,6 +103,12 @@ class Graph:
             self._restarts[name] = count
             self._forget(node)
             self._start(restarted(node.spec, count))
+
+    def _welcome(self) -> None:
+        """Start the nodes of vehicles that have joined with another game."""
+        for spec in self._roster.changed_specs() if self._roster is not None else ():
+            if spec.name not in self._nodes:
+                self._start(spec)
 
     def _forget(self, node: NodeProcess) -> None:
         if node.output in {key.fileobj for key in self._selector.get_map().values()}:

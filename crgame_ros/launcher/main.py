@@ -9,7 +9,8 @@ import sys
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import parse_arguments
-from crgame_ros.launcher.graph import Graph, node_specs
+from crgame_ros.launcher.graph import Graph
+from crgame_ros.launcher.node_specs import node_specs, Roster
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
 from crgame_ros.ros.environment import free_domain_id, network_is_open, prepare_environment
 
@@ -26,9 +27,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     :return: exit code: 0 at a good end, 2 for bad input, 1 for other failures.
     """
     try:
-        plan = plan_run(parse_arguments(sys.argv[1:] if arguments is None else arguments))
+        request = parse_arguments(sys.argv[1:] if arguments is None else arguments)
+        if request.replay is not None:
+            from crgame_ros.cockpit.replay_server import serve_replay
+            return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
+                                say=say)
+        plan = plan_run(request)
         announce(plan)
-        code = Graph(node_specs(plan), say).run()
+        code = Graph(node_specs(plan), say, Roster(plan.roster)).run()
         return max(code, finish(plan))
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)
@@ -65,6 +71,7 @@ def finish(plan: RunPlan) -> int:
     if not plan.bag.is_dir():
         say('nothing was recorded: the run ended before its first step')
         return 1
+    plan.roster.unlink(missing_ok=True)
     code = 0
     # A reset begins another bag, a recorder that was started again too.
     bags = sorted(path for path in plan.folder.glob(f'{plan.bag.name}*') if path.is_dir())

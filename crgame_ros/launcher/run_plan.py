@@ -7,12 +7,17 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
+from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.paths import default_game
 from crgame_ros.planner.registry import create_planner, EXTERNAL
+from crgame_ros.scenario.checked_values import build
+from crgame_ros.scenario.events import PlannerSwap
 from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, TimingSpec
-from crgame_ros.scenario.game_file import build, dump_game, load_game
+from crgame_ros.scenario.game_file import dump_game, load_game
+from crgame_ros.simulation.event_check import check_swap
+from crgame_ros.simulation.replay import with_replayed_events
 from crgame_ros.simulation.setup import build_setup, Setup
 
 
@@ -34,6 +39,16 @@ class RunPlan:
     def game_file(self) -> Path:
         """The game as it is run, in the run's folder."""
         return self.folder / 'game.yaml'
+
+    @property
+    def cockpit(self) -> Path:
+        """What people upload and choose in the cockpit."""
+        return self.folder / 'cockpit'
+
+    @property
+    def roster(self) -> Path:
+        """The vehicles of the game that runs now, while it runs."""
+        return self.folder / '.roster.json'
 
     @property
     def bag(self) -> Path:
@@ -84,9 +99,13 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
     :raises InputError: if anything cannot be used.
     """
     setup = build_setup(effective_game(request))
-    setup = with_planners(setup, request.planners)
+    if request.headless and any(human.driver == COCKPIT for human in setup.humans):
+        raise InputError('nobody can take a seat in the browser', '--headless',
+                         'leave it out, or name another driver')
+    setup = with_replayed_events(with_planners(setup, request.planners))
     for av in setup.avs:
         _check_planner(av.spec)
+    _check_swaps(setup)
     folder = _make_folder(request.out, setup.loaded.benchmark_id, now())
     plan = RunPlan(request, setup, folder)
     plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
@@ -99,6 +118,15 @@ def _check_planner(spec: AvSpec) -> None:
     elif spec.options:
         raise InputError('an external planner takes no options from the game', spec.id,
                          'give them to the external planner itself')
+
+
+def _check_swaps(setup: Setup) -> None:
+    """Make every planner that an event brings in, as its node will."""
+    specs = [av.spec for av in setup.avs]
+    for event in setup.game.events:
+        if isinstance(event.action, PlannerSwap):
+            check_swap(event, f'event {event.name}', specs)
+            create_planner(event.action.planner, event.action.options)
 
 
 def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:

@@ -18,14 +18,10 @@ from crgame_ros.planner.joints import vehicles_from_joints
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
-from crgame_ros.scenario.loading import parse_scenario, scenario_digest
 from crgame_ros.scenario.objects import ObjectStates
-from crgame_ros.simulation.documents import (
-    GameDocument,
-    parse_game_document,
-    parse_objects_document,
-)
+from crgame_ros.simulation.documents import GameDocument
 
 PERIOD_S = 0.005
 HEARTBEAT_S = 1.0
@@ -37,12 +33,9 @@ class DrivabilityNode(Node):
     def __init__(self) -> None:
         super().__init__('drivability_node')
         self._endpoints = Endpoints(self)
-        self._documents = {name: self._endpoints.polled(f'/scenario/{name}')
-                           for name in ('xml', 'objects', 'game')}
+        self._documents = ScenarioDocuments(self._endpoints)
         self._states = self._endpoints.polled('/vehicles/state', depth=100)
         self._objects = self._endpoints.polled('/traffic/objects', depth=100)
-        self._texts: dict[str, str] = {}
-        self._ready_for: tuple[str, ...] = ()
         self._game: GameDocument | None = None
         self._monitor: DrivabilityMonitor | None = None
         self._reports: dict[str, Publisher] = {}
@@ -65,36 +58,25 @@ class DrivabilityNode(Node):
             velocities = np.array(message.points[0].velocities).reshape(-1, 3)
             self._waiting_objects.append(
                 (from_time(message.header.stamp), ObjectStates(poses, velocities)))
-        for name, slot in self._documents.items():
-            if (document := slot.latest()) is not None:
-                self._texts[name] = document.data
-                self._prepare()
+        self._prepare()
         if self._monitor is not None:
             for message in states:
                 self._check(message)
 
     def _prepare(self) -> None:
-        """Build the monitor once text, game and objects belong together."""
-        if len(self._texts) < 3:
-            return
+        """Build the monitor anew when there is a new set of documents."""
         try:
-            game = parse_game_document(self._texts['game'])
-            key = (self._texts['game'], self._texts['objects'], game.scenario_sha256)
-            if scenario_digest(self._texts['xml']) != game.scenario_sha256 \
-                    or key == self._ready_for:
-                return
-            self._build(game)
-            self._ready_for = key
+            documents = self._documents.poll()
+            if documents is not None:
+                self._build(documents)
         except CrgameError as error:
             self._monitor = None
             self.get_logger().error(str(error))
 
-    def _build(self, game: GameDocument) -> None:
-        objects = parse_objects_document(self._texts['objects'])
-        driven = [item for item in objects if item.role.is_ego]
-        others = [item for item in objects if not item.role.is_ego]
-        network = parse_scenario(self._texts['xml'], '/scenario/xml').scenario.lanelet_network
-        monitor = DrivabilityMonitor(driven, others, network, game.drivability)
+    def _build(self, documents: ScenarioSet) -> None:
+        game, driven = documents.game, documents.driven
+        network = documents.loaded.scenario.lanelet_network
+        monitor = DrivabilityMonitor(driven, documents.others, network, game.drivability)
         monitor.prepare(np.array([entry['state'] for entry in (*game.humans, *game.avs)]))
         for item in driven:
             if item.id not in self._reports:

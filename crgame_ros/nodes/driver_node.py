@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """driver_node: one human's input, normalised and filtered in simulation time (CRG III-C1)."""
 
+import json
 import select
 import threading
 import time
@@ -21,6 +22,7 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.seats import GAME
 from crgame_ros.ros.spinning import spin
 from crgame_ros.simulation.documents import GameDocument, parse_game_document
 
@@ -51,7 +53,7 @@ class DriverNode(Node):
         if self._choice == 'joy':
             load_device_map(self._joy_map)
         endpoints = Endpoints(self)
-        self._commands = endpoints.publisher('/<hv>/driver_command', self._vehicle_id)
+        self._commands = endpoints.publisher('/<v>/driver_command', self._vehicle_id)
         self._raw = endpoints.publisher('/<hv>/joy', self._vehicle_id)
         self._diagnostics = endpoints.publisher('/diagnostics')
         self._lock = threading.Lock()
@@ -60,7 +62,9 @@ class DriverNode(Node):
         self._cycle = -1
         self._told = ''
         self._running = True
+        self._silent = False
         self._kept = [endpoints.subscription('/scenario/game', self._on_game),
+                      endpoints.subscription('/seats', self._on_seats),
                       endpoints.subscription('/clock', self._on_clock)]
         self._joy_subscription: Subscription | None = None
         self._endpoints = endpoints
@@ -102,6 +106,15 @@ class DriverNode(Node):
             self._joy_subscription = self._endpoints.subscription(
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
 
+    def _on_seats(self, message: String) -> None:
+        """Fall silent while somebody else has the seat."""
+        try:
+            seat = json.loads(message.data).get(self._vehicle_id, {})
+            self._silent = seat.get('source', GAME) != GAME
+        except (ValueError, AttributeError):
+            self.get_logger().warning('/seats is not what the contract says',
+                                      throttle_duration_sec=1.0)
+
     def _on_clock(self, message: Clock) -> None:
         """Begin the cycle that the clock has reached."""
         with self._lock:
@@ -119,11 +132,12 @@ class DriverNode(Node):
         """Publish the command of the present cycle; the lock is held."""
         assert self._driver is not None and self._game is not None
         self._tell_of_problem()
-        if not self._driver.connected or self._cycle < 0:
+        if not self._driver.connected or self._cycle < 0 or self._silent:
             return
         scheduler = self._game.scheduler
         stamp_ns = scheduler.stamp_ns(self._cycle)
-        self._commands.publish(to_joy(self._driver.command(self._cycle, scheduler.dt_s), stamp_ns))
+        command = self._driver.command(self._cycle, scheduler.dt_s)
+        self._commands.publish(to_joy(command, stamp_ns, GAME))
         raw = self._driver.joy()
         if raw is not None and not isinstance(self._driver, JoyDriver):
             message = Joy(axes=list(raw.axes), buttons=list(raw.buttons))

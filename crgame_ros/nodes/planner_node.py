@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """planner_node: one AV's planner in its own process (CRG III-B, the worker of algorithm 2)."""
 
-from collections.abc import Mapping
 import gc
 import math
 import time
@@ -16,22 +15,18 @@ from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.planner.adapter import PlannerAdapter
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.planner.crew import PlannerCrew
 from crgame_ros.planner.interface import Plan, PlannerContext
 from crgame_ros.planner.joints import plan_to_joints
-from crgame_ros.planner.registry import create_planner
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_joint_trajectory, MAP, SeriesMessage, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.spinning import spin
-from crgame_ros.scenario.loading import parse_scenario, scenario_digest
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.simulation.documents import (
-    GameDocument,
-    parse_game_document,
-    parse_objects_document,
-)
+from crgame_ros.scenario.events import FiredEvent
+from crgame_ros.simulation.documents import GameDocument, parse_events_document
 from crgame_ros.vehicle.parameters import VehicleParameters
 
 # Garbage is collected after an answer, never in the middle of planning one.
@@ -54,10 +49,11 @@ class PlannerNode(Node):
         self._plans = endpoints.publisher('/<av>/plan', self._vehicle_id)
         self._paths = endpoints.publisher('/<av>/plan_path', self._vehicle_id)
         self._diagnostics = endpoints.publisher('/diagnostics')
-        self._documents: dict[str, str] = {}
+        self._documents = DocumentCollector()
         self._game: GameDocument | None = None
-        self._ready_for: tuple[str, ...] = ()
-        self._adapter: PlannerAdapter | None = None
+        self._transform = RigidTransform(0.0, 0.0, 0.0)
+        self._crew: PlannerCrew | None = None
+        self._events: tuple[int, tuple[FiredEvent, ...]] = (-1, ())
         self._reader: RequestReader | None = None
         self._frames_skipped = False
         self._message: SeriesMessage | None = None
@@ -67,6 +63,8 @@ class PlannerNode(Node):
             endpoints.subscription('/scenario/objects', self._on_objects),
             endpoints.subscription('/scenario/game', self._on_game),
             endpoints.subscription('/timing/frame_skip', self._on_frame_skip),
+            # Before the requests, for an event may change who answers them.
+            endpoints.subscription('/scenario/events', self._on_events),
             endpoints.subscription('/<av>/plan_request', self._on_request, self._vehicle_id)]
 
     def run(self, stop: StopFlag) -> None:
@@ -82,38 +80,48 @@ class PlannerNode(Node):
     def _on_game(self, message: String) -> None:
         self._take_document('game', message.data)
 
+    def _on_events(self, message: String) -> None:
+        try:
+            self._events = parse_events_document(message.data)
+        except InputError as error:
+            self.get_logger().error(str(error))
+            return
+        self._apply_events()
+
+    def _apply_events(self) -> None:
+        """Bring the planner up to what events have done in the present run."""
+        epoch, fired = self._events
+        if self._crew is None or self._game is None or epoch != self._game.epoch:
+            return
+        for text in self._crew.apply([event.name for event in fired]):
+            self.get_logger().info(f'{self._vehicle_id}: {text} by an event')
+
     def _on_frame_skip(self, message: Bool) -> None:
         self._frames_skipped = message.data
 
     def _take_document(self, kind: str, text: str) -> None:
-        self._documents[kind] = text
-        if len(self._documents) < 3:
-            return
+        self._documents.take(kind, text)
         try:
-            self._prepare()
+            scenario = self._documents.complete()
+            if scenario is not None:
+                self._prepare(scenario)
         except CrgameError as error:
-            self._adapter = None
+            self._crew = None
             self.get_logger().error(f'{self._vehicle_id}: {error}')
             return
         waiting, self._waiting = self._waiting, None
         if waiting is not None:
             self._on_request(waiting)
 
-    def _prepare(self) -> None:
-        """Set the planner up once text, game and objects belong together."""
-        game = parse_game_document(self._documents['game'])
-        xml_text = self._documents['xml']
-        key = (self._documents['game'], self._documents['objects'], game.scenario_sha256)
-        if scenario_digest(xml_text) != game.scenario_sha256 or key == self._ready_for:
-            return
+    def _prepare(self, scenario: ScenarioSet) -> None:
+        """Set the planner up for documents that belong together."""
+        game, loaded = scenario.game, scenario.loaded
         entry = game.vehicle(self._vehicle_id)
         if entry is None:
-            self._adapter = None
+            self._crew = None
             self.get_logger().warning(f'{self._vehicle_id} takes no part in this game: waiting')
             return
-        loaded = parse_scenario(xml_text, '/scenario/xml')
-        objects: Mapping[str, ObjectDescription] = {
-            item.id: item for item in parse_objects_document(self._documents['objects'])}
+        objects = {item.id: item for item in scenario.objects}
         problem = next((problem for problem in loaded.planning_problems
                         if problem.planning_problem_id == entry['planning_problem']), None)
         if problem is None:
@@ -121,22 +129,24 @@ class PlannerNode(Node):
                              '/scenario/xml')
         name = self._choice or entry['planner']
         options = {} if self._choice and self._choice != entry['planner'] else entry['options']
-        adapter = PlannerAdapter(create_planner(name, options), time.perf_counter)
-        failure = adapter.setup(PlannerContext(
+        context = PlannerContext(
             self._vehicle_id, loaded.scenario, problem, VehicleParameters(**entry['vehicle']),
-            objects, game.scheduler.time_step_s, game.scheduler.k0, int(game.content['seed'])))
+            objects, game.scheduler.time_step_s, game.scheduler.k0, int(game.content['seed']))
+        crew = PlannerCrew(context, name, options, game.events, time.perf_counter)
         self._reader = RequestReader(self._vehicle_id, objects, game.scheduler)
-        self._adapter, self._game, self._ready_for = adapter, game, key
+        self._crew, self._game = crew, game
+        self._transform = RigidTransform(*entry['transform'])
         gc.collect()
         gc.freeze()
         gc.disable()
-        if failure is None:
+        if crew.failure is None:
             self.get_logger().info(f'{self._vehicle_id}: planner {name} is ready')
         else:
-            self.get_logger().error(f'{self._vehicle_id}: planner {name}: {failure}')
+            self.get_logger().error(f'{self._vehicle_id}: planner {name}: {crew.failure}')
+        self._apply_events()
 
     def _on_request(self, message: JointTrajectory) -> None:
-        if self._adapter is None or self._reader is None or self._game is None:
+        if self._crew is None or self._reader is None or self._game is None:
             self._waiting = message
             return
         try:
@@ -147,42 +157,42 @@ class PlannerNode(Node):
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
             self._waiting = message
             return
-        plan = self._adapter.plan(request)
+        plan = self._crew.plan(request)
         series = plan_to_joints(plan, self._vehicle_id, self._game.scheduler.time_step_ns)
         if self._message is None or not self._message.fits(series):
             self._message = SeriesMessage(series.names, series.times_ns)
         self._plans.publish(self._message.fill(series))
         if not self._frames_skipped and self._paths.get_subscription_count():
-            self._paths.publish(_path(plan))
+            self._paths.publish(_path(plan, self._transform))
         self._report(request.k, plan)
-        if self._adapter.statistics.plans % COLLECT_EVERY == 0:
+        if self._crew.statistics.plans % COLLECT_EVERY == 0:
             gc.collect()
 
     def _report(self, k: int, plan: Plan) -> None:
         """Tell of a fallback at once, and of the counts every ten requests."""
-        assert self._adapter is not None
-        statistics = self._adapter.statistics
+        assert self._crew is not None
+        statistics = self._crew.statistics
         if not plan.fallback and statistics.plans % 10:
             return
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if plan.fallback else DiagnosticStatus.OK,
             name=f'planner_node: {self._vehicle_id}',
-            message=f'braking: {self._adapter.last_reason}' if plan.fallback else 'planning')
+            message=f'braking: {self._crew.last_reason}' if plan.fallback else 'planning')
         times = statistics.durations_s
         status.values = [KeyValue(key=key, value=str(value)) for key, value in (
             ('k', k), ('plans', statistics.plans), ('fallbacks', statistics.fallbacks),
-            ('plan_time_ms', f'{times[-1] * 1e3:.3f}'))]
+            ('plan_time_ms', f'{times[-1] * 1e3:.3f}'), ('planner', self._crew.name))]
         message = DiagnosticArray(status=[status])
         message.header.stamp = to_time(plan.stamp_ns)
         self._diagnostics.publish(message)
 
 
-def _path(plan: Plan) -> Path:
-    """Give a plan for people: rear-axle poses in map."""
+def _path(plan: Plan, transform: RigidTransform) -> Path:
+    """Give a plan for people: rear-axle poses in map, whatever frame its AV plans in."""
     message = Path()
     message.header.frame_id = MAP
     message.header.stamp = to_time(plan.stamp_ns)
-    for x, y, yaw in plan.states[:, :3].tolist():
+    for x, y, yaw in transform.to_simulation(plan.states[:, :3]).tolist():
         pose = PoseStamped(header=message.header)
         pose.pose.position.x, pose.pose.position.y = x, y
         pose.pose.orientation.z = math.sin(0.5 * yaw)

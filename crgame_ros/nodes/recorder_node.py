@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -23,6 +23,7 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.simulation.documents import GAME_TOPIC, parse_game_document
 
 PERIOD_S = 0.01
+REPORT_S = 1.0
 # Ten seconds of the busiest topic fit into the queue, should the disk stall.
 QUEUE_DEPTH = 2000
 
@@ -58,6 +59,7 @@ class RecorderNode(Node):
         self._writer: BagWriter | None = None
         self._bags = 0
         self._game_text = b''
+        self._report_s = 0.0
         self._subscribe((), ())
 
     def _subscribe(self, humans: tuple[str, ...], avs: tuple[str, ...]) -> None:
@@ -95,6 +97,22 @@ class RecorderNode(Node):
                 self._writer.flush_if_due()
             except RecordingError as error:
                 self._tell(error)
+            if time.monotonic() - self._report_s > REPORT_S:
+                self._report_s = time.monotonic()
+                self._report(self._writer)
+
+    def _report(self, writer: BagWriter) -> None:
+        """Tell how the recording is going."""
+        failed = writer.failed is not None
+        self._publish_status(
+            DiagnosticStatus.ERROR if failed else DiagnosticStatus.OK,
+            str(writer.failed) if failed else f'recording into {writer.folder.name}',
+            {'messages': writer.message_count, 'bytes': writer.bytes_written})
+
+    def _publish_status(self, level: bytes, text: str, values: dict[str, int]) -> None:
+        status = DiagnosticStatus(level=level, name='recorder_node: recording', message=text)
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        self._diagnostics.publish(DiagnosticArray(status=[status]))
 
     def _take(self, recorded: RecordedTopic) -> None:
         while (taken := recorded.slot.take_timed()) is not None:
@@ -146,9 +164,7 @@ class RecorderNode(Node):
     def _tell(self, error: CrgameError) -> None:
         """Say that recording has failed; driving goes on."""
         self.get_logger().error(str(error))
-        status = DiagnosticStatus(level=DiagnosticStatus.ERROR, name='recorder_node: recording',
-                                  message=str(error))
-        self._diagnostics.publish(DiagnosticArray(status=[status]))
+        self._publish_status(DiagnosticStatus.ERROR, str(error), {})
 
     def _close(self) -> None:
         if self._writer is None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """sim_node: paces the simulation against the wall clock (CRG algorithms 1 and 2, live)."""
 
+import json
 import os
 
 from rclpy.executors import SingleThreadedExecutor
@@ -61,6 +62,7 @@ class SimNode(Node):
             return present
 
     def _told(self, setup: Setup) -> Setup:
+        self._write_roster(setup)
         for notice in setup.notices:
             self.get_logger().info(notice)
         self.get_logger().info(
@@ -68,6 +70,20 @@ class SimNode(Node):
             f'{len(setup.obstacles.descriptions)} objects, '
             f'{1.0 / setup.scheduler.dt_s:g} Hz, tick {setup.scheduler.time_step_s:g} s')
         return setup
+
+    def _write_roster(self, setup: Setup) -> None:
+        """Tell the launcher who takes part, for a chosen game may have other vehicles."""
+        path = self._control.roster
+        if path is None:
+            return
+        content = {'humans': {human.id: human.driver for human in setup.humans},
+                   'avs': {av.id: av.spec.planner for av in setup.avs}}
+        fresh = path.with_suffix('.new')
+        try:
+            fresh.write_text(json.dumps(content), encoding='utf-8')
+            fresh.replace(path)
+        except OSError as error:
+            self.get_logger().error(f'{path}: cannot be written ({error.strerror})')
 
     def _raise_priority(self) -> None:
         try:

@@ -71,6 +71,11 @@ class PlannerAdapter:
             self._setup_failure = self.last_reason = f'setup failed: {describe(error)}'
         return self._setup_failure
 
+    @property
+    def setup_failure(self) -> str | None:
+        """Why the planner is not set up; None if it is."""
+        return self._setup_failure
+
     def plan(self, request: PlanRequest) -> Plan:
         """
         Answer a request: with the planner's plan or by braking.

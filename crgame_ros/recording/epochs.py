@@ -62,6 +62,16 @@ class Epoch:
                 and (self.until_log_ns is None or log_time_ns < self.until_log_ns))
 
 
+def epoch_numbers(reader: BagReader) -> tuple[int, ...]:
+    """
+    Tell which epochs a recording holds, in the order in which they were run.
+
+    :raises InputError: if a document is missing.
+    """
+    games = (parse_game_document(text) for _, text in _documents(reader)[GAME_TOPIC])
+    return tuple(dict.fromkeys(game.epoch for game in games))
+
+
 def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
     """
     Find the documents of one run in a recording.

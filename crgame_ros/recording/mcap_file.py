@@ -8,8 +8,8 @@ from the front costs one seek per chunk and reads both kinds of file in the same
 """
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 import struct
@@ -29,6 +29,7 @@ _MAGIC = b'\x89MCAP0\r\n'
 _RECORD = struct.Struct('<BQ')
 _MESSAGE = struct.Struct('<HIQQ')
 _CHUNK = struct.Struct('<QQQII')
+_CHANNEL_ID = struct.Struct('<H')
 _LENGTH = struct.Struct('<Q')
 _RUN_BYTES = 1 << 20
 _DAMAGES = (struct.error, ValueError, RuntimeError, MemoryError, EOFError, EndOfFile,
@@ -49,13 +50,18 @@ class McapMessage(NamedTuple):
 
 @dataclass(frozen=True)
 class Segment:
-    """A chunk, or a run of records outside of chunks, with the range of its log times [ns]."""
+    """
+    A chunk, or a run of records outside of chunks, with the range of its log times [ns].
+
+    :param channels: ids of the channels with a message in it, None where no index names them.
+    """
 
     offset: int
     size: int
     start_ns: int
     end_ns: int
     chunked: bool
+    channels: frozenset[int] | None = None
 
 
 @dataclass(frozen=True)
@@ -99,6 +105,9 @@ class McapFile:
                 self._walk(stream)
         except OSError as error:
             raise InputError(f'cannot be read: {error.strerror}', str(self.path)) from error
+        if not self.complete and self.segments:
+            # Its index may be cut off: then it does not name every channel.
+            self.segments[-1] = replace(self.segments[-1], channels=None)
         while not self.complete and self.segments and not self.is_sound(self.segments[-1]):
             # A power cut can leave a last chunk that has its length but not its bytes.
             self.useless_bytes += self.segments.pop().size
@@ -143,6 +152,12 @@ class McapFile:
             self.segments.append(Segment(position, end - position, start_ns, end_ns, True))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(opcode, stream.read(length))
+        elif opcode == Opcode.MESSAGE_INDEX and self.segments and self.segments[-1].chunked:
+            # One index of each channel in it follows a chunk.
+            (number,) = _CHANNEL_ID.unpack(stream.read(_CHANNEL_ID.size))
+            chunk = self.segments[-1]
+            self.segments[-1] = replace(
+                chunk, channels=(chunk.channels or frozenset()) | {number})
         elif opcode == Opcode.HEADER:
             self.header = Header.read(ReadDataStream(BytesIO(stream.read(length))))
         elif opcode == Opcode.STATISTICS:
@@ -197,15 +212,17 @@ class McapFile:
         return Tally(dict(counts), min((s.start_ns for s in self.segments), default=0),
                      max((s.end_ns for s in self.segments), default=0))
 
-    def messages(self, segment: Segment) -> Iterator[McapMessage]:
+    def messages(self, segment: Segment,
+                 without: Collection[int] = ()) -> Iterator[McapMessage]:
         """
         Read the messages of a segment in file order, and take up the channels it defines.
 
+        :param without: ids of channels whose messages are passed over.
         :raises InputError: if the segment is damaged; nothing of it is yielded then, save where
             the damage passes the checksum or there is none.
         """
         try:
-            yield from self._messages(self._content(segment))
+            yield from self._messages(self._content(segment), without)
         except _DAMAGES as error:
             raise InputError(f'the data at byte {segment.offset} is damaged ({error})',
                              str(self.path), '`crgame recover` keeps the rest') from error
@@ -226,7 +243,8 @@ class McapFile:
             raise ValueError('wrong size or checksum')
         return content
 
-    def _messages(self, content: bytes) -> Iterator[McapMessage]:
+    def _messages(self, content: bytes,
+                  without: Collection[int]) -> Iterator[McapMessage]:
         position = 0
         while position < len(content):
             opcode, length = _RECORD.unpack_from(content, position)
@@ -235,6 +253,8 @@ class McapFile:
             if position > len(content):
                 raise ValueError('a record is longer than its chunk')
             if opcode == Opcode.MESSAGE:
+                if without and _CHANNEL_ID.unpack_from(content, body)[0] in without:
+                    continue
                 yield McapMessage._make((*_MESSAGE.unpack_from(content, body),
                                          content[body + _MESSAGE.size:position]))
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):

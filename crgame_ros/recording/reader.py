@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 import struct
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
@@ -17,6 +17,7 @@ from crgame_ros.recording.metadata import METADATA_FILE, read_metadata
 from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
 
 _HEADER_BYTES = 4
+_NS_PER_S = 1_000_000_000
 _BIG_ENDIAN, _LITTLE_ENDIAN = b'\x00\x00', b'\x00\x01'
 _SUFFIXES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 
@@ -82,25 +83,39 @@ class BagReader:
         """Return the number of messages of all topics."""
         return sum(topic.message_count for topic in self.topics.values())
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
+    def messages(self, topics: Collection[str] | None = None, start_ns: int | None = None,
+                 end_ns: int | None = None) -> Iterator[BagMessage]:
         """
         Yield the messages as they were serialised, in the order of their log time.
 
         :param topics: only these; names that were not recorded yield nothing. None for all.
+        :param start_ns: none that was logged earlier [ns]; None for no limit.
+        :param end_ns: none that was logged then or later [ns]; None for no limit.
         :raises InputError: if the recording is damaged inside.
         """
-        return self._storage.messages(None if topics is None else frozenset(topics))
+        return self._storage.messages(None if topics is None else frozenset(topics), start_ns,
+                                      end_ns)
 
-    def decoded(self, topics: Collection[str] | None = None) -> Iterator[DecodedMessage]:
+    def decoded(self, topics: Collection[str] | None = None, start_ns: int | None = None,
+                end_ns: int | None = None) -> Iterator[DecodedMessage]:
         """
         Yield the messages with their content, in the order of their log time.
 
-        :param topics: as in `messages`.
+        :param topics: as in `messages`, like the limits.
         :raises InputError: as `messages`, or if a message does not fit its type.
         """
-        for topic, type_name, log_time_ns, data in self.messages(topics):
-            yield DecodedMessage(topic, type_name, log_time_ns,
-                                 self._deserialize(topic, type_name, data))
+        for message in self.messages(topics, start_ns, end_ns):
+            yield self.decode(message)
+
+    def decode(self, message: BagMessage) -> DecodedMessage:
+        """
+        Give a message with its content.
+
+        :raises InputError: if it does not fit its type.
+        """
+        topic, type_name, log_time_ns, data = message
+        return DecodedMessage(topic, type_name, log_time_ns,
+                              self._deserialize(topic, type_name, data))
 
     def latched(self, topic: str) -> DecodedMessage | None:
         """
@@ -109,9 +124,8 @@ class BagReader:
         :raises InputError: as `decoded`.
         """
         newest = deque(self.messages([topic]), maxlen=1)
-        for name, type_name, log_time_ns, data in newest:
-            return DecodedMessage(name, type_name, log_time_ns,
-                                  self._deserialize(name, type_name, data))
+        for message in newest:
+            return self.decode(message)
         return None
 
     def _deserialize(self, topic: str, type_name: str, data: bytes) -> Any:
@@ -151,6 +165,17 @@ class BagReader:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.close()
+
+
+def header_stamp_ns(data: bytes) -> int:
+    """
+    Give the stamp of a serialised message that begins with a std_msgs/Header [ns].
+
+    :param data: CDR with its header.
+    """
+    order: Literal['big', 'little'] = 'big' if data[:2] == _BIG_ENDIAN else 'little'
+    seconds = int.from_bytes(data[_HEADER_BYTES:_HEADER_BYTES + 4], order, signed=True)
+    return seconds * _NS_PER_S + int.from_bytes(data[_HEADER_BYTES + 4:_HEADER_BYTES + 8], order)
 
 
 def _listed_files(folder: Path) -> tuple[tuple[Path, ...], str, bool]:

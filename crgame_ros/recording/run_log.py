@@ -70,8 +70,8 @@ class ReplayInputs(NamedTuple):
     """
     What `ReplayDriver` and `run_offline` need to repeat a recorded run to the last bit.
 
-    :param commands: (n, 4) throttle, brake, steering, reverse by human; row i was consumed in the
-        step from i to i + 1.
+    :param commands: (n, 4) throttle, brake, steering, reverse by human, and by AV that somebody
+        took over (NaN while it followed its plan); row i was consumed in the step from i to i + 1.
     :param dt_eff_s: (n) interval over which that step was integrated [s]
     """
 
@@ -125,17 +125,14 @@ def _read_points(reader: BagReader, run: Epoch, ids: Mapping[str, list[str]],
         OBJECT_STATES_TOPIC: [name for item in ids[OBJECT_STATES_TOPIC]
                               for name in object_joint_names(item)]}
     points: dict[str, dict[int, FloatArray]] = {topic: {} for topic in wanted}
-    places: dict[tuple[str, ...], list[int]] = {}
+    orders: dict[tuple[str, ...], list[int]] = {}
     for topic, _, log_time_ns, message in reader.decoded(wanted):
         stamp_ns = stamp_of(message)
         n = scheduler.tick_of_stamp(stamp_ns)
         if n is None or not run.holds(stamp_ns, log_time_ns):
             continue
-        names = (topic, *message.joint_names)
-        if names not in places:
-            places[names] = _places(message.joint_names, wanted[topic], topic, reader)
-        points[topic][n // scheduler.steps_per_tick] = _first_point(
-            message, places[names], topic, reader)
+        points[topic][n // scheduler.steps_per_tick] = first_point(
+            message, wanted[topic], topic, reader, orders)
     return points
 
 
@@ -153,15 +150,29 @@ def _places(names: list[str], wanted: list[str], topic: str, reader: BagReader) 
     return [place[name] for name in wanted]
 
 
-def _first_point(message: Any, places: list[int], topic: str, reader: BagReader) -> FloatArray:
+def first_point(message: Any, wanted: list[str], topic: str, reader: BagReader,
+                orders: dict[tuple[str, ...], list[int]]) -> FloatArray:
+    """
+    Give the first point of a decoded JointTrajectory.
+
+    :param message: of a topic that gives one point.
+    :param wanted: names of the joints, in the order in which they are given back.
+    :param topic: for messages.
+    :param orders: remembers, from call to call, where the joints of a message are.
+    :return: (3, joints) positions, velocities, accelerations.
+    :raises InputError: if a joint is missing.
+    """
     joints = len(message.joint_names)
+    names = (topic, *message.joint_names)
+    if names not in orders:
+        orders[names] = _places(message.joint_names, wanted, topic, reader)
     rows = [] if not message.points else [
         message.points[0].positions, message.points[0].velocities,
         message.points[0].accelerations]
     if [len(row) for row in rows] != [joints] * 3:
         raise InputError(f'a point of {topic} does not give every joint', str(reader.path),
                          'give one position, velocity and acceleration for each')
-    return np.array(rows, dtype=np.float64)[:, places]
+    return np.array(rows, dtype=np.float64)[:, orders[names]]
 
 
 def _usable_ticks(points: Mapping[str, Mapping[int, FloatArray]], with_objects: bool, run: Epoch,
@@ -194,13 +205,12 @@ def run_log_of(result: OfflineResult) -> RunLog:
     scheduler = setup.scheduler
     states = result.vehicle_states[::scheduler.steps_per_tick]
     ks = scheduler.k0 + np.arange(len(states))
-    velocities = [setup.obstacles.states_at(k).velocities for k in ks.tolist()]
     game = parse_game_document(
         game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
     return RunLog(
         setup.loaded.xml_text, game, setup.descriptions, ks,
         states.reshape(len(ks), -1, STATE_WIDTH), result.object_poses.reshape(len(ks), -1, 3),
-        np.array(velocities).reshape(len(ks), -1, 3))
+        result.object_velocities.reshape(len(ks), -1, 3))
 
 
 def read_cycles(path: Path, epoch: int | None = None) -> CycleTable:
@@ -239,7 +249,7 @@ def _cycle_tables(reader: BagReader) -> Iterator[CycleTable]:
 
 def replay_inputs(path: Path, epoch: int | None = None) -> ReplayInputs:
     """
-    Read what a run's humans did and over which intervals, cycle by cycle.
+    Read what a run's drivers did and over which intervals, cycle by cycle.
 
     :param epoch: which run, where a recording holds several; None for the last.
     :raises InputError: if a cycle is missing, for nothing after it could be exact.
@@ -251,6 +261,7 @@ def replay_inputs(path: Path, epoch: int | None = None) -> ReplayInputs:
         raise InputError(f'cycle n = {expected[wrong[0]]} was not recorded', str(path),
                          'a run can be repeated exactly only from a recording without gaps')
     suffix = f'/{COMMAND_COLUMNS[0]}'
-    humans = [name.removesuffix(suffix) for name in table.columns if name.endswith(suffix)]
-    return ReplayInputs({human: table.commands(human) for human in humans},
-                        table.column('dt_eff_s').copy())
+    vehicles = [name.removesuffix(suffix) for name in table.columns if name.endswith(suffix)]
+    commands = {vehicle: table.commands(vehicle) for vehicle in vehicles}
+    return ReplayInputs({vehicle: rows for vehicle, rows in commands.items()
+                         if np.isfinite(rows).any()}, table.column('dt_eff_s').copy())

@@ -15,6 +15,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.recording.mcap_file import McapFile, Segment
 from crgame_ros.recording.metadata import BagTopic, parse_qos, TopicQos
 
+_FOREVER_NS = 2 ** 64
+
 
 class BagMessage(NamedTuple):
     """A recorded message: `data` is CDR with its header, the log time is in ns."""
@@ -40,8 +42,14 @@ class Storage(Protocol):
     end_ns: int
     damages: tuple[str, ...]
 
-    def messages(self, topics: Collection[str] | None) -> Iterator[BagMessage]:
-        """Yield the messages of these topics, or of all, in the order of their log time."""
+    def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
+                 end_ns: int | None = None) -> Iterator[BagMessage]:
+        """
+        Yield the messages of these topics, or of all, in the order of their log time.
+
+        :param start_ns: none that was logged earlier [ns]; None for no limit.
+        :param end_ns: none that was logged then or later [ns]; None for no limit.
+        """
 
     def definition(self, type_name: str) -> str:
         """Return the stored `ros2msg` definition of a type, empty where there is none."""
@@ -75,10 +83,20 @@ class McapStorage:
             for file, tally in zip(self._files, tallies, strict=True)
             for number, channel in file.channels.items())
 
-    def messages(self, topics: Collection[str] | None) -> Iterator[BagMessage]:
-        """Yield the messages of these topics, or of all, in the order of their log time."""
+    def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
+                 end_ns: int | None = None) -> Iterator[BagMessage]:
+        """Yield the messages as `Storage` has it; only the chunks that may hold them are read."""
+        first_ns = 0 if start_ns is None else start_ns
+        last_ns = _FOREVER_NS if end_ns is None else end_ns - 1
+        for message in self._ordered(topics, first_ns, last_ns):
+            if first_ns <= message.log_time_ns <= last_ns:
+                yield message
+
+    def _ordered(self, topics: Collection[str] | None, first_ns: int,
+                 last_ns: int) -> Iterator[BagMessage]:
         order: list[tuple[McapFile, Segment]] = sorted(
-            ((file, segment) for file in self._files for segment in file.segments),
+            ((file, segment) for file in self._files for segment in file.segments
+             if segment.start_ns <= last_ns and segment.end_ns >= first_ns),
             key=lambda pair: pair[1].start_ns)
         held: list[BagMessage] = []
         for file, segment in order:
@@ -94,19 +112,19 @@ class McapStorage:
     @staticmethod
     def _select(file: McapFile, segment: Segment,
                 topics: Collection[str] | None) -> Iterator[BagMessage]:
-        names: dict[int, tuple[str, str] | None] = {}
-        for number, _, log_time_ns, _, data in file.messages(segment):
+        others = set() if topics is None else {
+            number for number, channel in file.channels.items() if channel.topic not in topics}
+        if segment.channels is not None and segment.channels <= others:
+            return
+        names: dict[int, tuple[str, str]] = {}
+        for number, _, log_time_ns, _, data in file.messages(segment, others):
             if number not in names:
                 if number not in file.channels:
                     raise InputError(f'a message on the unknown channel {number}', str(file.path),
                                      'the file is damaged; record again')
                 channel = file.channels[number]
-                wanted = topics is None or channel.topic in topics
-                names[number] = ((channel.topic, _schema_name(file, channel.schema_id))
-                                 if wanted else None)
-            name = names[number]
-            if name is not None:
-                yield BagMessage(*name, log_time_ns, data)
+                names[number] = (channel.topic, _schema_name(file, channel.schema_id))
+            yield BagMessage(*names[number], log_time_ns, data)
 
     def definition(self, type_name: str) -> str:
         """Return the stored `ros2msg` definition of a type, empty where there is none."""
@@ -167,13 +185,15 @@ class RosbagsStorage:
             raise InputError(f'cannot be read ({error})', str(self._path),
                              'check it with `ros2 bag info`, or `ros2 bag reindex` it') from error
 
-    def messages(self, topics: Collection[str] | None) -> Iterator[BagMessage]:
-        """Yield the messages of these topics, or of all, in the order of their log time."""
+    def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
+                 end_ns: int | None = None) -> Iterator[BagMessage]:
+        """Yield the messages as `Storage` has it."""
         wanted = [c for c in self._connections if topics is None or c.topic in topics]
         if not wanted:
             return
         with self._explained():
-            for connection, log_time_ns, data in self._reader.messages(wanted):
+            for connection, log_time_ns, data in self._reader.messages(wanted, start_ns,
+                                                                       end_ns):
                 yield BagMessage(connection.topic, connection.msgtype, log_time_ns, bytes(data))
 
     def definition(self, type_name: str) -> str:

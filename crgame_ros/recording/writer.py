@@ -96,6 +96,11 @@ class BagWriter:
             raise RecordingError(self.path, f'cannot record: {error.strerror}',
                                  'choose a folder that can be written') from error
 
+    @property
+    def bytes_written(self) -> int:
+        """Size of the file so far [bytes]."""
+        return self._stream.tell()
+
     def add_topic(self, name: str, type_name: str, qos: TopicQos) -> int:
         """
         Announce a topic before its first message.

@@ -69,11 +69,21 @@ class Topic:
 
 @dataclass(frozen=True)
 class Service:
-    """One service of the contract, offered by sim_node."""
+    """
+    One service of the contract, offered by sim_node.
+
+    :param name: with a placeholder <av> for an AV's id, if there is one of each.
+    """
 
     name: str
     type_name: str
     what: str
+
+    def names(self, avs: Sequence[str]) -> tuple[str, ...]:
+        """Give the service's names in a run with these AVs."""
+        if '<av>' not in self.name:
+            return (self.name,)
+        return tuple(self.name.replace('<av>', av) for av in avs)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import importlib
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -117,10 +118,18 @@ class Endpoints:
             callback_group=self._polled_group, raw=raw)
         return PolledSubscription(subscription, raw)
 
-    def service(self, name: str, callback: Callable[[Any, Any], Any]) -> Service:
+    def service(self, name: str, callback: Callable[[Any, Any], Any],
+                vehicle_id: str = '') -> Service:
         """Create a service."""
         row = self._contract.services[name]
-        return self._node.create_service(message_type(row.type_name), name, callback)
+        return self._node.create_service(
+            message_type(row.type_name), name.replace('<av>', vehicle_id), callback)
+
+    def client(self, name: str, vehicle_id: str = '') -> Client:
+        """Create a client of a service."""
+        row = self._contract.services[name]
+        return self._node.create_client(
+            message_type(row.type_name), name.replace('<av>', vehicle_id))
 
 
 def _unused(message: Any) -> None:

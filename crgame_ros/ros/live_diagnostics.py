@@ -30,6 +30,24 @@ class LiveDiagnostics:
                 f'{av_id} plan refused', DiagnosticStatus.WARN, reason, {'n': simulation.n},
                 simulation.scheduler.stamp_ns(simulation.n))
 
+    def run_state(self, state: str, real_time_factor: float) -> None:
+        """Tell whether the run is waiting, running, paused or ended."""
+        simulation = self._simulation
+        self._outputs.publish_diagnostics(
+            'run', DiagnosticStatus.OK, state,
+            {'n': simulation.n, 'k': simulation.scheduler.k(simulation.n),
+             'real_time_factor': real_time_factor}, simulation.scheduler.stamp_ns(simulation.n))
+
+    def event_refused(self, name: str, reason: str) -> None:
+        """Tell why a trigger brought nothing about."""
+        self._refusals += 1
+        if self._refusals <= MAX_REFUSALS_PER_REPORT:
+            simulation = self._simulation
+            self._outputs.publish_diagnostics(
+                'event refused', DiagnosticStatus.WARN, reason,
+                {'event': name[:40], 'n': simulation.n},
+                simulation.scheduler.stamp_ns(simulation.n))
+
     def publish(self, n: int) -> None:
         """Report on every AV and seat."""
         self._refusals = 0
@@ -42,16 +60,17 @@ class LiveDiagnostics:
                 f'{av.setup.id} plans',
                 DiagnosticStatus.ERROR if stale else DiagnosticStatus.OK,
                 'no plan: braking' if stale else 'following its plan',
-                {'requests': counters.requests, 'accepted': counters.accepted,
+                {'planner': av.setup.spec.planner, 'running': av.planner_running,
+                 'requests': counters.requests, 'accepted': counters.accepted,
                  'refused': counters.refused, 'skipped': counters.skipped,
                  'timed_out': counters.timed_out, 'realigned': counters.realigned,
                  'steps_without_plan': counters.steps_without_plan,
                  'latency_ms': round(counters.last_latency_steps * dt_s * 1e3, 3),
                  'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
                  'last_refusal': counters.last_refusal}, stamp_ns)
-        for human, seat in zip(simulation.setup.humans, self._inputs.seats, strict=True):
+        for seat in self._inputs.seats.all:
             self._outputs.publish_diagnostics(
-                f'{human.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
+                f'{seat.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
                 'driver lost' if seat.lost else 'driven',
-                {'losses': seat.losses, 'malformed': seat.malformed,
+                {'source': seat.source, 'losses': seat.losses, 'malformed': seat.malformed,
                  'outdated': seat.outdated}, stamp_ns)

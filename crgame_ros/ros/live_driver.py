@@ -9,6 +9,7 @@ from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.evdev_device import open_evdev
 from crgame_ros.driver.replay import ReplayDriver
 from crgame_ros.driver.source import (
+    COCKPIT,
     DriverSource,
     EvdevDriver,
     IdleDriver,
@@ -47,7 +48,7 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
         return ReplayDriver(commands[vehicle_id])
     if source.kind == 'joy':
         return JoyDriver(load_device_map(joy_map))
-    if source.kind == 'idle':
+    if source.kind in ('idle', COCKPIT):
         return IdleDriver()
     device = open_evdev(source.argument)
     if source.kind == 'auto' and device.problem is not None:

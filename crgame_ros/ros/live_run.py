@@ -57,7 +57,7 @@ class LiveRun:
         self._control = control
         self._epoch = epoch
         self._outputs = SimOutputs(node, setup)
-        self._inputs = SimInputs(node, setup, clock_offset_ns)
+        self._inputs = SimInputs(node, setup, clock_offset_ns, control.seat_sources)
         self.simulation = Simulation(setup, clock_offset_ns)
         scheduler = self.simulation.scheduler
         self._dt_s = scheduler.dt_s
@@ -73,13 +73,14 @@ class LiveRun:
         self._sleep_from_ns = 0
         self._stepped = 0
         self._stop = StopFlag()
+        self._state, self._state_ns = '', 0
 
     def run(self, stop: StopFlag) -> Outcome:
         """Run until the game's end, a reset or a stop."""
         self._stop = stop
         self._outputs.publish_documents(
             self._epoch, self.simulation.scheduler.clock_offset_ns,
-            self._control.real_time_factor)
+            self._control.real_time_factor, self._inputs.seats.document())
         result = self.simulation.begin()
         if self._epoch:
             self._settle()
@@ -100,6 +101,7 @@ class LiveRun:
             gc.unfreeze()
             self._outputs.publish_rows()
             self._diagnostics.publish(self.simulation.n)
+            self._tell_state('ended')
             self._outputs.wait_until_received()
 
     def destroy(self) -> None:
@@ -116,15 +118,25 @@ class LiveRun:
     def _wait_for_companions(self, result: StepResult) -> Outcome | None:
         """Stay at step 0 until everybody is there, or an order ends it."""
         control = self._control
+        self._tell_state('waiting')
         gate = StartGate(self._outputs, self._inputs, self.simulation, result,
                          control.companions, self._take_plan, self._node.get_logger().warning)
-        while not gate.is_open(time.monotonic_ns(), control.planner_timeout_s) \
+        while not (is_open := gate.is_open(time.monotonic_ns(), control.planner_timeout_s)) \
                 or self._stands_still():
             self._executor.spin_once(timeout_sec=0.005)
+            self._tell_state('paused' if is_open else 'waiting')
+            self._take_orders(time.monotonic_ns())
             outcome = self._ordered_end()
             if outcome is not None:
                 return outcome
         return None
+
+    def _tell_state(self, state: str) -> None:
+        """Tell a new state at once, and the present one every second."""
+        now_ns = time.monotonic_ns()
+        if state != self._state or now_ns - self._state_ns > NS_PER_S:
+            self._state, self._state_ns = state, now_ns
+            self._diagnostics.run_state(state, self._control.real_time_factor)
 
     def _ordered_end(self) -> Outcome | None:
         control = self._control
@@ -147,6 +159,24 @@ class LiveRun:
         if reason is not None:
             self._diagnostics.refusal(av_id, reason)
         return reason is None
+
+    def _take_orders(self, now_ns: int) -> None:
+        """Obey who is to drive what, and which planners are to go or stop."""
+        changed, refusals = self._inputs.seats.take_orders(now_ns)
+        if changed:
+            self._outputs.publish_seats(self._inputs.seats.document())
+        for refusal in refusals:
+            self._node.get_logger().warning(refusal, throttle_duration_sec=1.0)
+        for av_id, running in self._inputs.planner_orders.items():
+            self.simulation.set_planner_running(av_id, running)
+        self._inputs.planner_orders.clear()
+
+    def _take_triggers(self) -> None:
+        """Hand the events over that somebody triggered since the last tick."""
+        for name in self._inputs.triggers():
+            reason = self.simulation.trigger(name)
+            if reason is not None:
+                self._diagnostics.event_refused(name, reason)
 
     def _loop(self) -> Outcome:
         while self.simulation.n != self._last_n:
@@ -180,8 +210,11 @@ class LiveRun:
     def _stay_paused(self) -> None:
         """Serve orders while everything else stands still."""
         self._outputs.publish_rows()
+        self._tell_state('paused')
         while self._stands_still() and self._ordered_end() is None:
             self._executor.spin_once(timeout_sec=0.02)
+            self._tell_state('paused')
+            self._take_orders(time.monotonic_ns())
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)
         self._inputs.forgive(now_ns)
@@ -206,8 +239,10 @@ class LiveRun:
         cycle = self._controller.begin_cycle(start_ns)
         for av in simulation.avs:
             self._take_plan(av.setup.id)
-        commands = [seat.command(start_ns, cycle.dt_eff_s, human.state.speed)
-                    for seat, human in zip(inputs.seats, simulation.humans, strict=True)]
+        self._take_orders(start_ns)
+        commands = inputs.seats.commands(start_ns, cycle.dt_eff_s, simulation)
+        if simulation.scheduler.is_tick(simulation.n + 1):
+            self._take_triggers()
         result = simulation.step(cycle.dt_eff_s, commands)
         outputs.publish_step(simulation, result)
         if result.tick:
@@ -223,6 +258,10 @@ class LiveRun:
 
     def _at_tick(self, result: StepResult) -> None:
         """Do what is due with the scenario's time."""
+        self._tell_state('running')
+        for event in result.fired:
+            self._node.get_logger().info(
+                f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
         order = self._inputs.frame_skip_order()
         if order is not None:
             self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping

@@ -141,10 +141,15 @@ class SeriesMessage:
         return self.message
 
 
-def to_joy(command: DriverCommand, stamp_ns: int) -> Joy:
-    """Give a driver's command as a message (contract: /<hv>/driver_command)."""
+def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
+    """
+    Give a driver's command as a message (contract: /<v>/driver_command).
+
+    :param source: who speaks, as /seats names it.
+    """
     message = Joy(axes=array('f', (command.throttle, command.brake, command.steering)),
                   buttons=array('i', (int(command.reverse),)))
+    message.header.frame_id = source
     message.header.stamp = to_time(stamp_ns)
     return message
 

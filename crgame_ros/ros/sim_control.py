@@ -31,6 +31,7 @@ class SimControl:
         self.steps_wanted = 0
         self.reset_wanted = False
         self.stop_wanted = False
+        self.seat_sources: dict[str, str] = {}
         self._declare()
         # Read at every cycle, so kept beside the parameter.
         self.real_time_factor = float(self._value('real_time_factor'))
@@ -72,6 +73,9 @@ class SimControl:
         declare('wait_for', [''], ParameterDescriptor(
             description='companion nodes that must be connected before the run starts',
             read_only=True))
+        declare('roster', '', ParameterDescriptor(
+            description='file that tells the launcher which vehicles the game has; none if empty',
+            read_only=True))
         declare('planner_timeout', 10.0, ParameterDescriptor(
             description='seconds to wait for planners and companions at the start',
             read_only=True))
@@ -98,6 +102,12 @@ class SimControl:
     def companions(self) -> tuple[str, ...]:
         """Nodes that must be connected before the run starts."""
         return tuple(item for item in self._value('wait_for') if item)
+
+    @property
+    def roster(self) -> Path | None:
+        """File that tells the launcher which vehicles the game has."""
+        value = self._value('roster')
+        return Path(value) if value else None
 
     @property
     def planner_timeout_s(self) -> float:

@@ -26,8 +26,9 @@ from crgame_ros.planner.joints import (
 from crgame_ros.ros.contract import load_contract
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import MAP, SeriesMessage, set_time, StateMessage, to_time
+from crgame_ros.scenario.events import FiredEvent
 from crgame_ros.scenario.signals import TrafficLights
-from crgame_ros.simulation.documents import game_document, objects_document
+from crgame_ros.simulation.documents import events_document, game_document, objects_document
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import CycleRows
@@ -93,7 +94,8 @@ class SimOutputs:
         self._objects = endpoints.publisher('/traffic/objects')
         self._cycle = endpoints.publisher('/timing/cycle')
         self._latched = {name: endpoints.publisher(name) for name in (
-            '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/signals',
+            '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
+            '/scenario/signals',
             '/seats')}
         self._diagnostics = endpoints.publisher('/diagnostics')
         self._requests = {av.id: endpoints.publisher('/<av>/plan_request', av.id)
@@ -101,6 +103,7 @@ class SimOutputs:
         self._request_messages: dict[str, SeriesMessage] = {}
         self._vehicles = [VehicleOutputs(endpoints, vehicle) for vehicle in setup.vehicle_ids]
         self.frames_skipped = False
+        self._epoch = 0
         self._lights = TrafficLights(setup.loaded.scenario)
         self._light_states: dict[int, str] | None = None
         self._build_messages()
@@ -114,29 +117,42 @@ class SimOutputs:
             [name for item in setup.obstacles.descriptions
              for name in object_joint_names(item.id)])
         self._objects_message.accelerations[:] = math.nan
-        self.rows = CycleRows([human.id for human in setup.humans], self.publish_every)
+        self.rows = CycleRows(setup.vehicle_ids, self.publish_every)
         width = len(self.rows.columns)
         self._cycle_message = Float64MultiArray()
         self._cycle_message.layout.dim = [
             MultiArrayDimension(label='cycles'),
             MultiArrayDimension(label=','.join(self.rows.columns), size=width, stride=width)]
 
-    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float) -> None:
+    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float,
+                          seats: str) -> None:
         """Publish what describes the run: scenario, game, objects and seats."""
         setup = self._setup
-        seats = {human.id: {'source': f'/{human.id}/driver_command', 'driver': human.driver}
-                 for human in setup.humans}
+        self._epoch = epoch
         texts = {'/scenario/xml': setup.loaded.xml_text,
                  '/scenario/objects': objects_document(setup.descriptions),
+                 '/scenario/events': events_document(epoch, ()),
                  '/scenario/game': game_document(
                      setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
                      real_time_factor=factor),
-                 '/seats': json.dumps(seats)}
+                 '/seats': seats}
         for name, text in texts.items():
             self._latched[name].publish(String(data=text))
 
+    def publish_seats(self, seats: str) -> None:
+        """Publish who drives what."""
+        self._latched['/seats'].publish(String(data=seats))
+
+    def publish_events(self, fired: Sequence[FiredEvent]) -> None:
+        """Publish the events that have taken effect so far."""
+        self._latched['/scenario/events'].publish(
+            String(data=events_document(self._epoch, fired)))
+
     def publish_step(self, simulation: Simulation, result: StepResult) -> None:
         """Publish a step: requests first, for planners have the least time to lose."""
+        if result.fired:
+            # It may change the planner that the request is for.
+            self.publish_events(simulation.fired)
         for av_id, request in result.requests.items():
             self._publish_request(av_id, request)
         due = result.n % self.publish_every == 0
@@ -236,7 +252,8 @@ class SimOutputs:
     def wait_until_received(self) -> None:
         """Wait for the subscribers to acknowledge what was published, with a limit."""
         until_s = time.monotonic() + ACKNOWLEDGE_S
-        for publisher in (self._cycle, self._state, self._objects, self._diagnostics):
+        for publisher in (self._cycle, self._state, self._objects, self._diagnostics,
+                          self._latched['/scenario/events']):
             left_s = max(0.0, until_s - time.monotonic())
             publisher.wait_for_all_acked(Duration(seconds=left_s))
 

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Sequence
 
+from crgame_ros.ros.seats import GAME
 from crgame_ros.ros.sim_inputs import SimInputs
 from crgame_ros.ros.sim_outputs import SimOutputs
 from crgame_ros.simulation.engine import Simulation, StepResult
@@ -44,7 +45,7 @@ class StartGate:
         self._say = say
         self._connected = False
         self._planners = set(result.requests)
-        self._seats = {seat.id: seat for seat in inputs.seats
+        self._seats = {seat.id: seat for seat in inputs.seats.humans
                        if {'driver_node', f'driver_node_{seat.id}'} & set(companions)}
         self._began_ns = 0
         self._asked_ns = 0
@@ -75,7 +76,7 @@ class StartGate:
     def _listen(self, now_ns: int) -> None:
         self._planners -= {av_id for av_id in self._planners if self._take_plan(av_id)}
         for seat in list(self._seats.values()):
-            if seat.listen(now_ns):
+            if seat.source != GAME or seat.listen(now_ns):
                 del self._seats[seat.id]
         if now_ns - self._asked_ns > ASK_AGAIN_NS:
             self._asked_ns = now_ns

@@ -98,7 +98,7 @@ class ObjectWriter:
             if item.id in self.ids:
                 poses = self._log.object_poses[:, column].copy()
                 poses[:, 2] = wrap_pi_array(poses[:, 2])
-                if item.role is Role.STATIC:
+                if item.role is Role.STATIC and np.isfinite(poses).all():
                     self._write_static(item, poses[np.isfinite(poses).all(axis=1)][0].tolist())
                 else:
                     self._write_moving(item, poses, self._log.object_velocities[:, column])

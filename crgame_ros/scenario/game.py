@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any, Literal
 
+from crgame_ros.scenario.events import EventSpec
 from crgame_ros.vehicle.parameters import DEFAULT_VEHICLE
 
 DEFAULT_PLANNER = 'idm'
@@ -151,6 +152,7 @@ class Game:
     :param duration: simulated seconds until the run ends; infinite if nobody says.
     :param seed: seed of everything random.
     :param base: directory against which file names inside the game are resolved.
+    :param events: what triggers and conditions bring about.
     """
 
     scenario: Path
@@ -163,3 +165,4 @@ class Game:
     drivability: DrivabilitySpec = DrivabilitySpec()
     timing: TimingSpec = TimingSpec()
     base: Path = Path('.')
+    events: tuple[EventSpec, ...] = ()

@@ -3,18 +3,17 @@
 """Reading game files: YAML in, a checked `Game` or one clear error out."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields, is_dataclass, MISSING
+from dataclasses import asdict
 import math
 from pathlib import Path
 import re
-import reprlib
-import sys
-import types
-from typing import Any, get_args, get_origin, get_type_hints, Literal, TypeVar, Union
+from typing import Any
 
 import yaml
 
 from crgame_ros.errors import InputError
+from crgame_ros.scenario.checked_values import build, named_file
+from crgame_ros.scenario.event_file import event_entry, parse_events
 from crgame_ros.scenario.game import (
     AvSpec,
     DrivabilitySpec,
@@ -26,18 +25,8 @@ from crgame_ros.scenario.game import (
     TimingSpec,
 )
 
-T = TypeVar('T')
 MAX_BYTES = 1 << 20
 PREFIX = {'humans': 'hv', 'avs': 'av'}
-# Values in messages: YAML aliases can make a short file a huge value.
-_SHORT = reprlib.Repr()
-_SHORT.maxlevel = 2
-# Lower and upper bounds of numbers, by their name.
-BOUNDS: dict[str, tuple[float, float]] = {
-    'rate': (1.0, 10000.0), 'duration': (0.0, math.inf), 'horizon': (0.1, 60.0),
-    'dt_min': (1e-6, 1.0), 'dt_max': (1e-4, 10.0), 'skip_threshold': (0.0, math.inf),
-    'reset_threshold': (0.0, math.inf), 'warm_up_steps': (0, 1e9),
-    'max_catch_up_steps': (1, 1e9), 'seed': (0, 2**63 - 1), 'speed': (-100.0, 100.0)}
 
 
 def read_yaml(path: Path, what: str) -> Any:
@@ -100,6 +89,8 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
         rate = table.pop('rate')
         table['timing'] = build(TimingSpec, {**vars(table.get('timing', TimingSpec())),
                                              'rate': rate}, where)
+    if 'events' in table:
+        table['events'] = parse_events(table['events'], f'{where}: events', base)
     table['base'] = base
     game = build(Game, table, where)
     if not game.humans and game.avs == ():
@@ -121,7 +112,7 @@ def _vehicles(values: Any, group: str, where: str,
         table = {'id': f'{PREFIX[group]}{index}', **entry}
         for key in ('vehicle', 'planner'):
             if isinstance(table.get(key), str):
-                table[key] = _named_file(table[key], base)
+                table[key] = named_file(table[key], base)
         if group == 'humans' and isinstance(table.get('spawn'), Mapping):
             kind = LaneletSpawn if 'lanelet' in table['spawn'] else PoseSpawn
             table['spawn'] = build(kind, table['spawn'], f'{place}: spawn')
@@ -139,64 +130,6 @@ def _vehicles(values: Any, group: str, where: str,
     return tuple(specs)
 
 
-def build(kind: type[T], values: Any, where: str) -> T:
-    """
-    Build a dataclass from a mapping, checking every key and type.
-
-    :raises InputError: for an unknown or missing key, a wrong type, a number out of bounds.
-    """
-    if not isinstance(values, Mapping):
-        raise InputError('is no mapping', where)
-    assert is_dataclass(kind)
-    hints = get_type_hints(kind)
-    known = [field.name for field in fields(kind)]
-    for key in values:
-        if key not in known:
-            raise InputError(f'"{key}" is unknown', where, 'known are ' + ', '.join(known))
-    checked: dict[str, Any] = {}
-    for field in fields(kind):
-        if field.name in values:
-            checked[field.name] = _checked(
-                values[field.name], hints[field.name], field.name, where)
-        elif field.default is MISSING and field.default_factory is MISSING:
-            raise InputError(f'"{field.name}" is missing', where)
-    return kind(**checked)
-
-
-def _checked(value: Any, hint: Any, name: str, where: str) -> Any:
-    options = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
-    if value is None and type(None) in options:
-        return None
-    if hint is float or hint is int:
-        return _number(value, hint, name, where)
-    if int in options:
-        return _number(value, int, name, where)
-    for option in options:
-        origin = get_origin(option)
-        if origin is Literal:
-            if value in get_args(option):
-                return value
-            raise InputError(f'"{name}" is {_SHORT.repr(value)}', where,
-                             'use one of ' + ', '.join(map(str, get_args(option))))
-        plain = origin or option
-        if isinstance(plain, type) and isinstance(value, plain):
-            return value
-    names = ' or '.join(getattr(option, '__name__', str(option)) for option in options)
-    raise InputError(f'"{name}" is {_SHORT.repr(value)}', where, f'give a {names}')
-
-
-def _number(value: Any, kind: type, name: str, where: str) -> float | int:
-    allowed = int | float if kind is float else int
-    if isinstance(value, bool) or not isinstance(value, allowed) or value != value:
-        raise InputError(f'"{name}" is {_SHORT.repr(value)}', where, 'give a number')
-    low, high = BOUNDS.get(name, (-math.inf, math.inf))
-    largest = math.inf if name == 'duration' else sys.float_info.max
-    if not max(low, -largest) <= value <= min(high, largest):
-        raise InputError(f'"{name}" is {_SHORT.repr(value)}', where,
-                         f'give a number from {low:g} to {high:g}')
-    return kind(value)
-
-
 def dump_game(game: Game) -> str:
     """
     Write a game file that gives the same game from anywhere: its file names are absolute.
@@ -210,13 +143,15 @@ def dump_game(game: Game) -> str:
     here = Path.cwd()
     values['humans'] = [_without_empty(asdict(human)) | {
         'driver': _absolute_driver(human.driver, game.base),
-        'vehicle': _named_file(human.vehicle, here)} for human in game.humans]
+        'vehicle': named_file(human.vehicle, here)} for human in game.humans]
     if game.avs is not None:
         values['avs'] = [_without_empty(asdict(av)) | {
-            'vehicle': _named_file(av.vehicle, here),
-            'planner': _named_file(av.planner, here)} for av in game.avs]
+            'vehicle': named_file(av.vehicle, here),
+            'planner': named_file(av.planner, here)} for av in game.avs]
     for key in ('prediction', 'drivability', 'timing'):
         values[key] = asdict(getattr(game, key))
+    if game.events:
+        values['events'] = [event_entry(event) for event in game.events]
     return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
 
 
@@ -229,11 +164,3 @@ def _absolute_driver(driver: str, base: Path) -> str:
     if not colon or kind == 'evdev':
         return driver
     return f'{kind}:{(base / Path(argument).expanduser()).resolve()}'
-
-
-def _named_file(name: str, base: Path) -> str:
-    """Resolve `FILE.yaml` and `FILE.py:Class` against a directory; other names stay."""
-    file, colon, attribute = name.rpartition(':')
-    if not (name.endswith('.yaml') or file.endswith('.py')):
-        return name
-    return str(base / (file or name)) + colon + (attribute if file else '')

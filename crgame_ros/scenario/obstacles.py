@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The obstacles of a scenario: what they look like, and where they are at each time step."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 import math
 
@@ -46,10 +46,14 @@ class ScenarioObstacles:
 
     :param loaded: the scenario.
     :param without: obstacle ids to leave out.
+    :param held: ids of dynamic obstacles that stand at their first pose all the time, until
+        somebody lets them go.
+    :param put: what may be put into the scenario later; absent.
     :raises InputError: if a shape cannot be used, or there are too many states.
     """
 
-    def __init__(self, loaded: LoadedScenario, without: Collection[int] = ()) -> None:
+    def __init__(self, loaded: LoadedScenario, without: Collection[int] = (),
+                 held: Collection[int] = (), put: Sequence[ObjectDescription] = ()) -> None:
         scenario = loaded.scenario
         obstacles = [obstacle for obstacle in (
             *scenario.static_obstacles, *scenario.environment_obstacle,
@@ -57,20 +61,22 @@ class ScenarioObstacles:
             if obstacle.obstacle_id not in without]
         self.time_step_s = loaded.time_step_s
         described = [_describe(obstacle, loaded.source) for obstacle in obstacles]
-        self.descriptions: tuple[ObjectDescription, ...] = tuple(d for d, _ in described)
+        self.descriptions: tuple[ObjectDescription, ...] = (*(d for d, _ in described), *put)
         self.ids: tuple[str, ...] = tuple(d.id for d in self.descriptions)
         tracks = [_track(o, offset) for o, (_, offset) in zip(obstacles, described, strict=True)]
         moving = [t for t in tracks if len(t.steps)]
         self.first_k: int = min((int(t.steps[0]) for t in moving), default=0)
         self.last_k: int = max((int(t.steps[-1]) for t in moving), default=0)
         count = self.last_k - self.first_k + 1
-        if count * len(tracks) > _MAX_CELLS:
-            raise InputError(f'{len(tracks)} obstacles over {count} time steps are too many',
+        if count * len(self.ids) > _MAX_CELLS:
+            raise InputError(f'{len(self.ids)} obstacles over {count} time steps are too many',
                              loaded.source, 'shorten the trajectories')
-        self._poses: FloatArray = np.full((count, len(tracks), 3), np.nan)
-        self._velocities: FloatArray = np.full((count, len(tracks), 3), np.nan)
+        self._poses: FloatArray = np.full((count, len(self.ids), 3), np.nan)
+        self._velocities: FloatArray = np.full((count, len(self.ids), 3), np.nan)
         for column, track in enumerate(tracks):
             self._fill(column, track)
+        self._held = {column: self._hold(column) for column, obstacle in enumerate(obstacles)
+                      if obstacle.obstacle_id in held}
         self._poses.flags.writeable = False
         self._velocities.flags.writeable = False
         self._static = ObjectStates(*self._only_static())
@@ -99,6 +105,29 @@ class ScenarioObstacles:
             return ObjectStates(self._poses[row], self._velocities[row])
         return self._static
 
+    @property
+    def held(self) -> Collection[int]:
+        """Columns of the obstacles that stand until somebody lets them go."""
+        return self._held.keys()
+
+    def track(self, column: int) -> tuple[FloatArray, FloatArray]:
+        """
+        Give the recorded course of an obstacle, of a held one as well.
+
+        :return: poses and velocities (n, 3) from its first time step on
+        """
+        return self._held[column] if column in self._held else self._recorded(column)
+
+    def _recorded(self, column: int) -> tuple[FloatArray, FloatArray]:
+        present = np.isfinite(self._poses[:, column, 0])
+        return self._poses[present, column], self._velocities[present, column]
+
+    def _hold(self, column: int) -> tuple[FloatArray, FloatArray]:
+        """Let an obstacle stand at its first pose, and give its course."""
+        poses, velocities = self._recorded(column)
+        self._poses[:, column], self._velocities[:, column] = poses[0], 0.0
+        return poses, velocities
+
     def _fill(self, column: int, track: _Track) -> None:
         if len(track.steps):
             rows = np.arange(track.steps[0], track.steps[-1] + 1)
@@ -121,7 +150,8 @@ class ScenarioObstacles:
 
     def _only_static(self) -> tuple[FloatArray, FloatArray]:
         poses, velocities = self._poses[0].copy(), self._velocities[0].copy()
-        moving = [d.role is not Role.STATIC for d in self.descriptions]
+        moving = [d.role is not Role.STATIC and column not in self._held
+                  for column, d in enumerate(self.descriptions)]
         poses[moving] = np.nan
         velocities[moving] = np.nan
         poses.flags.writeable = velocities.flags.writeable = False

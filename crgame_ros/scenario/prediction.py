@@ -7,14 +7,16 @@ The human-vehicle scenario adapter (CRG III-A1c) predicts driven vehicles at con
 steering; recorded obstacles are predicted at constant speed along their lane.
 """
 
+from collections.abc import Sequence
 import math
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.scenario.lane_line import LaneLine
-from crgame_ros.scenario.objects import Role
+from crgame_ros.scenario.objects import ObjectStates, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.vehicle.state import StateColumn
@@ -62,7 +64,14 @@ def predict_constant_steering(states: FloatArray, wheelbases: FloatArray, steps:
     return poses, velocities
 
 
-def recorded_future(obstacles: ScenarioObstacles, k: int,
+class KnownCourses(Protocol):
+    """Whatever knows where all objects are at a scenario time step."""
+
+    def states_at(self, k: int) -> ObjectStates:
+        """Give the poses and velocities of all objects at a time step."""
+
+
+def recorded_future(obstacles: KnownCourses, k: int,
                     steps: int) -> tuple[FloatArray, FloatArray]:
     """
     Give the true future of all obstacles (`prediction: recorded`, which leaks).
@@ -92,7 +101,9 @@ class LanePrediction:
     def __init__(self, obstacles: ScenarioObstacles, network: RoadNetwork) -> None:
         self._obstacles = obstacles
         self._network = network
-        self._roles = np.array([d.role is Role.RECORDED for d in obstacles.descriptions], bool)
+        self._follows_lanes = np.array([
+            d.role is Role.RECORDED and d.type not in _FREE_MOVERS
+            for d in obstacles.descriptions], dtype=bool)
         shape = obstacles.poses.shape[:2]
         self._lane: NDArray[np.int64] = np.full(shape, _NO_LANE, dtype=np.int64)
         self._s: FloatArray = np.zeros(shape)
@@ -104,23 +115,32 @@ class LanePrediction:
         self._assign_lanes()
         self._ensure_reach(_MIN_REACH)
 
-    def predict(self, k: int, steps: int) -> tuple[FloatArray, FloatArray]:
+    def predict(self, k: int, steps: int, now: ObjectStates | None = None,
+                changed: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
         """
         Predict all obstacles from their states at scenario time step k.
 
-        :return: poses and velocities, both (steps + 1, M, 3); row 0 is `states_at(k)`, in later
-            rows a velocity leads to the next pose
+        :param now: the states at k, where events have changed some; those of the scenario if None
+        :param changed: columns whose state is not the scenario's
+        :return: poses and velocities, both (steps + 1, M, 3); row 0 is `now`, in later rows a
+            velocity leads to the next pose
         """
-        now = self._obstacles.states_at(k)
+        now = self._obstacles.states_at(k) if now is None else now
         dt = self._obstacles.time_step_s
         time = np.arange(steps + 2, dtype=np.float64) * dt
         poses = now.poses + time[:, None, None] * now.velocities
         poses[..., 2] = now.poses[:, 2]
         row = k - self._obstacles.first_k
         if 0 <= row < len(self._lane):
-            on_lane = np.flatnonzero(self._lane[row] != _NO_LANE)
-            if len(on_lane):
-                poses[1:, on_lane] = self._along_lanes(row, on_lane, time[1:])
+            on_lane = self._lane[row] != _NO_LANE
+            on_lane[list(changed)] = False
+            columns = np.flatnonzero(on_lane)
+            if len(columns):
+                poses[1:, columns] = self._along_lanes(
+                    self._lane[row, columns], self._s[row, columns], self._d[row, columns],
+                    self._speed[row, columns], time[1:])
+        if changed:
+            self._predict_changed(now, np.array(changed), time[1:], poses[1:])
         velocities = np.empty((steps + 1, *now.poses.shape))
         velocities[0] = now.velocities
         velocities[1:] = np.diff(poses[1:], axis=0) * (1.0 / dt)
@@ -129,12 +149,29 @@ class LanePrediction:
         poses[0] = now.poses
         return poses, velocities
 
-    def _along_lanes(self, row: int, columns: NDArray[np.int64], time: FloatArray) -> FloatArray:
-        speed = self._speed[row, columns]
+    def _predict_changed(self, now: ObjectStates, changed: NDArray[np.int64], time: FloatArray,
+                         poses: FloatArray) -> None:
+        """Find the lanes of the few objects that are not where they were recorded."""
+        columns = changed[self._follows_lanes[changed]]
+        yaw, velocities = now.poses[columns, 2], now.velocities[columns]
+        speed = velocities[:, 0] * np.cos(yaw) + velocities[:, 1] * np.sin(yaw)
+        # A standing or absent one needs no lane.
+        moving = np.abs(np.nan_to_num(speed)) > 0.0
+        columns, speed = columns[moving], speed[moving]
+        if not len(columns):
+            return
+        lane, s, d = self._place(now.poses[columns])
+        found = lane != _NO_LANE
+        if found.any():
+            poses[:, columns[found]] = self._along_lanes(
+                lane[found], s[found], d[found], speed[found], time)
+
+    def _along_lanes(self, lane: NDArray[np.int64], s: FloatArray, d: FloatArray,
+                     speed: FloatArray, time: FloatArray) -> FloatArray:
+        """Drive along lanes at constant speed; all arrays (C) but time (T); gives (T, C, 3)."""
         travelled = time[:, None] * speed
         self._ensure_reach(float(np.abs(travelled[-1]).max()))
-        lane = self._lane[row, columns]
-        index = (self._s[row, columns] + _BEHIND + travelled) / _SPACING
+        index = (s + _BEHIND + travelled) / _SPACING
         last = self._counts[lane] - 2
         cell = np.clip(index.astype(np.int64), 0, last)
         fraction = (index - cell)[..., None]
@@ -144,7 +181,6 @@ class LanePrediction:
         # The direction must not turn on where a line ends and goes straight on.
         yaw = before[..., 2] + np.clip(fraction[..., 0], 0.0, 1.0) * (
             self._table[cell + 1, 2] - before[..., 2])
-        d = self._d[row, columns]
         poses[..., 0] -= d * np.sin(yaw)
         poses[..., 1] += d * np.cos(yaw)
         poses[..., 2] = yaw
@@ -152,24 +188,41 @@ class LanePrediction:
 
     def _assign_lanes(self) -> None:
         poses = self._obstacles.poses
-        free = [d.type in _FREE_MOVERS for d in self._obstacles.descriptions]
-        mask = np.isfinite(poses[..., 0]) & (self._roles & ~np.array(free, dtype=bool))
-        rows, columns = np.nonzero(mask)
-        found = self._network.lanelets_at(poses[rows, columns])
-        self._used = [int(lane) for lane in np.unique(found[found >= 0])]
-        for number, lane in enumerate(self._used):
-            mine = found == lane
-            where = rows[mine], columns[mine]
+        rows, columns = np.nonzero(np.isfinite(poses[..., 0]) & self._follows_lanes)
+        self._used: list[int] = []
+        self._lane[rows, columns], self._s[rows, columns], self._d[rows, columns] = self._place(
+            poses[rows, columns])
+        # The lanes that a held obstacle will use, so that nothing is tabulated in the run.
+        for column in self._obstacles.held:
+            if self._follows_lanes[column]:
+                self._place(self._obstacles.track(column)[0])
+
+    def _place(self, poses: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+        """Give the number among the used lanes, or -1, and s and d of poses (N, 3)."""
+        found = self._network.lanelets_at(poses)
+        lanes = np.full(len(poses), _NO_LANE, dtype=np.int64)
+        along_line, aside = np.zeros(len(poses)), np.zeros(len(poses))
+        for lane in [int(lane) for lane in np.unique(found[found >= 0])]:
+            where = np.flatnonzero(found == lane)
             line = self._network.line(self._network.lanelet_ids[lane])
-            s, d = line.project(poses[where][:, :2])
+            s, d = line.project(poses[where, :2])
             yaw = np.interp(s, line.s, line.headings)
-            along = np.abs(wrap_pi_array(poses[where][:, 2] - yaw)) <= _MAX_LANE_ANGLE
-            where = where[0][along], where[1][along]
-            self._lane[where], self._s[where], self._d[where] = number, s[along], d[along]
+            along = np.abs(wrap_pi_array(poses[where, 2] - yaw)) <= _MAX_LANE_ANGLE
+            where = where[along]
+            lanes[where] = self._number(lane)
+            along_line[where], aside[where] = s[along], d[along]
+        return lanes, along_line, aside
+
+    def _number(self, lane: int) -> int:
+        """Find the number of a lane; a new one is tabulated before it is used."""
+        if lane not in self._used:
+            self._used.append(lane)
+            self._reach = 0.0
+        return self._used.index(lane)
 
     def _ensure_reach(self, reach: float) -> None:
         """Tabulate every used lane at least `reach` metres (at most 5 km) beyond its end."""
-        if min(reach, _MAX_REACH) <= self._reach or not self._used:
+        if min(reach, _MAX_REACH) <= self._reach > 0.0 or not self._used:
             return
         self._reach = min(max(_MIN_REACH, 1.5 * reach), _MAX_REACH)
         tables = []

@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from crgame_ros.driver.command import DriverCommand
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.planner.interface import Plan
@@ -18,6 +19,7 @@ from crgame_ros.scenario.game import TimingSpec
 from crgame_ros.simulation.setup import AvSetup
 from crgame_ros.timing.progress_tracker import ProgressTracker
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.kinematic_single_track import integrate
 from crgame_ros.vehicle.state import VehicleState
 
@@ -25,6 +27,8 @@ from crgame_ros.vehicle.state import VehicleState
 EXHAUSTED_DECELERATION = 4.0
 # A planner that is silent for so long is asked again [s] (semantics of the busy flag).
 BUSY_TIMEOUT_S = 1.0
+# Given back by a person, the vehicle rolls on for so long until a plan from there comes [s].
+GIVE_BACK_TIMEOUT_S = 1.0
 # Requests remembered, so that an overdue plan can still be checked and used.
 REMEMBERED_REQUESTS = 64
 
@@ -58,6 +62,15 @@ class AutonomousVehicle:
         self._busy_since: int | None = None
         self._followed_request_n = -1
         self._without_plan = False
+        # A stopped planner is asked for nothing; the vehicle follows its last plan and brakes.
+        self.planner_running = True
+        self._driven: HumanVehicle | None = None
+        self._given_back_n: int | None = None
+
+    @property
+    def driven(self) -> bool:
+        """Tell whether a person has taken the vehicle over."""
+        return self._driven is not None
 
     @property
     def busy(self) -> bool:
@@ -75,6 +88,8 @@ class AutonomousVehicle:
 
     def wants_request(self, n: int) -> bool:
         """Decide at a tick whether to ask the planner (algorithm 2, line 6)."""
+        if not self.planner_running:
+            return False
         if self._busy_since is not None:
             if (n - self._busy_since) * self._scheduler.dt_s < BUSY_TIMEOUT_S:
                 self.counters.skipped += 1
@@ -147,16 +162,57 @@ class AutonomousVehicle:
         """Give the followed plan's state at step n; None beyond its end or without one."""
         return self._tracker.sample(n)
 
+    def drive(self, command: DriverCommand, dt_s: float) -> VehicleState:
+        """
+        Move one step as a person commands, who has taken the vehicle over.
+
+        Its planner goes on planning from where the vehicle is, for the moment it is given back.
+
+        :param command: the normalised command, within its ranges
+        :param dt_s: Delta t_eff [s]
+        """
+        if self._driven is None:
+            self._driven = HumanVehicle(self.setup.vehicle, self.state)
+        self._given_back_n = None
+        self._without_plan = False
+        self.state = self._driven.step(command, dt_s)
+        return self.state
+
     def advance(self, n: int) -> VehicleState:
-        """Move to step n along the plan (algorithm 1, line 13), or brake where it is used up."""
-        planned = self._tracker.sample(n)
-        self._without_plan = planned is None
-        if planned is None:
+        """
+        Move to step n along the plan (algorithm 1, line 13), or brake where it is used up.
+
+        Given back by a person, the vehicle keeps speed and steering until the first plan that
+        was asked for since: an older one starts elsewhere.
+        """
+        if self._driven is not None:
+            self._driven, self._given_back_n = None, n - 1
+        if self._given_back_n is not None and self._followed_request_n >= self._given_back_n:
+            self._given_back_n = None
+        rolls = self._rolls_on(n)
+        planned = None if self._given_back_n is not None else self._tracker.sample(n)
+        self._without_plan = planned is None and not rolls
+        if rolls:
+            self.state = self._rolling()
+        elif planned is None:
             self.counters.steps_without_plan += 1
             self.state = self._braking()
         else:
             self.state = self._never_back(planned)
         return self.state
+
+    def _rolls_on(self, n: int) -> bool:
+        return self._given_back_n is not None \
+            and (n - self._given_back_n) * self._scheduler.dt_s <= GIVE_BACK_TIMEOUT_S
+
+    def _rolling(self) -> VehicleState:
+        """Keep speed and steering angle for one step."""
+        state, wheelbase = self.state, self.setup.vehicle.wheelbase
+        x, y, yaw, speed, angle = integrate(
+            state.x, state.y, state.yaw, state.speed, state.steering_angle, 0.0, 0.0, wheelbase,
+            self._scheduler.dt_s)
+        return VehicleState(x, y, wrap_pi(yaw), speed, angle, 0.0,
+                            speed * math.tan(angle) / wheelbase, 0.0)
 
     def _never_back(self, planned: VehicleState) -> VehicleState:
         """Hold still where a late plan, braking harder than the last, lies behind the vehicle."""

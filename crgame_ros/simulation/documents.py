@@ -15,6 +15,8 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.event_file import document_entry, parse_document_entries
+from crgame_ros.scenario.events import EventSpec, FiredEvent
 from crgame_ros.scenario.game import DrivabilitySpec
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.simulation.setup import Setup
@@ -23,6 +25,7 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 
 GAME_TOPIC = '/scenario/game'
 OBJECTS_TOPIC = '/scenario/objects'
+EVENTS_TOPIC = '/scenario/events'
 # What reading a text that somebody else wrote can raise: huge numbers and deep nesting included.
 MALFORMED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
 
@@ -56,7 +59,8 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
                            av.transform.offset_y]}
             for av in setup.avs],
         'prediction': asdict(game.prediction), 'drivability': asdict(game.drivability),
-        'timing': asdict(game.timing)}
+        'timing': asdict(game.timing),
+        'events': [document_entry(event) for event in game.events]}
     return json.dumps(document, allow_nan=False)
 
 
@@ -77,6 +81,7 @@ class GameDocument:
     :param humans: entries of the humans, as written.
     :param avs: entries of the AVs, as written.
     :param content: the whole document.
+    :param events: the game's events.
     """
 
     epoch: int
@@ -86,6 +91,7 @@ class GameDocument:
     avs: tuple[dict[str, Any], ...]
     drivability: DrivabilitySpec
     content: dict[str, Any]
+    events: tuple[EventSpec, ...] = ()
 
     def vehicle(self, vehicle_id: str) -> dict[str, Any] | None:
         """Give the entry of a driven vehicle, None if it takes no part."""
@@ -113,7 +119,8 @@ def parse_game_document(text: str) -> GameDocument:
             ScenarioScheduler(int(content['dt_c_ns']), int(content['steps_per_tick']),
                               int(content['k0']), int(content['clock_offset_ns'])),
             tuple(content['humans']), tuple(content['avs']),
-            DrivabilitySpec(**content['drivability']), content)
+            DrivabilitySpec(**content['drivability']), content,
+            parse_document_entries(content.get('events', []), GAME_TOPIC))
     except MALFORMED as error:
         raise InputError(f'is no game document ({type(error).__name__}: {error})',
                          GAME_TOPIC) from error
@@ -145,3 +152,26 @@ def parse_objects_document(text: str) -> tuple[ObjectDescription, ...]:
     except MALFORMED as error:
         raise InputError(f'is no list of objects ({type(error).__name__}: {error})',
                          OBJECTS_TOPIC) from error
+
+
+def events_document(epoch: int, fired: Sequence[FiredEvent]) -> str:
+    """Write what has taken effect in a run so far (fields as in the contract)."""
+    return json.dumps({'epoch': epoch, 'fired': [asdict(event) for event in fired]})
+
+
+def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
+    """
+    Read `/scenario/events`.
+
+    :return: the epoch, and what took effect in it, in order.
+    :raises InputError: if it is not what `events_document` writes.
+    """
+    try:
+        content = json.loads(text)
+        return int(content['epoch']), tuple(
+            FiredEvent(str(item['name']), int(item['n']), int(item['k']),
+                       'trigger' if item['by'] == 'trigger' else 'condition')
+            for item in content['fired'])
+    except MALFORMED as error:
+        raise InputError(f'is no list of events ({type(error).__name__}: {error})',
+                         EVENTS_TOPIC) from error

@@ -8,10 +8,12 @@ import hashlib
 
 import numpy as np
 
-from crgame_ros.driver.command import DriverCommand
+from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.planner.joints import JointSeries, vehicles_from_joints
+from crgame_ros.scenario.events import FiredEvent, PlannerRun
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
+from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.plan_requests import PlanRequests
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
@@ -28,6 +30,7 @@ class StepResult:
     :param tick: True where k has just advanced; only then are objects and requests given.
     :param requests: the plan requests to send, by AV id.
     :param objects: poses of everything that is no driven vehicle.
+    :param fired: the events that took effect at this tick.
     """
 
     n: int
@@ -35,6 +38,7 @@ class StepResult:
     tick: bool
     requests: Mapping[str, JointSeries]
     objects: ObjectStates | None
+    fired: tuple[FiredEvent, ...] = ()
 
 
 class Simulation:
@@ -55,9 +59,12 @@ class Simulation:
         self.n = 0
         self.humans = [HumanVehicle(human.vehicle, human.state) for human in setup.humans]
         self.avs = [AutonomousVehicle(av, self.scheduler, setup.game.timing) for av in setup.avs]
-        self.commands: list[DriverCommand] = [DriverCommand()] * len(self.humans)
+        self.commands: list[DriverCommand | None] = [
+            *[DriverCommand()] * len(self.humans), *[None] * len(self.avs)]
         self.objects = setup.obstacles.states_at(self.scheduler.k0)
-        self._requests = PlanRequests(setup)
+        self._events = RunEvents(setup) if setup.game.events else None
+        self._requests = PlanRequests(
+            setup, None if self._events is None else self._events.obstacles)
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
 
@@ -83,19 +90,44 @@ class Simulation:
         """Count a planner's answer that could not be read."""
         self._av_by_id[av_id].refuse_malformed(reason)
 
-    def step(self, dt_eff_s: float, commands: Sequence[DriverCommand]) -> StepResult:
+    def set_planner_running(self, av_id: str, running: bool) -> None:
+        """Stop an AV's planner, which is then asked for no plan, or let it go on."""
+        self._av_by_id[av_id].planner_running = running
+
+    def trigger(self, name: str) -> str | None:
+        """
+        Let an event of the game take effect at the next tick.
+
+        :return: None if it will, else the reason why not.
+        """
+        if self._events is None:
+            return f'there is no event "{name[:40]}"; the game has none'
+        return self._events.trigger(name)
+
+    @property
+    def fired(self) -> tuple[FiredEvent, ...]:
+        """All events that have taken effect so far."""
+        return () if self._events is None else self._events.fired
+
+    def step(self, dt_eff_s: float, commands: Sequence[DriverCommand | None]) -> StepResult:
         """
         Advance from n to n + 1.
 
         :param dt_eff_s: interval that the humans are integrated over (CRG 13) [s]
-        :param commands: one for each human, in their order
+        :param commands: one for each human, in their order; then, if anybody has taken an AV over,
+            one for each AV, None for one that follows its plan
         """
         self.n += 1
-        self.commands = [command.rounded() for command in commands]
-        for human, command in zip(self.humans, self.commands, strict=True):
-            human.step(command, dt_eff_s)
-        for av in self.avs:
-            av.advance(self.n)
+        seats = len(self.humans) + len(self.avs)
+        self.commands = [command and command.rounded() for command in commands]
+        self.commands += [None] * (seats - len(commands))
+        for human, command in zip(self.humans, self.commands, strict=False):
+            human.step(command or RELEASED, dt_eff_s)
+        for av, command in zip(self.avs, self.commands[len(self.humans):], strict=True):
+            if command is None:
+                av.advance(self.n)
+            else:
+                av.drive(command, dt_eff_s)
         result = self._result()
         self._add_to_hash()
         return result
@@ -104,7 +136,11 @@ class Simulation:
         k = self.scheduler.k(self.n)
         if not self.scheduler.is_tick(self.n):
             return StepResult(self.n, k, False, {}, None)
-        self.objects = self.setup.obstacles.states_at(k)
+        fired: tuple[FiredEvent, ...] = ()
+        if self._events is None:
+            self.objects = self.setup.obstacles.states_at(k)
+        else:
+            fired = self._take_effect(self._events, k)
         asking = [av for av in self.avs if av.wants_request(self.n)]
         requests: dict[str, JointSeries] = {}
         if asking:
@@ -117,7 +153,16 @@ class Simulation:
                                            request.accelerations[0, :4])
                 av.request_sent(self.n, stamp_ns, VehicleState(*ego.tolist()))
                 requests[av.setup.id] = request
-        return StepResult(self.n, k, True, requests, self.objects)
+        return StepResult(self.n, k, True, requests, self.objects, fired)
+
+    def _take_effect(self, events: RunEvents, k: int) -> tuple[FiredEvent, ...]:
+        """Let events change what is there and who plans, at a tick."""
+        fired = events.at_tick(self.n, k, self.states)
+        for action in events.actions(fired):
+            if isinstance(action, PlannerRun):
+                self.set_planner_running(action.av, action.run)
+        self.objects = events.obstacles.states_at(k)
+        return fired
 
     def _add_to_hash(self) -> None:
         self._hash.update(np.array(self.states, dtype=np.float64).tobytes())

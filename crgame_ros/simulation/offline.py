@@ -2,20 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The offline runner: the same engine on a virtual clock, planners in lockstep."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.drivability.monitor import changes, DrivabilityMonitor, VehicleDrivability
+from crgame_ros.driver.command import RELEASED
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
-from crgame_ros.planner.adapter import PlannerAdapter, PlannerStatistics
+from crgame_ros.planner.adapter import PlannerStatistics
+from crgame_ros.planner.crew import PlannerCrew
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.joints import JointSeries, plan_to_joints
-from crgame_ros.planner.registry import create_planner
 from crgame_ros.planner.request_reader import RequestReader
+from crgame_ros.scenario.events import FiredEvent
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
 from crgame_ros.simulation.drivers import offline_driver
 from crgame_ros.simulation.engine import Simulation, StepResult
@@ -52,19 +54,23 @@ class OfflineResult:
     :param state_hash: SHA-256 over all states; equal for equal inputs.
     :param vehicle_states: (n + 1, V, 8) states of humans, then AVs, at every step.
     :param object_poses: (ticks, M, 3) centre poses at every tick.
+    :param object_velocities: (ticks, M, 3) their derivatives.
     :param commands: (n + 1, H, 4) throttle, brake, steering and reverse; row i was consumed by
         the step that led to state i, row 0 by none.
     :param planners: what each AV's planner did.
     :param violations: changes of the vehicles' drivability, in order.
+    :param fired: events that took effect, in order.
     """
 
     setup: Setup
     state_hash: str
     vehicle_states: NDArray[np.float64]
     object_poses: NDArray[np.float64]
+    object_velocities: NDArray[np.float64]
     commands: NDArray[np.float64]
     planners: Mapping[str, PlannerRecord]
     violations: tuple[VehicleDrivability, ...] = field(default=())
+    fired: tuple[FiredEvent, ...] = ()
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """Give the states (n + 1, 8) of one driven vehicle."""
@@ -83,14 +89,15 @@ class PlannerSeat:
         self._due: list[tuple[int, JointSeries]] = []
         objects = {item.id: item for item in setup.descriptions}
         self._reader = RequestReader(av.id, objects, simulation.scheduler)
-        self.adapter = PlannerAdapter(create_planner(av.spec.planner, av.spec.options), clock_s)
-        self.adapter.setup(PlannerContext(
+        context = PlannerContext(
             av.id, setup.loaded.scenario, av.planning_problem, av.vehicle, objects,
-            setup.scheduler.time_step_s, setup.scheduler.k0, setup.game.seed))
+            setup.scheduler.time_step_s, setup.scheduler.k0, setup.game.seed)
+        self.crew = PlannerCrew(
+            context, av.spec.planner, av.spec.options, setup.game.events, clock_s)
 
     def ask(self, request: JointSeries) -> None:
         """Plan now; the answer is due after the latency (at once for the first request)."""
-        plan = self.adapter.plan(self._reader.read(request))
+        plan = self.crew.plan(self._reader.read(request))
         series = plan_to_joints(plan, self.id, self._simulation.scheduler.time_step_ns)
         n = self._simulation.n
         self._due.append((n + (self._latency if n else 0), series))
@@ -103,50 +110,68 @@ class PlannerSeat:
     def record(self) -> PlannerRecord:
         """Sum up what the planner did."""
         counters = next(av.counters for av in self._simulation.avs if av.setup.id == self.id)
-        return PlannerRecord(counters, self.adapter.statistics)
+        return PlannerRecord(counters, self.crew.statistics)
 
 
 def run_offline(
     setup: Setup, *, duration_s: float | None = None, latency_steps: int = 0,
     drivers: Mapping[str, DriverSource] | None = None,
     intervals_s: NDArray[np.float64] | None = None, check_drivability: bool = True,
-    clock_s: Callable[[], float] | None = None,
+    clock_s: Callable[[], float] | None = None, triggers: Sequence[tuple[int, str]] = (),
 ) -> OfflineResult:
     """
     Run a game as fast as it can.
 
     :param duration_s: simulated time; the game's own where None [s]
     :param latency_steps: simulation steps between a request and its plan.
-    :param drivers: drivers of humans by id, instead of the game's own.
+    :param drivers: drivers of humans by id, instead of the game's own; of AVs: they take it over.
     :param intervals_s: Delta t_eff of each step, as recorded; the nominal step where None and
         beyond their end [s]
     :param check_drivability: run the monitor in lockstep.
     :param clock_s: clock that times the planners, which the result doesn't depend on.
-    :raises InputError: if a human's driver needs a person or a device.
+    :param triggers: simulation step n and name of the events that somebody triggers; each takes
+        effect at the first tick from n on.
+    :raises InputError: if a human's driver needs a person or a device, or a trigger is refused.
     """
     simulation = Simulation(setup)
     steps = simulation.scheduler.steps_for(_duration(setup, duration_s))
     drivers = drivers or {}
     hands = [drivers.get(human.id) or offline_driver(human) for human in setup.humans]
+    takers = [drivers.get(av.id) for av in setup.avs]
     seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s)
              for index in range(len(setup.avs))]
     trace = _Trace(setup, steps, check_drivability)
     dt_s = simulation.scheduler.dt_s
     intervals: list[float] = [] if intervals_s is None else intervals_s.tolist()
+    _trigger(simulation, triggers, 0)
     result = simulation.begin()
     for _ in range(steps):
         for seat in seats:
+            seat.crew.apply([event.name for event in result.fired])
             if seat.id in result.requests:
                 seat.ask(result.requests[seat.id])
             seat.deliver()
         trace.add(simulation, result)
-        commands = [hand.command(simulation.n, dt_s) for hand in hands]
+        n = simulation.n
+        commands = [
+            *(hand.command(n, dt_s) for hand in hands),
+            *(taker.command(n, dt_s) if taker is not None and taker.drives(n) else None
+              for taker in takers)]
         effective_s = intervals[simulation.n] if simulation.n < len(intervals) else dt_s
+        _trigger(simulation, triggers, simulation.n + 1)
         result = simulation.step(effective_s, commands)
     trace.add(simulation, result)
     return OfflineResult(
-        setup, simulation.state_hash(), trace.vehicles, np.array(trace.objects), trace.commands,
-        {seat.id: seat.record() for seat in seats}, tuple(trace.violations))
+        setup, simulation.state_hash(), trace.vehicles, np.array(trace.objects),
+        np.array(trace.object_velocities), trace.commands,
+        {seat.id: seat.record() for seat in seats}, tuple(trace.violations), simulation.fired)
+
+
+def _trigger(simulation: Simulation, triggers: Sequence[tuple[int, str]], n: int) -> None:
+    """Trigger what is due before state n is made."""
+    for due, name in triggers:
+        if due == n and (reason := simulation.trigger(name)) is not None:
+            raise InputError(reason, f'trigger at step {n}', 'see "events" of the game')
 
 
 def _duration(setup: Setup, duration_s: float | None) -> float:
@@ -165,6 +190,7 @@ class _Trace:
         self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), 8))
         self.commands = np.zeros((steps + 1, len(setup.humans), 4))
         self.objects: list[NDArray[np.float64]] = []
+        self.object_velocities: list[NDArray[np.float64]] = []
         self.violations: list[VehicleDrivability] = []
         self._tick_n = 0
         self._previous: tuple[VehicleDrivability, ...] = ()
@@ -178,10 +204,11 @@ class _Trace:
     def add(self, simulation: Simulation, result: StepResult) -> None:
         n = simulation.n
         self.vehicles[n] = simulation.states
-        for index, command in enumerate(simulation.commands):
-            self.commands[n, index] = command
+        for index in range(self.commands.shape[1]):
+            self.commands[n, index] = simulation.commands[index] or RELEASED
         if result.objects is not None:
             self.objects.append(result.objects.poses)
+            self.object_velocities.append(result.objects.velocities)
             self._tick_n = n
             if self._monitor is not None:
                 self._monitor.set_objects(n, result.objects)

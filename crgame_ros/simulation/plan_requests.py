@@ -11,6 +11,7 @@ from crgame_ros.planner.joints import (
     vehicle_joint_names,
     vehicle_to_joints,
 )
+from crgame_ros.scenario.courses import ObstacleCourses
 from crgame_ros.scenario.prediction import (
     LanePrediction,
     predict_constant_steering,
@@ -42,10 +43,16 @@ class Forecast:
 
 
 class PlanRequests:
-    """Predicts once a tick and packs the request of each AV."""
+    """
+    Predicts once a tick and packs the request of each AV.
 
-    def __init__(self, setup: Setup) -> None:
+    :param setup: the run.
+    :param courses: the objects as events change them; None where no event can.
+    """
+
+    def __init__(self, setup: Setup, courses: ObstacleCourses | None = None) -> None:
         self._setup = setup
+        self._courses = courses
         self._mode = setup.game.prediction.mode
         self._time_step_s = setup.scheduler.time_step_s
         self.points = max(1, round(setup.game.prediction.horizon / self._time_step_s)) + 1
@@ -75,10 +82,14 @@ class PlanRequests:
             for index, av in enumerate(avs):
                 self._follow_plan(av, n, poses[:, first_av + index],
                                   velocities[:, first_av + index])
+        courses = self._courses
         if self._mode == 'recorded':
-            objects = recorded_future(self._setup.obstacles, k, steps)
-        else:
+            objects = recorded_future(courses or self._setup.obstacles, k, steps)
+        elif courses is None or not courses.changed:
             objects = self._lane_prediction.predict(k, steps)
+        else:
+            objects = self._lane_prediction.predict(
+                k, steps, courses.states_at(k), courses.changed)
         return Forecast(poses, velocities, *objects)
 
     def _follow_plan(self, av: AutonomousVehicle, n: int, poses: Poses, velocities: Poses) -> None:

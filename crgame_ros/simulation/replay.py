@@ -2,15 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorded human again: the inputs of a recording, for the offline runner."""
 
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.driver.replay import ReplayDriver
-from crgame_ros.driver.source import DriverSource, parse_source
+from crgame_ros.driver.source import DriverSource, parse_source, SourceSpec
 from crgame_ros.errors import InputError
+from crgame_ros.recording.run_events import read_run_events
 from crgame_ros.recording.run_log import replay_inputs
+from crgame_ros.scenario.events import AtStep, FiredEvent
+from crgame_ros.scenario.game import Game
 from crgame_ros.simulation.setup import Setup
 
 
@@ -20,8 +25,8 @@ def recorded_inputs(
     """
     Find the inputs of every human whose driver is `replay:BAG`.
 
-    :return: drivers by human, and the intervals Delta t_eff that reproduce the recorded states to
-        the last bit [s]; None for the nominal step.
+    :return: drivers by human and by AV that somebody took over, and the intervals Delta t_eff that
+        reproduce the recorded states to the last bit [s]; None for the nominal step.
     :raises InputError: if a recording cannot be used, or two of them differ in their intervals.
     """
     drivers: dict[str, DriverSource] = {}
@@ -30,7 +35,7 @@ def recorded_inputs(
         source = parse_source(human.driver)
         if source.kind != 'replay':
             continue
-        commands, measured = replay_inputs(Path(source.argument))
+        commands, measured = replay_inputs(_bag(setup, source))
         if human.id not in commands:
             raise InputError(f'{human.id} took no part', source.argument,
                              'it has ' + ', '.join(commands))
@@ -38,4 +43,42 @@ def recorded_inputs(
             raise InputError('was recorded with other intervals than the other replay',
                              source.argument, 'replay humans of one recording together')
         drivers[human.id], intervals = ReplayDriver(commands[human.id]), measured
+        drivers.update({av.id: ReplayDriver(commands[av.id])
+                        for av in setup.avs if av.id in commands})
     return drivers, intervals
+
+
+def with_recorded_events(game: Game, fired: Sequence[FiredEvent],
+                         known: Collection[str] | None = None) -> Game:
+    """
+    Let events take effect when they did in a recorded run, and no other one by itself.
+
+    :param game: the game to play.
+    :param fired: what took effect in the recorded run.
+    :param known: names of the recorded game's events, others stay as they are; None for all of
+        the game to play.
+    """
+    steps = {event.name: event.k for event in fired}
+    return replace(game, events=tuple(
+        event if known is not None and event.name not in known
+        else replace(event, when=AtStep(steps[event.name]) if event.name in steps else None)
+        for event in game.events))
+
+
+def with_replayed_events(setup: Setup) -> Setup:
+    """
+    Repeat the recorded events, too, where a human's driver is `replay:BAG`.
+
+    :raises InputError: if the recording cannot be used.
+    """
+    for human in setup.humans if setup.game.events else ():
+        source = parse_source(human.driver)
+        if source.kind == 'replay':
+            known, fired = read_run_events(_bag(setup, source))
+            return replace(setup, game=with_recorded_events(setup.game, fired, known))
+    return setup
+
+
+def _bag(setup: Setup, source: SourceSpec) -> Path:
+    """Give the recording that a source names, relative to the game file."""
+    return setup.game.base / Path(source.argument).expanduser()

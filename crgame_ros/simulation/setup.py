@@ -16,6 +16,7 @@ from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
+from crgame_ros.simulation.event_check import check_events, held_obstacles, put_obstacles
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -129,7 +130,9 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     avs = _place_avs(game, loaded, network)
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
     doubles = _recorded_egos(loaded, avs, k0)
-    obstacles = ScenarioObstacles(loaded, doubles)
+    obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
+    check_events(game, loaded.source, network, obstacles, [human.id for human in game.humans],
+                 [av.spec for av in avs])
     notices = [*loaded.notices, *(
         f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'
         for number, av_id in doubles.items())]

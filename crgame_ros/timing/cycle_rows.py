@@ -4,6 +4,7 @@
 
 from array import array
 from collections.abc import Sequence
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +17,20 @@ TIMING_COLUMNS = (
     'epoch', 'n', 'k', 'ideal_s', 'actual_s', 'step_error_s', 'cumulative_error_s', 'busy_s',
     'sleep_s', 'dt_eff_s', 'resets', 'dropped_s')
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse')
+NO_COMMAND = (math.nan,) * len(COMMAND_COLUMNS)
 
 
 class CycleRows:
     """
     A fixed buffer of rows, filled cycle by cycle and emptied together.
 
-    :param human_ids: whose consumed commands follow the timing columns.
+    :param vehicle_ids: whose consumed commands follow the timing columns: humans, then AVs.
     :param capacity: rows held before they have to be taken.
     """
 
-    def __init__(self, human_ids: Sequence[str], capacity: int) -> None:
+    def __init__(self, vehicle_ids: Sequence[str], capacity: int) -> None:
         self.columns = TIMING_COLUMNS + tuple(
-            f'{human}/{name}' for human in human_ids for name in COMMAND_COLUMNS)
+            f'{vehicle}/{name}' for vehicle in vehicle_ids for name in COMMAND_COLUMNS)
         self._data = array('d', bytes(8 * capacity * len(self.columns)))
         self._rows = np.frombuffer(self._data).reshape(capacity, len(self.columns))
         self.capacity = capacity
@@ -40,15 +42,19 @@ class CycleRows:
         return self.count == self.capacity
 
     def add(self, epoch: int, k: int, cycle: Cycle, busy_s: float, sleep_s: float,
-            commands: Sequence[DriverCommand]) -> None:
-        """Add one cycle, with the time it worked and slept [s]."""
+            commands: Sequence[DriverCommand | None]) -> None:
+        """
+        Add one cycle, with the time it worked and slept [s].
+
+        :param commands: of each vehicle; None of an AV that followed its plan, which gives NaN.
+        """
         row = self._rows[self.count]
         row[:12] = (epoch, cycle.n, k, cycle.ideal_s, cycle.actual_s, cycle.step_error_s,
                     cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s, cycle.resets,
                     cycle.dropped_s)
         place = len(TIMING_COLUMNS)
         for command in commands:
-            row[place:place + 4] = command
+            row[place:place + 4] = NO_COMMAND if command is None else command
             place += len(COMMAND_COLUMNS)
         self.count += 1
 
@@ -102,14 +108,16 @@ class CycleTable:
         return self.rows[:, [self._place[name] for name in
                              ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')]]
 
-    def commands(self, human_id: str) -> NDArray[np.float64]:
+    def commands(self, vehicle_id: str) -> NDArray[np.float64]:
         """
-        Give (R, 4) consumed throttle, brake, steering and reverse of a human.
+        Give (R, 4) consumed throttle, brake, steering and reverse of a vehicle.
 
-        :raises InputError: if the human took no part.
+        Rows are NaN where nobody drove it: those of an AV that followed its plan.
+
+        :raises InputError: if the vehicle took no part.
         """
-        names = [f'{human_id}/{name}' for name in COMMAND_COLUMNS]
+        names = [f'{vehicle_id}/{name}' for name in COMMAND_COLUMNS]
         if names[0] not in self._place:
-            raise InputError(f'{human_id} took no part', '/timing/cycle',
-                             'choose one of the humans of this recording')
+            raise InputError(f'{vehicle_id} took no part', '/timing/cycle',
+                             'choose one of the vehicles of this recording')
         return self.rows[:, [self._place[name] for name in names]]

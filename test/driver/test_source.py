@@ -47,8 +47,8 @@ def test_sources_are_read(text: str, spec: SourceSpec) -> None:
                                   'evdev:', 'Keys:x'])
 def test_other_sources_are_refused_with_the_forms(text: str) -> None:
     """The message lists what there is."""
-    with pytest.raises(InputError, match='auto, idle, evdev or evdev:NAME, keys:FILE, joy or '
-                                         'joy:FILE, replay:BAG'):
+    with pytest.raises(InputError, match='auto, cockpit, idle, evdev or evdev:NAME, '
+                                         'keys:FILE, joy or joy:FILE, replay:BAG'):
         parse_source(text)
 
 

@@ -21,10 +21,11 @@ def test_every_argument() -> None:
     request = parse_arguments([
         'games/mine.yaml', '--scenario', 'road.xml', '--driver', 'evdev:Logitech G29',
         '--planner', 'idm', '--planner', 'mine.py:Mine', '--duration', '20', '--rate', '200',
-        '--real-time-factor', '0.5', '--headless', '--realtime-priority', '--out', 'there'])
+        '--real-time-factor', '0.5', '--headless', '--port', '9000', '--listen', '0.0.0.0',
+        '--realtime-priority', '--out', 'there'])
     assert request == RunRequest(
         Path('games/mine.yaml'), Path('road.xml'), 'evdev:Logitech G29', ('idm', 'mine.py:Mine'),
-        20.0, 200.0, 0.5, True, True, Path('there'))
+        20.0, 200.0, 0.5, True, 9000, '0.0.0.0', realtime_priority=True, out=Path('there'))
 
 
 @pytest.mark.parametrize(('arguments', 'named'), [
@@ -36,6 +37,8 @@ def test_every_argument() -> None:
     (['--real-time-factor', '0.05'], 'not within 0.1 to 10'),
     (['--real-time-factor', '11'], 'not within 0.1 to 10'),
     (['--real-time-factor', 'nan'], 'not within'), (['--colour', 'red'], '--colour'),
+    (['--port', '0'], 'argument --port: 0 is no port'), (['--port', '65536'], 'no port'),
+    (['--port', 'x'], 'no port'), (['--port', '-1'], 'argument --port'),
     (['one.yaml', 'two.yaml'], 'two.yaml'), (['--headless=yes'], '--headless')])
 def test_bad_argument_is_refused(arguments: list[str], named: str) -> None:
     """One line that names the argument, exit code 2, no usage text in between."""

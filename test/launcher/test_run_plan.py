@@ -174,3 +174,20 @@ def test_bad_request_ends_before_anything_is_made(tmp_path: Path, request_: RunR
     assert caught.value.exit_code == 2
     assert '\n' not in str(caught.value)
     assert not (tmp_path / 'runs').exists()
+
+
+CROSSING = SCENARIOS / 'crossing.yaml'
+
+
+def test_planners_of_events_are_checked(tmp_path: Path) -> None:
+    """One that nobody knows, and one that would replace an external planner: before any start."""
+    text = CROSSING.read_text().replace('scenario: ', f'scenario: {SCENARIOS}/').replace(
+        'joy:crossing', f'joy:{SCENARIOS}/crossing')
+    game = tmp_path / 'game.yaml'
+    game.write_text(text.replace('{av: av0, planner: idm', '{av: av0, planner: x'))
+    with pytest.raises(InputError, match='there is no planner "x"'):
+        plan_run(RunRequest(game), noon)
+    with pytest.raises(InputError, match='event careful-planner: av0 has an external planner'):
+        plan_run(RunRequest(CROSSING, planners=('external',)), noon)
+    plan = plan_run(RunRequest(CROSSING), noon)
+    assert load_game(plan.game_file).events == load_game(CROSSING).events

@@ -34,7 +34,7 @@ def run(steady_graph: Run) -> Iterator[Run]:
     assert peer.call('/sim/reset').success
     peer.wait_until(lambda: peer.games[-1].epoch > epoch and peer.n > 50, 'n = 50 of a new epoch')
     peer.forget()
-    for topic in ('/vehicles/state', '/<av>/plan', '/<hv>/driver_command'):
+    for topic in ('/vehicles/state', '/<av>/plan', '/<v>/driver_command'):
         peer.wait_until(lambda topic=topic: peer.messages[topic], f'a message of {topic}')
     yield steady_graph
     for name in dict(launcher.started):

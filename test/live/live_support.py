@@ -50,17 +50,19 @@ class Launcher:
     :param arguments: of the launcher.
     :param out: folder of the run; None leaves the choice to the launcher.
     :param cwd: where it is started.
+    :param headless: without the cockpit.
     """
 
     def __init__(self, arguments: Sequence[str | Path], out: Path | None = None,
-                 cwd: Path = ROOT) -> None:
+                 cwd: Path = ROOT, *, headless: bool = True) -> None:
         self.domain = free_domain_id()
         self.out = out or cwd
-        words = [*map(str, arguments), *(['--out', str(out)] if out else [])]
+        words = [*map(str, arguments), *(['--out', str(out)] if out else []),
+                 *(['--headless'] if headless else [])]
         environment = {key: value for key, value in os.environ.items()
                        if not key.startswith('CRGAME_')}
         self._process = subprocess.Popen(
-            [sys.executable, '-u', '-m', 'crgame_ros.launcher.main', '--headless', *words],
+            [sys.executable, '-u', '-m', 'crgame_ros.launcher.main', *words],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             cwd=cwd, env=environment | {'ROS_DOMAIN_ID': str(self.domain)})
         self.lines: list[str] = []
@@ -92,6 +94,13 @@ class Launcher:
         """Name and process id of every node started so far, in order."""
         return [(found[1], int(found[2])) for line in list(self.lines)
                 if (found := _STARTED.fullmatch(line))]
+
+    @property
+    def page(self) -> str:
+        """Address of the cockpit, once it has been printed."""
+        self.wait_for(r'the cockpit is at http://')
+        return next(found[0] for line in reversed(list(self.lines))
+                    if (found := re.search(r'http://\S+', line)))
 
     def node(self, name: str) -> int:
         """Give the process id of a node, the latest if it was started again."""

@@ -28,7 +28,7 @@ joy:
   points: [[0.0, {THROTTLE}, 0.0, 0.0], [3600.0, {THROTTLE}, 0.0, 0.0]]
 """
 TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state', '/diagnostics',
-          ('/<hv>/driver_command', 'hv0'), ('/<av>/plan', 'av0'), ('/<av>/plan_request', 'av0'),
+          ('/<v>/driver_command', 'hv0'), ('/<av>/plan', 'av0'), ('/<av>/plan_request', 'av0'),
           ('/<v>/drivability', 'hv0'))
 
 

@@ -17,7 +17,7 @@ from crgame_ros.ros.messages import from_time, to_time
 
 STEPS_PER_TICK = 10
 TOPICS = ('/clock', '/scenario/game', '/scenario/xml', '/scenario/objects', '/seats',
-          '/timing/cycle', '/vehicles/state', '/diagnostics', ('/<hv>/driver_command', 'hv0'),
+          '/timing/cycle', '/vehicles/state', '/diagnostics', ('/<v>/driver_command', 'hv0'),
           ('/<av>/plan', 'av0'), ('/<av>/plan_request', 'av0'))
 OTHER_SCENARIO = 'ZAM_Roundabout-1_1_T-1.xml'
 # So long nothing may happen during a pause [s]; ten ticks would fit into it.
@@ -124,8 +124,8 @@ def test_reset_begins_a_new_epoch_and_bag(graph: tuple[Launcher, Peer], peer: Pe
 
 def test_messages_of_an_earlier_epoch_are_refused(peer: Peer) -> None:
     """A plan and a command with stamps from before the reset change nothing, and are counted."""
-    plan, command = peer.messages['/<av>/plan'][-1], peer.messages['/<hv>/driver_command'][-1]
-    commands = peer.publisher('/<hv>/driver_command', 'hv0')
+    plan, command = peer.messages['/<av>/plan'][-1], peer.messages['/<v>/driver_command'][-1]
+    commands = peer.publisher('/<v>/driver_command', 'hv0')
     plans = peer.publisher('/<av>/plan', 'av0')
     _reset(peer)
     peer.wait_until(lambda: peer.n > 10, 'n = 10')

@@ -46,7 +46,7 @@ def test_seat_lets_go_while_the_driver_is_frozen(run: Run) -> None:
     launcher.freeze('driver_node_hv0')
     peer.listen_for(0.1)
     last_n = peer.games[-1].scheduler.step_of_stamp(
-        from_time(peer.messages['/<hv>/driver_command'][-1].header.stamp))
+        from_time(peer.messages['/<v>/driver_command'][-1].header.stamp))
     peer.wait_until(lambda: peer.cycles().commands('hv0')[-1, 1] > 0.999 * GENTLE_BRAKE,
                     'the gentle brake')
     peer.wait_until(lambda: peer.statuses('sim_node: hv0 seat')

@@ -34,7 +34,7 @@ TABLE_I = {'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 't
            'real_time_ratio', 'time_efficiency', 'precision_ratio'}
 PLANS = {'accepted', 'fallback', 'refused', 'skipped', 'latency_ms'}
 NODES = {'sim_node', 'driver_node_hv0', 'planner_node_av0', 'recorder_node', 'drivability_node',
-         'timesync_node'}
+         'timesync_node', 'marker_node'}
 
 
 @pytest.fixture(scope='module')

@@ -20,7 +20,7 @@ from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, v
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.writer import BagWriter
 from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
-from crgame_ros.simulation.documents import game_document, objects_document
+from crgame_ros.simulation.documents import events_document, game_document, objects_document
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleRows
@@ -139,6 +139,8 @@ class RunRecorder:
                  '/scenario/objects': objects_document(setup.descriptions),
                  '/scenario/game': game_document(
                      setup, epoch=epoch, clock_offset_ns=offset_ns, real_time_factor=1.0)}
+        if setup.game.events:
+            texts['/scenario/events'] = events_document(epoch, result.fired)
         found = [(topic, 'std_msgs/msg/String', log_ns, self._samples.string(text))
                  for topic, text in texts.items()]
         names = [name for item in setup.vehicle_ids for name in vehicle_joint_names(item)]
@@ -151,10 +153,11 @@ class RunRecorder:
             stamp_ns = scheduler.stamp_ns(n)
             at_ns = log_ns + stamp_ns - offset_ns + 1_000_000
             if scheduler.is_tick(n):
-                objects = setup.obstacles.states_at(scheduler.k(n))
+                row = scheduler.k(n) - scheduler.k0
+                poses = result.object_poses[row]
                 found.append(('/traffic/objects', TRAJECTORY, at_ns, self.joints(
-                    stamp_ns, others, objects.poses, objects.velocities,
-                    np.full_like(objects.poses, np.nan))))
+                    stamp_ns, others, poses, result.object_velocities[row],
+                    np.full_like(poses, np.nan))))
             joints = np.array([vehicle_to_joints(VehicleState(*state)) for state in states])
             found.append(('/vehicles/state', TRAJECTORY, at_ns, self.joints(
                 stamp_ns, names, joints[:, 0], joints[:, 1], joints[:, 2])))

@@ -22,6 +22,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
 from crgame_ros.errors import InputError
+from crgame_ros.recording.mcap_file import McapFile
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.writer import BagWriter
@@ -93,6 +94,52 @@ def test_folders_of_rosbag2(tmp_path: Path, samples: Any, storage: StoragePlugin
         assert list(reader.messages(['/b'])) == [e for e in expected if e[0] == '/b']
         assert list(reader.messages(['/none'])) == []
         assert next(reader.decoded(['/b'])).message.data == 'message 1'
+
+
+@pytest.mark.parametrize('kind', ['ours', 'mcap', 'sqlite3'])
+def test_a_span_of_time(tmp_path: Path, samples: Any, kind: str) -> None:
+    """From the first limit on and before the second, of all topics or of one, in every storage."""
+    expected = record_ours(tmp_path / 'bag', samples) if kind == 'ours' else record_others(
+        tmp_path / 'bag', samples, StoragePlugin[kind.upper()], 9)
+    with BagReader(tmp_path / 'bag') as reader:
+        for start, end in ((1_005, 1_012), (None, 1_003), (1_027, None), (1_005, 1_005),
+                           (0, 900), (2_000, 3_000)):
+            inside = [e for e in expected if (start is None or e[2] >= start)
+                      and (end is None or e[2] < end)]
+            assert list(reader.messages(None, start, end)) == inside
+            assert [m.log_time_ns for m in reader.decoded(['/a'], start, end)] == [
+                e[2] for e in inside if e[0] == '/a']
+
+
+@pytest.mark.parametrize('cut', [False, True], ids=['whole', 'cut'])
+def test_only_what_may_hold_the_answer_is_read(tmp_path: Path, samples: Any, cut: bool,
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten chunks a second long, the rare topic in one of them: the others stay unread."""
+    times = iter(range(0, 10**13, 10**9))
+    with BagWriter(tmp_path / 'bag', now_ns=lambda: next(times)) as writer:
+        rare, often = (writer.add_topic(name, STRING, TopicQos(1)) for name in ('/rare', '/often'))
+        for i in range(10):
+            # Each look at the clock is a second later than the one before, so each writes a chunk.
+            writer.write(rare if i == 3 else often, samples.string('x'), 1_000 + i)
+    file = tmp_path / 'bag' / 'bag_0.mcap'
+    if cut:
+        (tmp_path / 'bag' / 'metadata.yaml').unlink()
+        whole = McapFile(file)
+        # Behind the last chunk, before its index.
+        last = whole.segments[-1]
+        file.write_bytes(file.read_bytes()[:last.offset + last.size])
+    read: list[int] = []
+    content = McapFile._content
+    with BagReader(tmp_path / 'bag') as reader:
+        assert reader.complete != cut
+        monkeypatch.setattr(McapFile, '_content', lambda self, segment: read.append(
+            segment.offset) or content(self, segment))
+        assert [m.log_time_ns for m in reader.messages(['/rare'])] == [1_003]
+        # What has no index of its own may hold anything.
+        assert len(read) == (2 if cut else 1)
+        read.clear()
+        assert [m.log_time_ns for m in reader.messages(None, 1_004, 1_006)] == [1_004, 1_005]
+        assert len(read) == 2
 
 
 @pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])

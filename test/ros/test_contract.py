@@ -57,9 +57,10 @@ def _walk(message: Any, path: str) -> Iterator[str]:
 def test_the_contract_is_whole() -> None:
     """What the graph cannot do without has a row, under the name that everybody knows."""
     assert {'/clock', '/scenario/xml', '/vehicles/state', '/<av>/plan_request', '/<av>/plan',
-            '/<hv>/driver_command', '/timing/cycle', '/diagnostics'} <= set(CONTRACT.topics)
+            '/<v>/driver_command', '/timing/cycle', '/diagnostics'} <= set(CONTRACT.topics)
     assert set(CONTRACT.services) == {
-        f'/sim/{name}' for name in ('start', 'pause', 'step', 'reset', 'stop')}
+        *(f'/sim/{name}' for name in ('start', 'pause', 'step', 'reset', 'stop')),
+        '/<av>/planner_run'}
 
 
 @pytest.mark.parametrize('topic', TOPICS, ids=_by_name)
@@ -89,10 +90,11 @@ def test_qos_is_what_rclpy_gets(topic: Topic) -> None:
 
 def test_slots_are_one_deep_and_documents_latched() -> None:
     """CRG algorithm 2 exchanges single slots; who joins late still learns what is played."""
-    for name in ('/<av>/plan_request', '/<av>/plan', '/<hv>/driver_command'):
+    for name in ('/<av>/plan_request', '/<av>/plan', '/<v>/driver_command'):
         assert CONTRACT.topic(name).qos.depth == 1
+    orders = ('/trigger', '/seats/order')
     for topic in TOPICS:
-        if topic.type_name == 'std_msgs/msg/String':
+        if topic.type_name == 'std_msgs/msg/String' and topic.name not in orders:
             assert topic.qos.durability == 'transient_local', topic.name
 
 

@@ -21,7 +21,7 @@ import yaml
 
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
-from crgame_ros.launcher.graph import node_specs
+from crgame_ros.launcher.node_specs import node_specs
 from crgame_ros.launcher.run_plan import plan_run
 from crgame_ros.recording.reader import BagReader
 

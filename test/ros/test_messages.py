@@ -246,12 +246,13 @@ def test_message_that_is_no_plan_is_refused(names: tuple[str, ...], times_ns: Se
     DriverCommand(), DriverCommand(1.0, 0.0, -1.0, True), DriverCommand(0.1, 0.7, 1.0 / 3.0)])
 def test_command_is_rounded_once(command: DriverCommand) -> None:
     """A Joy holds float32, to which every command is rounded: what comes is what was meant."""
-    message = _sent(to_joy(command, 1_230_000_000))
+    message = _sent(to_joy(command, 1_230_000_000, 'cockpit'))
+    assert message.header.frame_id == 'cockpit'
     assert from_time(message.header.stamp) == 1_230_000_000
     assert message.axes.typecode == 'f' and list(message.buttons) == [int(command.reverse)]
     read = from_joy(message, '/hv0/driver_command')
     assert read == command.rounded()
-    assert read == from_joy(_sent(to_joy(read, 0)), '/hv0/driver_command')
+    assert read == from_joy(_sent(to_joy(read, 0, 'game')), '/hv0/driver_command')
     assert read.throttle == float(np.float32(command.throttle))
 
 

@@ -53,6 +53,7 @@ REACTIONS = {
     ('two_avs', 'av0'): Reaction(8.0, 1.0, (6.0, 18.0)),
     ('two_avs', 'av1'): Reaction(6.0, 3.0, (30.0, 60.0)),
     ('traffic', 'av0'): Reaction(6.0, 2.0, (1.9, 5.0)),
+    ('crossing', 'av0'): Reaction(3.0, 0.0, (12.0, 25.0)),
 }
 
 
@@ -136,7 +137,7 @@ def test_scripts_survive_an_uneven_clock(path: Path) -> None:
     The intervals still add up to n dt, as the time controller's carry has it. In the middle of
     the narrowest lane the vehicle has (3.5 m - 1.61 m) / 2 = 0.94 m to either side.
     """
-    setup = build_setup(replace(load_game(path), avs=()))
+    setup = build_setup(replace(load_game(path), avs=(), events=()))
     steps = setup.scheduler.steps_for(20.0)
     random = np.random.default_rng(0)
     late = np.abs(random.normal(0.0, 1e-3, steps))

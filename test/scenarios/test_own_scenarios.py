@@ -130,13 +130,14 @@ def test_neighbours_share_a_bound(opened: Opened) -> None:
 
 
 def test_every_lane_has_a_speed_limit(opened: Opened) -> None:
-    """Limits are written in m/s, as CommonRoad has it: 30 to 100 km/h; turns may have none."""
+    """Limits are in m/s, as CommonRoad has it: 30 to 100 km/h; turns and crosswalks have none."""
     network = opened[0].lanelet_network
     for lanelet in network.lanelets:
         limits = [float(element.additional_values[0]) for id_ in lanelet.traffic_signs
                   for element in network.find_traffic_sign_by_id(id_).traffic_sign_elements
                   if element.traffic_sign_element_id.name == 'MAX_SPEED']
-        inside = {LaneletType.INTERSECTION, LaneletType.PARKING} & lanelet.lanelet_type
+        inside = {LaneletType.INTERSECTION, LaneletType.PARKING,
+                  LaneletType.CROSSWALK} & lanelet.lanelet_type
         assert limits or inside
         assert all(30 / 3.6 - 1e-3 < limit < 100 / 3.6 + 1e-3 for limit in limits)
 

@@ -50,6 +50,16 @@ def test_commands_keep_their_bits() -> None:
         table.commands('hv2')
 
 
+def test_an_av_that_follows_its_plan_has_no_command() -> None:
+    """NaN in its four columns; the command of whoever takes it over otherwise."""
+    rows = CycleRows(('hv0', 'av0'), 2)
+    rows.add(0, 1, FIRST, 0.0, 0.0, (LEFT, None))
+    rows.add(0, 1, SECOND, 0.0, 0.0, (LEFT, BACK))
+    commands = CycleTable.from_message(','.join(rows.columns), rows.taken()).commands('av0')
+    assert np.isnan(commands[0]).all()
+    assert commands[1].tolist() == list(map(float, BACK))
+
+
 def test_rows_for_the_metrics() -> None:
     """Ideal and actual start, busy and dropped, in the order that the metrics take."""
     rows = filled()

@@ -1,0 +1,326 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The cockpit in a real browser: key to odometry, key to picture, script time, and what it costs.
+
+Needs Debian's chromium and chromium-driver. Keys go through the browser's input pipeline, times
+are those of the key event in the page, of the odometry's arrival at another process, and of the
+end of the first drawn frame that shows a state at least as late as that odometry.
+"""
+
+import argparse
+from collections.abc import Callable, Sequence
+import json
+from pathlib import Path
+import random
+import socket
+import statistics
+import tempfile
+import threading
+import time
+from typing import Any
+from urllib.parse import urlsplit
+
+from live_graph import LiveGraph, RemoteControl
+import numpy as np
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+import websocket
+
+from crgame_ros.paths import scenarios_directory
+
+FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync',
+         '--window-size=1280,720')
+LOGGER = """
+window.keyTimes = []; window.frameTimes = [];
+addEventListener('keydown', e => keyTimes.push(performance.timeOrigin + e.timeStamp), true);
+(function log() {
+  const shown = window.crgame.world.shown;
+  if (shown) frameTimes.push([performance.timeOrigin + performance.now(), shown.t]);
+  if (frameTimes.length > 2000) frameTimes.splice(0, 1000);
+  requestAnimationFrame(log);
+})();
+"""
+KEYS = {1.0: ('KeyA', 'a', 65), -1.0: ('KeyD', 'd', 68)}
+LIMIT_S = 1.0
+
+
+class Browser:
+    """
+    A real Chromium that looks at the page.
+
+    :param page: its address.
+    """
+
+    def __init__(self, page: str) -> None:
+        options = webdriver.ChromeOptions()
+        for flag in FLAGS:
+            options.add_argument(flag)
+        options.binary_location = '/usr/bin/chromium'
+        self.driver = webdriver.Chrome(options=options,
+                                       service=Service('/usr/bin/chromedriver'))
+        self.driver.get(page)
+        self.wait_for('return !!(window.crgame && crgame.store.scene && crgame.world.shown)')
+
+    def wait_for(self, script: str, limit_s: float = 30.0) -> None:
+        """Wait until a script gives something true."""
+        until_s = time.monotonic() + limit_s
+        while not self.driver.execute_script(script):
+            if time.monotonic() > until_s:
+                raise SystemExit(f'the page did not come so far: {script}')
+            time.sleep(0.05)
+
+    def drive(self, seat: str) -> None:
+        """Take a seat."""
+        self.driver.execute_script(
+            f"crgame.connection.request({{type: 'claim', seat: '{seat}'}})")
+        self.wait_for(f"return crgame.store.seats.seats?.{seat}?.source === 'cockpit'"
+                      f" || crgame.store.seats.{seat}?.source === 'cockpit'")
+
+    def key(self, direction: float, down: bool) -> None:
+        """Press or release a steering key."""
+        code, key, number = KEYS[direction]
+        self.driver.execute_cdp_cmd('Input.dispatchKeyEvent', {
+            'type': 'keyDown' if down else 'keyUp', 'code': code, 'key': key,
+            'windowsVirtualKeyCode': number})
+
+    def close(self) -> None:
+        """End the browser."""
+        self.driver.quit()
+
+
+class OdometryProbe:
+    """Notes when the odometry of each step arrives and how its front wheels turn."""
+
+    def __init__(self) -> None:
+        from nav_msgs.msg import Odometry
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from sensor_msgs.msg import JointState
+        self._node = rclpy.create_node('odometry_probe')
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._arrived: dict[int, float] = {}
+        self._rates: dict[int, float] = {}
+        self._kept = [
+            self._node.create_subscription(Odometry, '/hv0/odom', self._on_odom, 10),
+            self._node.create_subscription(JointState, '/hv0/joint_states', self._on_joint, 10)]
+
+    def _on_odom(self, message: Any) -> None:
+        stamp = message.header.stamp
+        self._arrived[stamp.sec * 10**9 + stamp.nanosec] = time.time()
+
+    def _on_joint(self, message: Any) -> None:
+        stamp = message.header.stamp
+        self._rates[stamp.sec * 10**9 + stamp.nanosec] = message.velocity[0]
+
+    def listen(self, seconds: float) -> None:
+        """Take what comes for a while, and forget it."""
+        until_s = time.monotonic() + seconds
+        while time.monotonic() < until_s:
+            self._executor.spin_once(timeout_sec=0.02)
+        self._arrived.clear()
+        self._rates.clear()
+
+    def wait_for_turn(self, direction: float) -> tuple[int, float] | None:
+        """Give stamp [ns] and arrival [s since 1970] of the first step that turns so."""
+        until_s = time.monotonic() + LIMIT_S
+        while time.monotonic() < until_s:
+            self._executor.spin_once(timeout_sec=0.05)
+            for stamp in sorted(self._rates):
+                if self._rates[stamp] * direction > 0.0 and stamp in self._arrived:
+                    return stamp, self._arrived[stamp]
+        return None
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._node.destroy_node()
+
+
+def measure_keys(browser: Browser, probe: OdometryProbe, trials: int,
+                 offset_s: float) -> tuple[list[float], list[float]]:
+    """Press steering keys at random times; give latencies to odometry and to the picture [ms]."""
+    draw = random.Random(7)
+    odometry, picture = [], []
+    for trial in range(trials):
+        direction = 1.0 if trial % 2 else -1.0
+        browser.driver.execute_script('keyTimes.length = 0; frameTimes.length = 0;')
+        probe.listen(0.3 + 0.2 * draw.random())
+        browser.key(direction, True)
+        found = probe.wait_for_turn(direction)
+        probe.listen(0.15)
+        browser.key(direction, False)
+        keys = browser.driver.execute_script('return keyTimes')
+        frames = browser.driver.execute_script('return frameTimes')
+        if found is None or not keys:
+            print(f'trial {trial}: nothing came', flush=True)
+            continue
+        stamp, arrived_s = found
+        odometry.append(arrived_s * 1e3 - keys[0])
+        shown = [at for at, t in frames if at > keys[0] and t >= stamp * 1e-9 - offset_s - 1e-6]
+        if shown:
+            picture.append(shown[0] - keys[0])
+    return odometry, picture
+
+
+def latency_run(folder: Path, trials: int) -> None:
+    """Measure from the key to odometry and picture."""
+    graph = LiveGraph(folder / 'keys', [
+        str(scenarios_directory() / 'cut_in.yaml'), '--driver', 'idle', '--duration', '100000',
+        '--port', str(free_port())], headless=False)
+    control = RemoteControl()
+    browser = None
+    try:
+        control.wait_until_running()
+        control.deafen()
+        browser = Browser(graph.page())
+        browser.drive('hv0')
+        browser.driver.execute_script(LOGGER)
+        offset_s = browser.driver.execute_script(
+            'return crgame.store.scene.time.clock_offset_s')
+        probe = OdometryProbe()
+        probe.listen(1.0)
+        odometry, picture = measure_keys(browser, probe, trials, offset_s)
+        probe.close()
+        report('key to odometry [ms]', odometry, 'p50 <= 15, p99 <= 30')
+        report('key to picture [ms]', picture, 'p50 <= 50')
+    finally:
+        if browser is not None:
+            browser.close()
+        control.close()
+        graph.kill()
+
+
+def report(name: str, values: Sequence[float], wanted: str) -> None:
+    """Print quantiles of a series."""
+    p50, p99 = np.percentile(values, (50, 99))
+    print(f'{name:34} p50 {p50:7.2f}  p99 {p99:7.2f}  worst {max(values):7.2f}  '
+          f'n {len(values):4}  wanted: {wanted}', flush=True)
+
+
+def script_run(folder: Path, scenario: Path, seconds: float) -> None:
+    """Measure the script time of a frame, following a vehicle and with the whole map in view."""
+    graph = LiveGraph(folder / 'script', [
+        '--scenario', str(scenario), '--driver', 'idle', '--duration', '100000', '--port',
+        str(free_port())], headless=False)
+    browser = None
+    try:
+        browser = Browser(graph.page())
+        size = browser.driver.execute_script(
+            'return [crgame.store.scene.lanelets.length, crgame.store.scene.objects.length]')
+        for view, script in (('following', 'crgame.world.follow(crgame.store.scene.vehicles[0].id'
+                              ', true)'), ('whole map', 'crgame.world.fit()')):
+            browser.driver.execute_script(script)
+            time.sleep(2.0)
+            before = browser.driver.execute_script('return crgame.world.stats.frames')
+            time.sleep(seconds)
+            stats = browser.driver.execute_script(
+                'return [crgame.world.stats.frames, Array.from(crgame.world.stats.frame_ms)]')
+            count = min(stats[0] - before, len(stats[1]))
+            times = [value for value in stats[1] if value > 0.0][-count:]
+            report(f'script a frame, {view} [ms]', times, '<= 8')
+            print(f'{"":34} {(stats[0] - before) / seconds:.1f} frames/s; {scenario.stem}: '
+                  f'{size[0]} lanelets, {size[1]} objects', flush=True)
+    finally:
+        if browser is not None:
+            browser.close()
+        graph.kill()
+
+
+class Listener:
+    """A WebSocket client; one that never reads leaves everything in its socket's buffer."""
+
+    def __init__(self, page: str, reads: bool) -> None:
+        netloc = urlsplit(page).netloc
+        self._socket = websocket.create_connection(
+            f'ws://{netloc}/ws', origin=f'http://{netloc}', timeout=60)
+        if reads:
+            threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        try:
+            while True:
+                self._socket.recv_data()
+        except (OSError, websocket.WebSocketException):
+            return
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+
+def timing_block(folder: Path, seconds: float, watched: bool) -> dict[str, Any]:
+    """Run the game once, with viewers or without a cockpit; give its timing report."""
+    game = str(scenarios_directory() / 'cut_in.yaml')
+    graph = LiveGraph(folder, [game, '--duration', '100000', '--port', str(free_port())],
+                      headless=not watched)
+    closers: list[Callable[[], None]] = []
+    try:
+        if watched:
+            page = graph.page()
+            closers.append(Browser(page).close)
+            closers += [Listener(page, reads).close for reads in (True, False)]
+        control = RemoteControl()
+        control.wait_until_running()
+        control.call('reset')
+        control.deafen()
+        time.sleep(seconds + 2.0)
+        control.close()
+        graph.stop()
+        reports = sorted(folder.glob('timing*.json'))
+        result: dict[str, Any] = json.loads(reports[-1].read_text())
+        return result
+    finally:
+        for close in closers:
+            close()
+        graph.kill()
+
+
+def timing_run(folder: Path, runs: int, seconds: float) -> None:
+    """Compare table I with viewers and without, in turns."""
+    rows: dict[bool, list[dict[str, Any]]] = {False: [], True: []}
+    for run in range(runs):
+        for watched in (False, True):
+            print(f'run {run + 1} of {runs}, {"watched" if watched else "headless"}: '
+                  f'{seconds:.0f} s …', flush=True)
+            rows[watched].append(timing_block(folder / f'timing{run}{watched}', seconds, watched))
+    print(f'\n{"":28}{"headless":>12}{"(worst)":>12}{"watched":>12}{"(worst)":>12}')
+    for key in ('mean_step_error_ms', 'max_cumulative_error_ms', 'final_error_ms',
+                'timeout_ratio', 'busy_p50_ms', 'busy_p99_ms'):
+        cells = ''
+        for watched in (False, True):
+            values = [float(item[key]) for item in rows[watched]]
+            cells += f'{statistics.median(values):12.4f}{max(values):12.4f}'
+        print(f'{key:28}{cells}', flush=True)
+
+
+def free_port() -> int:
+    """Find a port that nobody uses now."""
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
+
+
+def main() -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--trials', type=int, default=100, help='key presses')
+    parser.add_argument('--scenario', type=Path, default=scenarios_directory() /
+                        'ZAM_Traffic-1_1_T-1.xml', help='a large one, for the script time')
+    parser.add_argument('--runs', type=int, default=3, help='of each kind, for the timing')
+    parser.add_argument('--seconds', type=float, default=30.0, help='of each timing run')
+    parser.add_argument('--only', choices=('keys', 'script', 'timing'))
+    values = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if values.only in (None, 'keys'):
+            latency_run(folder, values.trials)
+        if values.only in (None, 'script'):
+            script_run(folder, values.scenario, 10.0)
+        if values.only in (None, 'timing'):
+            timing_run(folder, values.runs, values.seconds)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who may talk to the server: the token, the Host header and the Origin header."""
+
+from dataclasses import dataclass, replace
+import hmac
+import ipaddress
+import secrets
+from urllib.parse import urlsplit
+
+from crgame_ros.errors import InputError
+
+TOKEN_BYTES = 24
+_LOOPBACK_NAMES = ('localhost', '127.0.0.1', '[::1]')
+
+
+@dataclass(frozen=True)
+class Access:
+    """
+    Where the server listens and what it asks of those who come.
+
+    :param host: address or name to listen on.
+    :param port: the port; `listen` may move to a later one.
+    :param token: secret that everybody has to show; None lets everybody on this machine in.
+    :raises InputError: if there is no token where other machines can connect, or it is short.
+    """
+
+    host: str
+    port: int
+    token: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse to be open to other machines without a token."""
+        if self.token is None and not is_loopback(self.host):
+            raise InputError('is open to other machines without a token', f'address {self.host}',
+                             'make it with Access.guarded')
+        if self.token is not None and len(self.token) < 16:
+            raise InputError('has fewer than 16 characters', 'token', 'make it at random')
+
+    @classmethod
+    def guarded(cls, host: str, port: int) -> 'Access':
+        """Ask nothing of this machine, and a new random token where others can connect."""
+        return cls(host, port, None if is_loopback(host) else new_token())
+
+    def at_port(self, port: int) -> 'Access':
+        """Give the same at another port."""
+        return replace(self, port=port)
+
+    @property
+    def url(self) -> str:
+        """The address to open in a browser, with the token."""
+        host = f'[{self.host}]' if ':' in self.host else self.host
+        query = f'?token={self.token}' if self.token is not None else ''
+        return f'http://{host}:{self.port}/{query}'
+
+    def allows_host(self, host: str, port: int) -> bool:
+        """
+        Tell whether a Host header names this server.
+
+        A page of another site whose name was made to point here (DNS rebinding) sends that name.
+
+        :param host: the header.
+        :param port: at which the request arrived.
+        """
+        if self.token is not None:
+            # Whoever knows the token was told the address: it may be any name of this machine.
+            return bool(host)
+        name, _, given = host.lower().rpartition(':') if _has_port(host) else (
+            host.lower(), '', '80')
+        listened = f'[{self.host}]' if ':' in self.host else self.host.lower()
+        return given == str(port) and name in (*_LOOPBACK_NAMES, listened)
+
+    def knows(self, token: str | None) -> bool:
+        """Tell whether a token is the right one, in a time that does not depend on it."""
+        if self.token is None:
+            return True
+        given = (token or '').encode('utf-8', 'surrogatepass')
+        return hmac.compare_digest(given, self.token.encode())
+
+
+def is_own_origin(origin: str | None, host: str) -> bool:
+    """
+    Tell whether a request comes from a page of this server, or from no page at all.
+
+    :param origin: the Origin header; None if there is none: a program, no browser.
+    :param host: the Host header.
+    """
+    if origin is None:
+        return True
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return False
+    return (parts.scheme in ('http', 'https') and parts.netloc.lower() == host.lower()
+            and origin == f'{parts.scheme}://{parts.netloc}')
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether only this machine can connect to an address."""
+    if host == 'localhost':
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def new_token() -> str:
+    """Make a random token."""
+    return secrets.token_urlsafe(TOKEN_BYTES)
+
+
+def _has_port(host: str) -> bool:
+    return ':' in host.rpartition(']')[2]

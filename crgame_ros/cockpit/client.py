@@ -1,0 +1,197 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One WebSocket client: what waits to be sent to it, how fast it may talk, when it is dropped."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from aiohttp import WSMsgType
+
+MAX_WAITING = 256
+MAX_WAITING_BYTES = 16 * 2 ** 20
+STALL_S = 5.0
+STATE = 'state'
+
+
+class Socket(Protocol):
+    """What a client needs of `aiohttp.web.WebSocketResponse`."""
+
+    async def send_frame(self, message: bytes, opcode: WSMsgType) -> None:
+        """Send one message, and wait until the operating system has taken it."""
+
+
+@dataclass
+class _Text:
+    kind: str
+    data: bytes
+
+
+class TokenBucket:
+    """
+    A limit on how often something may happen.
+
+    :param rate: sustained [1/s].
+    :param burst: at once.
+    """
+
+    def __init__(self, rate: float, burst: float) -> None:
+        self._rate = rate
+        self._burst = burst
+        self._level = burst
+        self._filled_s: float | None = None
+
+    def take(self, now_s: float) -> bool:
+        """Take one token; tell whether there was one."""
+        if self._filled_s is not None:
+            gained = (now_s - self._filled_s) * self._rate
+            self._level = min(self._burst, self._level + gained)
+        self._filled_s = now_s
+        if self._level < 1.0:
+            return False
+        self._level -= 1.0
+        return True
+
+
+class Client:
+    """
+    One page that is open somewhere.
+
+    Texts are sent in order. Of frames only the newest of each slot is kept, so that a slow client
+    sees less, never later. Nothing here waits but `write`, which is a task of its own.
+
+    :param client_id: c1, c2, …
+    :param name: of the person, for others to read.
+    :param abort: ends the connection without waiting for anything.
+    :param unsent: gives the bytes that the connection holds back.
+    """
+
+    def __init__(self, client_id: str, name: str, abort: Callable[[], None],
+                 unsent: Callable[[], int]) -> None:
+        self.id = client_id
+        self.name = name
+        # Set by the backend: whether the client holds a seat.
+        self.drives = False
+        self.wants_predictions = False
+        # Least time between two frames of the slot 'state' [s]; 0 sends each.
+        self.state_period_s = 0.0
+        self.dropped = ''
+        self._abort = abort
+        self._unsent = unsent
+        self._texts: deque[_Text] = deque()
+        self._documents: dict[str, _Text] = {}
+        self._event_bytes = 0
+        self._frames: dict[str, bytes] = {}
+        self._state_due_s = 0.0
+        self._wake = asyncio.Event()
+        self._timer: asyncio.TimerHandle | None = None
+        self._sent = 0
+        # Messages sent, bytes unsent, and since when neither has moved [s].
+        self._stall: tuple[int, int, float] | None = None
+
+    @property
+    def waiting(self) -> int:
+        """How many messages wait to be sent."""
+        return len(self._texts) + len(self._frames)
+
+    def put_document(self, kind: str, text: bytes) -> None:
+        """Queue a document; an older one of its kind that is still unsent is replaced."""
+        unsent = self._documents.get(kind)
+        if unsent is not None:
+            unsent.data = text
+            return
+        self._documents[kind] = _Text(kind, text)
+        self._put(self._documents[kind])
+
+    def put_event(self, text: bytes) -> None:
+        """Queue an event."""
+        self._event_bytes += len(text)
+        self._put(_Text('', text))
+
+    def put_frame(self, slot: str, frame: bytes) -> None:
+        """Keep a frame until it is sent or a newer one of its slot comes."""
+        if self.dropped:
+            return
+        self._frames[slot] = frame
+        self._wake.set()
+
+    def drop(self, reason: str) -> None:
+        """End the connection at once, and forget what waits."""
+        if self.dropped:
+            return
+        self.forget(reason)
+        self._abort()
+
+    def forget(self, reason: str) -> None:
+        """Let go of everything that waits to be sent, and take nothing more."""
+        self.dropped = self.dropped or reason
+        self._texts.clear()
+        self._documents.clear()
+        self._frames.clear()
+        self._event_bytes = 0
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def check_stall(self, now_s: float) -> None:
+        """Drop the client if its connection has taken nothing for `STALL_S`."""
+        unsent = self._unsent()
+        if unsent == 0:
+            self._stall = None
+        # More bytes are a ping: only fewer are progress.
+        elif self._stall is None or self._stall[0] != self._sent or unsent < self._stall[1]:
+            self._stall = (self._sent, unsent, now_s)
+        elif now_s - self._stall[2] >= STALL_S:
+            self.drop('reads nothing')
+
+    async def write(self, socket: Socket) -> None:
+        """Send what waits, for ever: texts first, then the frames."""
+        loop = asyncio.get_running_loop()
+        while True:
+            self._wake.clear()
+            while self._texts:
+                text = self._texts.popleft()
+                if text.kind:
+                    del self._documents[text.kind]
+                else:
+                    self._event_bytes -= len(text.data)
+                await self._send(socket, text.data, WSMsgType.TEXT)
+            slot = self._next_slot(loop)
+            if slot is not None:
+                await self._send(socket, self._frames.pop(slot), WSMsgType.BINARY)
+            elif not self._texts:
+                await self._wake.wait()
+
+    async def _send(self, socket: Socket, message: bytes, opcode: WSMsgType) -> None:
+        await socket.send_frame(message, opcode)
+        self._sent += 1
+
+    def _put(self, text: _Text) -> None:
+        if self.dropped:
+            return
+        self._texts.append(text)
+        # Documents are at most one of each kind, and shared with the hub.
+        if len(self._texts) > MAX_WAITING or self._event_bytes > MAX_WAITING_BYTES:
+            self.drop('reads too slowly')
+        self._wake.set()
+
+    def _next_slot(self, loop: asyncio.AbstractEventLoop) -> str | None:
+        """Choose the frame to send: the longest waiting, unless its time has not come."""
+        for slot in self._frames:
+            if slot != STATE or self.state_period_s <= 0.0:
+                return slot
+            now_s = loop.time()
+            if now_s >= self._state_due_s:
+                # From the time it was due: the mean rate is the one asked for.
+                self._state_due_s = max(self._state_due_s, now_s - self.state_period_s)
+                self._state_due_s += self.state_period_s
+                return slot
+            if self._timer is None:
+                self._timer = loop.call_at(self._state_due_s, self._due)
+        return None
+
+    def _due(self) -> None:
+        self._timer = None
+        self._wake.set()

@@ -1,0 +1,113 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The binary frames that carry motion to the page: little-endian float64 arrays."""
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crgame_ros.errors import InputError
+
+STATE_COLUMNS = 12
+OBJECT_COLUMNS = 6
+PLAN_COLUMNS = 5
+PREDICTION_COLUMNS = 3
+
+_FLOAT = np.dtype('<f8')
+
+
+class FrameKind(IntEnum):
+    """What a frame carries: its first number."""
+
+    STATE = 1
+    OBJECTS = 2
+    PLAN = 3
+    PREDICTION = 4
+
+
+def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> bytes:
+    """
+    Write where the driven vehicles are.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param vehicles: (V, 12) x, y [m], yaw [rad] of the rear axle, speed [m/s], steering angle
+        [rad], acceleration [m/s^2], yaw rate, steering rate [rad/s], then the command in force:
+        throttle, brake, steering, reverse; NaN where there is none.
+    :raises InputError: if the array has another width.
+    """
+    return _rows(FrameKind.STATE, epoch, n, k, t, (), vehicles, STATE_COLUMNS)
+
+
+def encode_objects(epoch: int, n: int, k: int, t: float, objects: ArrayLike) -> bytes:
+    """
+    Write where all other objects are.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param objects: (M, 6) centre x, y [m], yaw [rad] and the velocities that lead to the pose at
+        k + 1 [m/s, m/s, rad/s]; NaN where absent.
+    :raises InputError: if the array has another width.
+    """
+    return _rows(FrameKind.OBJECTS, epoch, n, k, t, (), objects, OBJECT_COLUMNS)
+
+
+def encode_plan(epoch: int, n: int, k: int, t: float, vehicle: int, points: ArrayLike) -> bytes:
+    """
+    Write the plan of an AV.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param vehicle: its index among the scene's vehicles.
+    :param points: (P, 5) rear-axle x, y [m], yaw [rad], speed [m/s], time after `t` [s].
+    :raises InputError: if the array has another width.
+    """
+    return _rows(FrameKind.PLAN, epoch, n, k, t, (vehicle,), points, PLAN_COLUMNS)
+
+
+def encode_prediction(epoch: int, n: int, k: int, t: float, av: int, columns: Sequence[int],
+                      points: ArrayLike) -> bytes:
+    """
+    Write what an AV is told about the future of others.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param av: index of the asking AV among the scene's vehicles.
+    :param columns: (Q) who is predicted: 0 to V - 1 are vehicles, objects follow from V.
+    :param points: (Q, P, 3) x, y [m], yaw [rad], one scenario time step apart, from `t`.
+    :raises InputError: if the arrays do not fit.
+    """
+    futures = np.asarray(points, dtype=_FLOAT)
+    if futures.shape[2:] != (PREDICTION_COLUMNS,) or len(futures) != len(columns):
+        raise InputError(f'predictions of shape {futures.shape} for {len(columns)} objects',
+                         'cockpit frame', f'give (Q, P, {PREDICTION_COLUMNS})')
+    count, length = futures.shape[:2]
+    frame = np.empty(8 + count * (1 + length * PREDICTION_COLUMNS), _FLOAT)
+    frame[:8] = (FrameKind.PREDICTION, epoch, n, k, t, av, length, count)
+    body = frame[8:].reshape(count, -1)
+    body[:, 0] = columns
+    body[:, 1:] = futures.reshape(count, -1)
+    return frame.tobytes()
+
+
+def _rows(kind: FrameKind, epoch: int, n: int, k: int, t: float, extra: tuple[int, ...],
+          rows: ArrayLike, width: int) -> bytes:
+    table: NDArray[np.float64] = np.asarray(rows, dtype=_FLOAT)
+    if table.ndim != 2 or table.shape[1] != width:
+        raise InputError(f'{kind.name} of shape {table.shape}', 'cockpit frame',
+                         f'give (any, {width})')
+    start = 6 + len(extra)
+    frame = np.empty(start + table.size, _FLOAT)
+    frame[:start] = (kind, epoch, n, k, t, *extra, len(table))
+    frame[start:] = table.ravel()
+    return frame.tobytes()

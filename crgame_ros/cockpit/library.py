@@ -1,0 +1,237 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The scenarios and games that the page offers: folders of this machine, and uploads."""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import hashlib
+import json
+import os
+from pathlib import Path
+import re
+import secrets
+from typing import Any, Literal
+
+import yaml
+
+from crgame_ros.cockpit.messages import clean_text
+from crgame_ros.cockpit.scenario_reader import ScenarioReader
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.planner.registry import planner_names
+from crgame_ros.scenario import guard
+from crgame_ros.scenario.game_file import read_yaml
+
+DRIVERS = ('auto', 'cockpit', 'idle')
+UPLOADS = 'Uploads'
+MAX_ENTRIES = 1000
+MAX_UPLOADS = 64
+MAX_UPLOADS_BYTES = 512 * 2 ** 20
+MAX_TITLE = 80
+
+_BENCHMARK = re.compile(rb'benchmarkID\s*=\s*["\']([^"\'<&]{1,80})["\']')
+_TIMELINES = ('.keys.yaml', '.joy.yaml')
+
+
+@dataclass(frozen=True)
+class Entry:
+    """
+    Something that can be chosen.
+
+    :param id: by which the page names it; says nothing of where it is.
+    :param kind: a game file, a scenario of a folder, or an upload.
+    :param name: of the file.
+    :param title: for people.
+    :param path: never shown.
+    """
+
+    id: str
+    kind: Literal['game', 'scenario', 'upload']
+    name: str
+    title: str
+    path: Path
+
+
+@dataclass(frozen=True)
+class Choice:
+    """
+    What somebody wants to run.
+
+    :param id: of an entry.
+    :param drivers: by human.
+    :param planners: by AV.
+    """
+
+    id: str
+    drivers: Mapping[str, str]
+    planners: Mapping[str, str]
+
+
+class Library:
+    """
+    Offers the games and scenarios of some folders, and takes uploads.
+
+    :param folders: (name, path) of each; its subfolders are left out.
+    :param uploads: where uploads are kept; made when the first comes.
+    :param games: where the games that are loaded are written.
+    :param reader: runs what takes long.
+    :param max_upload_bytes: size of the largest upload.
+    """
+
+    def __init__(self, folders: Sequence[tuple[str, Path]], uploads: Path, games: Path, *,
+                 reader: ScenarioReader | None = None,
+                 max_upload_bytes: int = guard.MAX_BYTES) -> None:
+        self.max_upload_bytes = max_upload_bytes
+        self._folders = tuple((name, path.resolve()) for name, path in folders)
+        self._uploads = uploads.resolve()
+        self._games = games.resolve()
+        self._reader = reader if reader is not None else ScenarioReader()
+        self._entries: dict[str, Entry] = {}
+        self._titles: dict[str, str] = {}
+        self._uploading = asyncio.Lock()
+
+    async def listing(self) -> dict[str, Any]:
+        """Give the answer of /api/scenarios, as the folders are now."""
+        folders = await asyncio.to_thread(self._list)
+        self._entries = {entry.id: entry for _, entries in folders for entry in entries}
+        return {
+            'folders': [
+                {'name': name, 'entries': [
+                    {'id': entry.id, 'kind': entry.kind, 'name': entry.name,
+                     'title': entry.title} for entry in entries]}
+                for name, entries in folders],
+            'planners': list(planner_names()), 'drivers': list(DRIVERS)}
+
+    async def preview(self, entry_id: str) -> bytes:
+        """
+        Show how an entry begins.
+
+        :return: the answer of /api/preview as JSON.
+        :raises CrgameError: if there is no such entry, or it cannot be used.
+        """
+        entry = await self._entry(entry_id)
+        return await self._reader.run('preview', path=str(entry.path), kind=entry.kind)
+
+    async def upload(self, data: bytes, title: str) -> str:
+        """
+        Keep a scenario that somebody sent, if it is one.
+
+        :param data: the file.
+        :param title: what the sender calls it; empty takes its benchmark id.
+        :return: its id.
+        :raises CrgameError: if it cannot be used, or too many are kept.
+        """
+        name = hashlib.sha256(data).hexdigest()[:16]
+        path = self._uploads / f'{name}.xml'
+        async with self._uploading:
+            part = await asyncio.to_thread(self._store_part, data, path)
+            try:
+                checked = json.loads(await self._reader.run('check', path=str(part)))
+                part.replace(path)
+            finally:
+                part.unlink(missing_ok=True)
+        title = clean_text(title, MAX_TITLE) or checked['title']
+        entry = Entry(_entry_id(path), 'upload', path.name, title, path)
+        self._titles[entry.id] = title
+        self._entries[entry.id] = entry
+        return entry.id
+
+    async def write_game(self, choice: Choice) -> Path:
+        """
+        Write the game file of a choice.
+
+        :raises CrgameError: if it is not allowed, or the game cannot be used.
+        """
+        entry = await self._entry(choice.id)
+        answer = await self._reader.run(
+            'compose', path=str(entry.path), kind=entry.kind, drivers=dict(choice.drivers),
+            planners=dict(choice.planners), allowed_drivers=list(DRIVERS),
+            allowed_planners=list(planner_names()))
+        text = json.loads(answer)['text'].encode()
+        return await asyncio.to_thread(self._store_game, text)
+
+    async def close(self) -> None:
+        """End what still runs."""
+        await self._reader.close()
+
+    async def _entry(self, entry_id: str) -> Entry:
+        if entry_id not in self._entries:
+            await self.listing()
+        try:
+            return self._entries[entry_id]
+        except KeyError:
+            raise InputError('there is no such scenario', 'id', 'load the page again') from None
+
+    def _list(self) -> list[tuple[str, list[Entry]]]:
+        folders = [(name, self._entries_in(path, 'scenario')) for name, path in self._folders]
+        return [*folders, (UPLOADS, self._entries_in(self._uploads, 'upload'))]
+
+    def _entries_in(self, folder: Path, kind: Literal['scenario', 'upload']) -> list[Entry]:
+        try:
+            paths = sorted(path for path in folder.iterdir() if path.is_file())[:MAX_ENTRIES]
+        except OSError:
+            # Not made yet, or taken away: nothing to offer.
+            return []
+        entries = []
+        for path in paths:
+            entry_id = _entry_id(path)
+            if path.suffix == '.xml':
+                title = self._titles.get(entry_id) or _scenario_title(path)
+                entries.append(Entry(entry_id, kind, path.name, title, path))
+            elif kind == 'scenario' and path.suffix == '.yaml':
+                title = '' if path.name.endswith(_TIMELINES) else _game_title(path)
+                if title:
+                    entries.append(Entry(entry_id, 'game', path.name, title, path))
+        return entries
+
+    def _store_part(self, data: bytes, path: Path) -> Path:
+        try:
+            self._uploads.mkdir(parents=True, exist_ok=True)
+            kept = [other.stat().st_size for other in self._uploads.glob('*.xml')
+                    if other != path]
+            if len(kept) >= MAX_UPLOADS or sum(kept) + len(data) > MAX_UPLOADS_BYTES:
+                raise CrgameError(f'{len(kept)} uploads are kept already; remove some from the '
+                                  'folder of uploads')
+            part = path.with_name(f'{path.stem}.{secrets.token_hex(4)}.part')
+            part.write_bytes(data)
+        except OSError as error:
+            raise CrgameError(f'the upload cannot be kept ({error.strerror})') from error
+        return part
+
+    def _store_game(self, text: bytes) -> Path:
+        path = self._games / f'{hashlib.sha256(text).hexdigest()[:16]}.yaml'
+        part = path.with_name(f'{path.stem}.{secrets.token_hex(4)}.part')
+        try:
+            self._games.mkdir(parents=True, exist_ok=True)
+            part.write_bytes(text)
+            os.replace(part, path)
+        except OSError as error:
+            raise CrgameError(f'the game cannot be written ({error.strerror})') from error
+        return path
+
+
+def _entry_id(path: Path) -> str:
+    return hashlib.sha256(os.fsencode(path)).hexdigest()[:16]
+
+
+def _game_title(path: Path) -> str:
+    """Give the title of a game file, empty if the file is no game."""
+    try:
+        values = read_yaml(path, 'game file')
+    except (InputError, yaml.YAMLError):
+        return ''
+    if not isinstance(values, dict) or not isinstance(values.get('scenario'), str):
+        return ''
+    title = values.get('title')
+    return clean_text(title, MAX_TITLE) if isinstance(title, str) and title else path.stem
+
+
+def _scenario_title(path: Path) -> str:
+    """Give the benchmark id, without reading more than the file's beginning."""
+    try:
+        with path.open('rb') as stream:
+            found = _BENCHMARK.search(stream.read(4096))
+    except OSError:
+        found = None
+    title = clean_text(found.group(1).decode('utf-8', 'replace'), MAX_TITLE) if found else ''
+    return title or path.stem

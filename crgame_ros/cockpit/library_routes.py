@@ -1,0 +1,133 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The HTTP interface of the library: list, preview, upload, load."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+import json
+import logging
+from typing import Any
+
+from aiohttp import web
+
+from crgame_ros.cockpit.backend import Backend
+from crgame_ros.cockpit.library import Choice, Library
+from crgame_ros.errors import CrgameError, InputError
+
+MAX_VEHICLES = 1000
+MAX_TEXT = 1000
+UPLOAD_S = 60.0
+
+_log = logging.getLogger(__name__)
+Answer = Callable[[web.Request], Awaitable[web.Response]]
+
+
+def add_routes(app: web.Application, library: Library | None, backend: Backend) -> None:
+    """
+    Add /api/scenarios, preview, upload and load.
+
+    :param library: None answers that there is nothing to choose.
+    :param backend: takes the game that is loaded.
+    """
+    if library is None:
+        for method, path in (('GET', 'scenarios'), ('GET', 'preview'), ('POST', 'upload'),
+                             ('POST', 'load')):
+            app.router.add_route(method, f'/api/{path}', _nothing)
+        return
+    routes = _Routes(library, backend)
+    app.router.add_get('/api/scenarios', _refusable(routes.scenarios))
+    app.router.add_get('/api/preview', _refusable(routes.preview))
+    app.router.add_post('/api/upload', _refusable(routes.upload))
+    app.router.add_post('/api/load', _refusable(routes.load))
+
+    async def closing(_: web.Application) -> AsyncIterator[None]:
+        yield
+        await library.close()
+
+    app.cleanup_ctx.append(closing)
+
+
+class _Routes:
+
+    def __init__(self, library: Library, backend: Backend) -> None:
+        self._library = library
+        self._backend = backend
+        # Two bodies in memory at most: this and the one that is being read for check.
+        self._receiving = asyncio.Semaphore(2)
+
+    async def scenarios(self, _: web.Request) -> web.Response:
+        return web.json_response(await self._library.listing())
+
+    async def preview(self, request: web.Request) -> web.Response:
+        content = await self._library.preview(request.query.get('id', '')[:MAX_TEXT])
+        return web.Response(body=content, content_type='application/json', charset='utf-8')
+
+    async def upload(self, request: web.Request) -> web.Response:
+        async with self._receiving:
+            data = await _body(request, self._library.max_upload_bytes)
+            title = request.query.get('name', '')[:MAX_TEXT]
+            return web.json_response({'id': await self._library.upload(data, title)})
+
+    async def load(self, request: web.Request) -> web.Response:
+        path = await self._library.write_game(_choice(await request.read()))
+        return web.json_response({'ok': True, 'text': await self._backend.load_game(path)})
+
+
+def _refusable(handler: Answer) -> Answer:
+    async def answer(request: web.Request) -> web.Response:
+        try:
+            return await handler(request)
+        except CrgameError as error:
+            return web.json_response({'error': str(error)}, status=400)
+        except web.HTTPRequestEntityTooLarge:
+            return web.json_response({'error': 'that is too much'}, status=413)
+        except TimeoutError:
+            return web.json_response({'error': 'the upload takes too long'}, status=408)
+        except (ConnectionError, web.HTTPException):
+            raise
+        except Exception:
+            _log.exception('%s', request.path)
+            return web.json_response(
+                {'error': 'it failed; the log of the server says why'}, status=500)
+    return answer
+
+
+async def _nothing(_: web.Request) -> web.Response:
+    return web.json_response({'error': 'there is nothing to choose here'}, status=404)
+
+
+async def _body(request: web.Request, limit: int) -> bytes:
+    if (request.content_length or 0) > limit:
+        raise web.HTTPRequestEntityTooLarge(limit, request.content_length or 0)
+    data = bytearray()
+    async with asyncio.timeout(UPLOAD_S):
+        async for chunk in request.content.iter_any():
+            data += chunk
+            if len(data) > limit:
+                raise web.HTTPRequestEntityTooLarge(limit, len(data))
+    return bytes(data)
+
+
+def _choice(body: bytes) -> Choice:
+    try:
+        content = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise InputError('is no JSON', 'choice', 'load the page again') from error
+    if not isinstance(content, dict):
+        raise InputError('is no JSON object', 'choice', 'load the page again')
+    return Choice(_text(content.get('id')), _by_vehicle(content.get('humans', []), 'driver'),
+                  _by_vehicle(content.get('avs', []), 'planner'))
+
+
+def _by_vehicle(entries: Any, what: str) -> dict[str, str]:
+    if not isinstance(entries, list) or len(entries) > MAX_VEHICLES:
+        raise InputError('is no list of vehicles', 'choice', 'load the page again')
+    if not all(isinstance(entry, dict) for entry in entries):
+        raise InputError('holds something other than vehicles', 'choice', 'load the page again')
+    return {_text(entry.get('id')): _text(entry.get(what)) for entry in entries}
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or len(value) > MAX_TEXT:
+        raise InputError('misses a text', 'choice', 'load the page again')
+    return value

@@ -1,0 +1,135 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The WebSocket to the cockpit's server: it comes back by itself and feeds the store. */
+
+const FIRST_RETRY_MS = 250;
+const LAST_RETRY_MS = 2000;
+const REPLY_WITHIN_MS = 10000;
+const PING_EVERY_MS = 1000;
+
+/** One page's connection to the server. */
+export class Connection {
+  #store;
+  #url;
+  #socket = null;
+  #pending = new Map();
+  #lastId = 0;
+  #retry_ms = FIRST_RETRY_MS;
+  #retryTimer = 0;
+  #pings = 0;
+  #closed = false;
+
+  /**
+   * @param {import('./store.js').Store} store told everything that arrives
+   * @param {string} [url] of the WebSocket; that of this page's server by default
+   */
+  constructor(store, url = socketUrl(window.location)) {
+    this.#store = store;
+    this.#url = url;
+    this.#open();
+    this.#pings = setInterval(
+      () => this.send({ type: 'ping', t: performance.now() }), PING_EVERY_MS);
+  }
+
+  /** Whether the server can be reached at this moment. */
+  get open() {
+    return this.#socket?.readyState === WebSocket.OPEN;
+  }
+
+  /**
+   * Send a message that needs no answer.
+   *
+   * @param {object} message with its `type`
+   * @returns {boolean} false when there is no connection
+   */
+  send(message) {
+    if (!this.open) {
+      return false;
+    }
+    this.#socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  /**
+   * Send a message and wait for the server's reply.
+   *
+   * @param {object} message with its `type`; gets its `id` here
+   * @returns {Promise<{ok: boolean, text: string}>} never rejects
+   */
+  request(message) {
+    this.#lastId += 1;
+    const id = this.#lastId;
+    if (!this.send({ ...message, id })) {
+      return Promise.resolve({ ok: false, text: 'There is no connection to the simulation.' });
+    }
+    return new Promise((resolve) => {
+      const timer = setTimeout(() => this.#settle(
+        id, { ok: false, text: 'The simulation did not answer within 10 s.' }), REPLY_WITHIN_MS);
+      this.#pending.set(id, { resolve, timer });
+    });
+  }
+
+  /** Drop the connection; it is taken up again at once. */
+  interrupt() {
+    this.#socket?.close();
+  }
+
+  /** Close for good. */
+  close() {
+    this.#closed = true;
+    clearInterval(this.#pings);
+    clearTimeout(this.#retryTimer);
+    this.#socket?.close();
+  }
+
+  #open() {
+    const socket = new WebSocket(this.#url);
+    socket.binaryType = 'arraybuffer';
+    socket.addEventListener('open', () => {
+      this.#retry_ms = FIRST_RETRY_MS;
+      this.#store.setConnected(true);
+    });
+    socket.addEventListener('message', (event) => this.#receive(event.data));
+    socket.addEventListener('close', () => this.#lost());
+    this.#socket = socket;
+  }
+
+  #lost() {
+    for (const id of [...this.#pending.keys()]) {
+      this.#settle(id, { ok: false, text: 'The connection broke before the answer came.' });
+    }
+    this.#store.setConnected(false);
+    if (!this.#closed) {
+      this.#retryTimer = setTimeout(() => this.#open(), this.#retry_ms);
+      this.#retry_ms = Math.min(2 * this.#retry_ms, LAST_RETRY_MS);
+    }
+  }
+
+  #receive(data) {
+    if (data instanceof ArrayBuffer) {
+      this.#store.receiveFrame(data, performance.now());
+      return;
+    }
+    const message = JSON.parse(data);
+    if (message.type === 'reply') {
+      this.#settle(message.to, message);
+    } else if (message.type === 'pong') {
+      this.#store.round_trip_ms = performance.now() - message.t;
+    } else {
+      this.#store.receive(message);
+    }
+  }
+
+  #settle(id, reply) {
+    const waiting = this.#pending.get(id);
+    if (waiting !== undefined) {
+      this.#pending.delete(id);
+      clearTimeout(waiting.timer);
+      waiting.resolve(reply);
+    }
+  }
+}
+
+function socketUrl(location) {
+  return `${location.protocol === 'https:' ? 'wss:' : 'ws:'}//${location.host}/ws`;
+}

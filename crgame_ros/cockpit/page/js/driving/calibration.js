@@ -1,0 +1,124 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The dialog that finds out which axes of a device steer, and how far they go. */
+
+import { CalibrationRun, STEPS } from './calibration_run.js';
+import { CalibrationTest } from './calibration_test_view.js';
+import { element, setAttribute, setText } from './dom.js';
+import { connectedPads } from './gamepad.js';
+import { loadProfile, sampleOf } from './gamepad_profile.js';
+import { RawBars } from './raw_bars.js';
+
+const TEXTS = {
+  centre: ['Rest', 'Hold the wheel or stick straight, take your feet off the pedals, then press '
+    + 'Next.'],
+  left: ['Left', 'Turn fully left, then back to straight.'],
+  right: ['Right', 'Turn fully right, then back to straight.'],
+  throttle: ['Throttle', 'Press the throttle fully, then let it go.'],
+  brake: ['Brake', 'Press the brake fully, then let it go.'],
+  reverse: ['Reverse', 'Press the button that shall change between forward and reverse.'],
+  test: ['Test', 'Try it. Dead zones and directions can be changed here; Save keeps everything '
+    + 'in this browser for this device.'],
+};
+
+/** One dialog, opened for one device after the other. */
+export class CalibrationDialog {
+  #save;
+  #pad = null;
+  #run = null;
+  #frame = 0;
+  #bars = null;
+  #test = new CalibrationTest();
+  #heading = element('h2', { id: 'calibration-title' });
+  #steps = STEPS.map((step) => element('li', { text: TEXTS[step][0] }));
+  #instruction = element('p', { class: 'calibration-instruction', 'aria-live': 'assertive' });
+  #found = element('p', { class: 'calibration-found', role: 'status' });
+  #live = element('div', { class: 'calibration-live' });
+  #skip = this.#button('Skip', () => this.#run.skip());
+  #next = this.#button('Next', () => this.#finishStep(), 'primary');
+  #dialog = element('dialog', {
+    class: 'calibration', 'aria-labelledby': 'calibration-title', on: { close: () => this.#end() },
+  }, this.#heading, element('ol', { class: 'calibration-steps' }, ...this.#steps),
+  this.#instruction, this.#found, this.#test.node, this.#live,
+  element('div', { class: 'dialog-buttons' },
+    this.#button('Use the default mapping', () => this.#close(null)),
+    this.#button('Cancel', () => this.#dialog.close()), this.#skip, this.#next));
+
+  /**
+   * @param {(index: number, profile: import('./gamepad_profile.js').Profile|null) => void} save
+   *   told the new mapping of the device with this index, null for its default
+   */
+  constructor(save) {
+    this.#save = save;
+    document.body.append(this.#dialog);
+  }
+
+  /** @param {number} index of the device to calibrate */
+  open(index) {
+    this.#pad = connectedPads().find((pad) => pad.index === index) ?? null;
+    if (this.#pad === null || this.#dialog.open) {
+      return;
+    }
+    this.#run = new CalibrationRun(loadProfile(this.#pad).profile);
+    this.#bars = new RawBars(sampleOf(this.#pad));
+    this.#live.replaceChildren(this.#bars.node);
+    setText(this.#heading, `Calibrate ${this.#pad.id}`);
+    this.#dialog.showModal();
+    this.#next.focus();
+    this.#poll(performance.now());
+  }
+
+  #poll(now_ms) {
+    const pad = connectedPads().find(({ index }) => index === this.#pad.index);
+    if (pad === undefined) {
+      setText(this.#instruction, 'The device is unplugged. Plug it in again and press a button.');
+    } else {
+      const sample = sampleOf(pad);
+      this.#run.feed(sample, now_ms);
+      this.#bars.show(sample, this.#run.found);
+      this.#show(sample);
+    }
+    this.#frame = requestAnimationFrame((at_ms) => this.#poll(at_ms));
+  }
+
+  #show(sample) {
+    const { step, found } = this.#run;
+    const testing = step === 'test';
+    this.#steps.forEach((item, i) => {
+      setAttribute(item, 'aria-current', STEPS[i] === step ? 'step' : null);
+      setAttribute(item, 'data-done', i < STEPS.indexOf(step));
+    });
+    setText(this.#instruction, TEXTS[step][1]);
+    const measures = !testing && step !== 'centre';
+    setText(this.#found, found
+      ? `${found.kind === 'axis' ? 'Axis' : 'Button'} ${found.index} moves`
+      : measures ? 'Nothing moves yet' : '');
+    setText(this.#next, testing ? 'Save' : 'Next');
+    setAttribute(this.#next, 'disabled', measures && found === null);
+    setAttribute(this.#skip, 'hidden', !measures);
+    this.#test.show(testing ? this.#run.profile : null, sample);
+  }
+
+  #finishStep() {
+    if (this.#run.step === 'test') {
+      this.#close(this.#run.profile);
+    } else {
+      this.#run.next();
+    }
+  }
+
+  #close(profile) {
+    this.#save(this.#pad.index, profile);
+    this.#dialog.close();
+  }
+
+  #end() {
+    cancelAnimationFrame(this.#frame);
+    this.#test.show(null);
+  }
+
+  #button(text, act, kind = '') {
+    return element('button', { type: 'button', class: `drive-button ${kind}`, text,
+      on: { click: act } });
+  }
+}

@@ -1,0 +1,212 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * The measuring behind the calibration dialog: which axis or button a person moves, how far.
+ *
+ * It has no clock and no page: samples and times are handed to it.
+ */
+
+/** The steps in their order. */
+export const STEPS = Object.freeze([
+  'centre', 'left', 'right', 'throttle', 'brake', 'reverse', 'test',
+]);
+
+// A smaller movement of an axis or button is none that was asked for.
+const LEAST_SPAN = 0.3;
+// A control is back once it has left less than this share of its span, and stays.
+const BACK_SHARE = 0.25;
+const BACK_FOR_MS = 500;
+const DEADZONE = 0.03;
+// A first change from 0 beyond this is no movement but the axis's first true value.
+const MADE_UP = 0.5;
+
+/** One run through the steps. */
+export class CalibrationRun {
+  #start = null;
+  #first = null;
+  #low = null;
+  #high = null;
+  #sample = null;
+  #centre = null;
+  #left = null;
+  #backSince_ms = NaN;
+
+  /**
+   * @param {import('./gamepad_profile.js').Profile} profile what is kept where a step is skipped
+   */
+  constructor(profile) {
+    this.profile = structuredClone(profile);
+    this.step = STEPS[0];
+  }
+
+  /** @returns {{kind: string, index: number, span: number}|null} what is moved in this step */
+  get found() {
+    return this.#sample && this.#asksForMovement ? this.#largest() : null;
+  }
+
+  get #asksForMovement() {
+    return this.step !== 'centre' && this.step !== 'test';
+  }
+
+  /**
+   * Take a sample in; a step ends by itself when what was moved is back at rest.
+   *
+   * @param {import('./gamepad_profile.js').Sample} sample
+   * @param {number} now_ms
+   * @returns {boolean} whether the step ended
+   */
+  feed(sample, now_ms) {
+    this.#sample = sample;
+    this.#start ??= sample;
+    this.#first = merged((before, start, now) => (before === start ? now : before),
+      this.#first ?? this.#start, this.#start, sample);
+    this.#low = merged(Math.min, this.#low ?? sample, sample);
+    this.#high = merged(Math.max, this.#high ?? sample, sample);
+    const found = this.found;
+    if (found === null || !this.#isBack(found)) {
+      this.#backSince_ms = NaN;
+      return false;
+    }
+    if (Number.isNaN(this.#backSince_ms)) {
+      this.#backSince_ms = now_ms;
+    }
+    return now_ms - this.#backSince_ms >= BACK_FOR_MS && this.next();
+  }
+
+  /**
+   * End this step with what was measured.
+   *
+   * @returns {boolean} false when nothing that fits has been moved yet
+   */
+  next() {
+    if (this.step === 'test' || this.#sample === null) {
+      return false;
+    }
+    if (this.step === 'centre') {
+      this.#centre = this.#sample;
+    } else {
+      const found = this.found;
+      if (found === null) {
+        return false;
+      }
+      this.#keep(found);
+    }
+    this.#advance();
+    return true;
+  }
+
+  /** Leave what this step asks for as it was. */
+  skip() {
+    // Left and right are one measurement.
+    if (this.step === 'left') {
+      this.#advance();
+    }
+    this.#advance();
+  }
+
+  #advance() {
+    this.step = STEPS[Math.min(STEPS.indexOf(this.step) + 1, STEPS.length - 1)];
+    this.#start = this.#first = this.#low = this.#high = this.#sample;
+    this.#backSince_ms = NaN;
+  }
+
+  #keep({ kind, index }) {
+    const [low, high] = [this.#low, this.#high].map((sample) => valueOf(sample, kind, index));
+    if (this.step === 'left') {
+      const centre = valueOf(this.#centre, kind, index);
+      this.#left = { kind, index, centre, end: farther(low, high, centre) };
+    } else if (this.step === 'right') {
+      this.profile.steering = this.#steering(farther(low, high, this.#left.end));
+    } else if (this.step === 'reverse') {
+      this.profile.reverse = { on: [], off: [], toggle: [index], held: [] };
+    } else {
+      const rest = this.#rest(kind, index);
+      const full = farther(low, high, rest);
+      this.profile[this.step] = { kind, index, min: Math.min(rest, full),
+        max: Math.max(rest, full), invert: full < rest, deadzone: DEADZONE };
+    }
+  }
+
+  #steering(right) {
+    const { kind, index, end: left, centre } = this.#left;
+    const [min, max] = [Math.min(left, right), Math.max(left, right)];
+    const share = (centre - min) / (max - min);
+    return { kind, index, min, max, centre: share > 0.3 && share < 0.7 ? centre : (min + max) / 2,
+      invert: left > right, deadzone: DEADZONE };
+  }
+
+  #largest() {
+    let best = null;
+    const kinds = this.step === 'reverse' ? ['button'] : ['axis', 'button'];
+    for (const kind of kinds) {
+      listOf(this.#sample, kind).forEach((_, index) => {
+        const span = valueOf(this.#high, kind, index) - valueOf(this.#low, kind, index);
+        if (span > LEAST_SPAN && span > (best?.span ?? 0) && this.#isFree(kind, index)) {
+          best = { kind, index, span };
+        }
+      });
+    }
+    return best;
+  }
+
+  #isFree(kind, index) {
+    const { steering, throttle } = this.profile;
+    const is = (control) => control?.kind === kind && control.index === index;
+    switch (this.step) {
+      case 'left': return kind === 'axis';
+      case 'right': return is(this.#left);
+      case 'throttle': return !is(steering);
+      // Both pedals of some wheels share one axis, one for each direction.
+      case 'brake': return !is(steering) && (!is(throttle) || this.#isOpposite(throttle));
+      default: return true;
+    }
+  }
+
+  #isOpposite(throttle) {
+    const { kind, index } = throttle;
+    const rest = throttle.invert ? throttle.max : throttle.min;
+    const up = valueOf(this.#high, kind, index) - rest;
+    const down = rest - valueOf(this.#low, kind, index);
+    return throttle.invert ? up > down : down > up;
+  }
+
+  #isBack({ kind, index }) {
+    const low = valueOf(this.#low, kind, index);
+    const high = valueOf(this.#high, kind, index);
+    const rest = this.#rest(kind, index);
+    const far = Math.abs(farther(low, high, rest) - rest);
+    return Math.abs(valueOf(this.#sample, kind, index) - rest) < BACK_SHARE * far;
+  }
+
+  /** Where a control stands when nobody touches it. */
+  #rest(kind, index) {
+    if (this.step === 'left' || this.step === 'right') {
+      return valueOf(this.#centre, kind, index);
+    }
+    // Browsers report 0 for an axis that has not moved yet; a pedal's first true value is then
+    // near the end where it rests.
+    const start = valueOf(this.#start, kind, index);
+    const first = valueOf(this.#first, kind, index);
+    return kind === 'axis' && start === 0 && Math.abs(first) > MADE_UP ? Math.sign(first) : start;
+  }
+}
+
+function listOf(sample, kind) {
+  return kind === 'axis' ? sample.axes : sample.buttons;
+}
+
+function valueOf(sample, kind, index) {
+  return listOf(sample, kind)[index] ?? 0;
+}
+
+function farther(low, high, from) {
+  return Math.abs(low - from) > Math.abs(high - from) ? low : high;
+}
+
+/** Combine samples value by value. */
+function merged(combine, ...samples) {
+  const last = samples.at(-1);
+  const each = (name) => last[name].map(
+    (value, i) => combine(...samples.map((sample) => sample[name][i] ?? value)));
+  return { axes: each('axes'), buttons: each('buttons') };
+}

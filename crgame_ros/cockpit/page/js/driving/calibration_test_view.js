@@ -1,0 +1,96 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The last step of the calibration: what the mapping makes of the device, with fine tuning. */
+
+import { element, setAttribute, setText } from './dom.js';
+import { gearAfter, pedalValue, steeringValue } from './gamepad_profile.js';
+import { PedalBar, SteeringBar } from './gauges.js';
+import { SteeringWheel } from './steering_wheel.js';
+
+const NAMES = { steering: 'Steering', throttle: 'Throttle', brake: 'Brake' };
+const MOST_DEADZONE = 0.3;
+
+/** Shows a profile at work; `node` goes into the dialog. */
+export class CalibrationTest {
+  #profile = null;
+  #reverse = false;
+  #pressed = [];
+  #wheel = new SteeringWheel();
+  #bars = {
+    steering: new SteeringBar(), throttle: new PedalBar('throttle', 'Throttle'),
+    brake: new PedalBar('brake', 'Brake'),
+  };
+  #gear = element('span', { class: 'hud-gear', text: 'D' });
+  #tuning = element('div', { class: 'tuning' });
+
+  constructor() {
+    const { steering, throttle, brake } = this.#bars;
+    this.node = element('div', { class: 'calibration-test', hidden: true },
+      element('div', { class: 'calibration-seen' }, brake.node, throttle.node, this.#wheel.node,
+        steering.node, this.#gear),
+      this.#tuning);
+  }
+
+  /**
+   * Show what a sample means.
+   *
+   * @param {import('./gamepad_profile.js').Profile|null} profile null hides this view
+   * @param {import('./gamepad_profile.js').Sample} [sample]
+   */
+  show(profile, sample) {
+    setAttribute(this.node, 'hidden', profile === null);
+    if (profile !== this.#profile) {
+      this.#profile = profile;
+      this.#reverse = false;
+      this.#pressed = [];
+      this.#tuning.replaceChildren(...profile === null ? []
+        : Object.keys(NAMES).map((name) => this.#row(name, profile[name])));
+    }
+    if (profile !== null) {
+      this.#move(profile, sample);
+    }
+  }
+
+  #move(profile, sample) {
+    const steering = steeringValue(sample, profile.steering);
+    this.#wheel.turn(steering);
+    this.#bars.steering.show(steering, false, false);
+    for (const name of ['throttle', 'brake']) {
+      const value = pedalValue(sample, profile[name]);
+      this.#bars[name].show(value, false);
+      this.#bars[name].write(value);
+    }
+    sample.buttons.forEach((value, i) => {
+      if ((value > 0.5) !== (this.#pressed[i] ?? false)) {
+        this.#pressed[i] = value > 0.5;
+        this.#reverse = gearAfter(profile.reverse, this.#reverse, i, value > 0.5);
+      }
+    });
+    setText(this.#gear, this.#reverse ? 'R' : 'D');
+    setAttribute(this.#gear, 'data-gear', this.#reverse ? 'R' : 'D');
+  }
+
+  #row(name, control) {
+    const shown = element('output', { text: percent(control.deadzone) });
+    const range = element('input', { type: 'range', min: 0, max: MOST_DEADZONE, step: 0.01,
+      value: control.deadzone, 'aria-label': `Dead zone of ${NAMES[name]}` });
+    range.addEventListener('input', () => {
+      control.deadzone = Number(range.value);
+      setText(shown, percent(control.deadzone));
+    });
+    const turned = element('input', { type: 'checkbox' });
+    turned.checked = control.invert;
+    turned.addEventListener('change', () => {
+      control.invert = turned.checked;
+    });
+    const where = `${control.kind === 'axis' ? 'Axis' : 'Button'} ${control.index}`;
+    return element('div', { class: 'tuning-row' },
+      element('strong', { text: NAMES[name] }), element('span', { text: where }),
+      element('label', {}, 'Dead zone ', range, shown),
+      element('label', {}, turned, ' Inverted'));
+  }
+}
+
+function percent(share) {
+  return `${Math.round(100 * share)} %`;
+}

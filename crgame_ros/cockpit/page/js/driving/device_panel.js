@@ -1,0 +1,58 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The list of input devices in the Drive panel: which one drives, and its calibration. */
+
+import { element } from './dom.js';
+
+/** A section of the panel; `node` goes into the page. */
+export class DevicePanel {
+  #gamepads;
+  #calibrate;
+  #list = element('ul', { class: 'devices' });
+
+  /**
+   * @param {import('./gamepad.js').Gamepads} gamepads
+   * @param {(index: number) => void} calibrate opens the dialog for a device
+   */
+  constructor(gamepads, calibrate) {
+    this.#gamepads = gamepads;
+    this.#calibrate = calibrate;
+    this.node = element('section', { class: 'drive-section', 'aria-labelledby': 'devices-title' },
+      element('h2', { id: 'devices-title', text: 'Input devices' }), this.#list,
+      element('p', { class: 'drive-note', text: 'A gamepad or wheel appears here after you press '
+        + 'one of its buttons. It drives once you move it; the keys go before it while held.' }));
+    this.list();
+  }
+
+  /** List the devices that are connected now. */
+  list() {
+    const { active, devices } = this.#gamepads;
+    this.#list.replaceChildren(
+      this.#row('Keyboard', 'W A S D or arrows, space brakes, R reverse', active === null,
+        () => this.#gamepads.choose(null)),
+      ...devices.map((device) => this.#row(shortName(device.id),
+        device.calibrated ? 'calibrated' : 'default mapping, not calibrated', device === active,
+        () => this.#gamepads.choose(device.index), device.index)));
+  }
+
+  #row(name, note, active, choose, index = null) {
+    return element('li', { class: 'device', 'data-active': active },
+      element('button', { type: 'button', class: 'device-choose', 'aria-pressed': String(active),
+        title: `Drive with ${name}`, on: { click: choose } },
+      element('span', { class: 'device-name', text: name }),
+      element('span', { class: 'drive-note', text: note })),
+      index === null ? null : element('button', { type: 'button', class: 'drive-button',
+        text: 'Calibrate…', on: { click: () => this.#calibrate(index) } }));
+  }
+}
+
+/**
+ * Shorten the name that browsers give a gamepad.
+ *
+ * @param {string} id such as 'Wheel (Vendor: 046d Product: c24f)'
+ * @returns {string}
+ */
+export function shortName(id) {
+  return id.replace(/\s*\([^)]*Vendor:[^)]*\)/i, '').replace(/^[0-9a-f]{4}-[0-9a-f]{4}-/i, '')
+    .trim() || 'Gamepad';
+}

@@ -1,0 +1,210 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Driving from the page: seats, hands and instruments put together. */
+
+import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { createSeats } from '../seats.js';
+import { CalibrationDialog } from './calibration.js';
+import { DevicePanel, shortName } from './device_panel.js';
+import { part } from './dom.js';
+import { Focus } from './focus.js';
+import { Gamepads } from './gamepad.js';
+import { Hud } from './hud.js';
+import { Keyboard } from './keyboard.js';
+import { describeSeat } from './seat_text.js';
+import { InputSender } from './sender.js';
+
+/** What a page does with its hands; in `window.crgame.driving`. */
+export class Driving {
+  #store;
+  #connection;
+  #sender;
+  #devicePanel = null;
+  #reverse = false;
+  // After the device that drove was unplugged nothing moves before a person moves something.
+  #unplugged = false;
+  // What the instruments say while there is no connection.
+  #lost = '';
+
+  /**
+   * @param {HTMLElement} root `#hud`, or an ancestor of it
+   * @param {import('../store.js').Store} store
+   * @param {import('../connection.js').Connection} connection
+   */
+  constructor(root, store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    this.focus = new Focus(store, (reason) => this.#focusChanged(reason));
+    this.keyboard = new Keyboard(() => this.seat !== null && this.focus.reason === null, {
+      changed: () => this.#moved(this.keyboard.anyHeld),
+      reversed: () => this.#setReverse(!this.#reverse),
+    });
+    this.#sender = new InputSender(connection, () => this.hands);
+    this.gamepads = new Gamepads({
+      changed: () => this.#moved(this.gamepads?.active !== null),
+      gear: (change) => this.#setReverse(change(this.#reverse)),
+      unplugged: () => this.#unplug(),
+      listed: () => this.#devicePanel?.list(),
+    });
+    this.calibration = new CalibrationDialog(
+      (index, profile) => this.gamepads.setProfile(index, profile));
+    this.#devicePanel = new DevicePanel(this.gamepads, (index) => this.calibration.open(index));
+    this.hud = new Hud(part(root, 'hud'), store, () => this.#subject());
+    store.on('seats', () => this.#takeSeat());
+    store.on('connection', (connected) => this.#connectionChanged(connected));
+    this.#takeSeat();
+  }
+
+  /** @returns {string|null} the seat that this page drives */
+  get seat() {
+    return this.#sender?.seat ?? null;
+  }
+
+  /** @returns {string|null} why the hands are off the controls, null while they are on */
+  get away() {
+    return this.focus.reason ?? (this.#unplugged ? 'unplugged' : null);
+  }
+
+  /** @returns {object} what the hands do, as an input message says it */
+  get hands() {
+    if (this.away !== null) {
+      return { away: true };
+    }
+    const reverse = Number(this.#reverse);
+    const axes = this.keyboard.anyHeld ? null : this.gamepads.axes;
+    return axes === null ? { keys: this.keyboard.keys, reverse } : { axes, reverse };
+  }
+
+  /** @returns {HTMLElement} the list of input devices, for the Drive panel */
+  get devices() {
+    return this.#devicePanel.node;
+  }
+
+  /**
+   * Take a seat, giving back the one held before.
+   *
+   * @param {string} seat
+   * @returns {Promise<{ok: boolean, text: string}>}
+   */
+  async claim(seat) {
+    if (this.seat !== null && this.seat !== seat) {
+      await this.release();
+    }
+    return this.#connection.request({ type: 'claim', seat });
+  }
+
+  /** Let go of the controls at once, and give the seat back. */
+  async release() {
+    const { seat } = this;
+    this.#leaveSeat();
+    const reply = await this.#connection.request({ type: 'release', seat });
+    this.#takeSeat();
+    return reply;
+  }
+
+  #connectionChanged(connected) {
+    if (connected) {
+      this.#lost = '';
+    } else if (this.#lost === '') {
+      // Told again at each vain attempt to connect.
+      this.#lost = this.seat === null ? 'Connection lost: this is how it was last seen.'
+        : `Connection lost: ${this.seat} brakes by itself.`;
+      this.#leaveSeat();
+    }
+  }
+
+  #takeSeat() {
+    const { seats, me } = this.#store;
+    const mine = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
+    if (this.#store.mode !== 'live' || !this.#store.connected || mine.length === 0) {
+      this.#leaveSeat();
+    } else if (!mine.includes(this.seat)) {
+      this.#enterSeat(mine[0]);
+    }
+  }
+
+  #enterSeat(seat) {
+    this.#unplugged = false;
+    this.#reverse = this.#gearOf(seat) || this.gamepads.gateHeld;
+    this.keyboard.release();
+    this.#sender.seat = seat;
+    window.crgame?.world?.follow?.(seat, true);
+    // A focused button would show its ring on, and widgets might take the keys.
+    document.activeElement?.blur?.();
+  }
+
+  #leaveSeat() {
+    if (this.seat !== null) {
+      if (this.#store.seats[this.seat]?.holder === this.#store.me.id) {
+        this.#connection.send({ type: 'input', seat: this.seat, away: true });
+      }
+      this.#sender.seat = null;
+      this.keyboard.release();
+    }
+  }
+
+  /** Whoever takes over a vehicle keeps its gear. */
+  #gearOf(seat) {
+    const row = this.#store.vehicleIndex(seat) * VEHICLE_WIDTH;
+    return this.#store.latest?.vehicles[row + VEHICLE.reverse] > 0.5;
+  }
+
+  #focusChanged(reason) {
+    if (reason !== null) {
+      this.keyboard.release();
+    }
+    this.#sender?.update();
+  }
+
+  #moved(really) {
+    if (really) {
+      this.#unplugged = false;
+    }
+    this.#sender?.update();
+  }
+
+  #setReverse(reverse) {
+    // A lever that is moved while the page has no focus counts; what calibration presses doesn't.
+    if (this.seat !== null && this.focus.reason !== 'dialog' && reverse !== this.#reverse) {
+      this.#reverse = reverse;
+      this.#moved(true);
+    }
+  }
+
+  #unplug() {
+    this.#unplugged = this.seat !== null && !this.keyboard.anyHeld;
+    this.#sender.update();
+  }
+
+  #subject() {
+    const id = this.seat ?? window.crgame?.world?.followed ?? null;
+    return {
+      id, driven: this.seat !== null, away: this.away, lost: this.#lost, reverse: this.#reverse,
+      keyboard: this.keyboard, driver: this.#driverOf(id),
+    };
+  }
+
+  #driverOf(id) {
+    const { seats, scene, me, connected } = this.#store;
+    const { active } = this.gamepads;
+    if (this.seat !== null) {
+      return active && !this.keyboard.anyHeld ? shortName(active.id) : 'Keyboard';
+    }
+    const role = scene?.vehicles[this.#store.vehicleIndex(id)]?.role;
+    return connected && seats[id] ? describeSeat(seats[id], role, scene?.planners?.[id], me.id) : '';
+  }
+}
+
+/**
+ * Put the instruments, the seats and the input devices into the page.
+ *
+ * @param {HTMLElement} root
+ * @param {import('../store.js').Store} store
+ * @param {import('../connection.js').Connection} connection
+ * @returns {Driving}
+ */
+export function createDriving(root, store, connection) {
+  const driving = new Driving(root, store, connection);
+  createSeats(part(root, 'panel-drive'), store, connection, driving);
+  return driving;
+}

@@ -1,0 +1,84 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Whether a person's hands can be on the controls of this page right now. */
+
+const EDITABLE = 'input:not([type=checkbox]):not([type=radio]):not([type=button]),'
+  + 'select, textarea, [contenteditable=""], [contenteditable=true]';
+
+/**
+ * Tell whether keys pressed at this element belong to it.
+ *
+ * @param {EventTarget|null} target
+ * @returns {boolean}
+ */
+export function isTyping(target) {
+  return target instanceof Element && target.closest(EDITABLE) !== null;
+}
+
+/** Watches focus, visibility, dialogs and the connection. */
+export class Focus {
+  #store;
+  #changed;
+  #gone = false;
+  #focused = document.hasFocus();
+
+  /**
+   * @param {import('../store.js').Store} store its `connected` counts
+   * @param {(reason: string|null) => void} changed called at once at each change of `reason`
+   */
+  constructor(store, changed) {
+    this.#store = store;
+    this.#changed = changed;
+    /**
+     * Null while the controls may act, else why they may not: 'connection', 'hidden', 'focus' or
+     * 'dialog'.
+     */
+    this.reason = this.#why();
+    this.#listen();
+  }
+
+  #listen() {
+    const focused = (value) => () => {
+      this.#focused = value;
+      this.#update();
+    };
+    const gone = (value) => () => {
+      this.#gone = value;
+      this.#update();
+    };
+    // During a blur event hasFocus() may still be true, so the events themselves count.
+    window.addEventListener('blur', focused(false));
+    window.addEventListener('focus', focused(true));
+    window.addEventListener('pagehide', gone(true));
+    window.addEventListener('pageshow', gone(false));
+    document.addEventListener('freeze', gone(true));
+    document.addEventListener('resume', gone(false));
+    document.addEventListener('visibilitychange', () => this.#update());
+    // A page that was opened in the background may get no focus event with its first click.
+    window.addEventListener('pointerdown', () => focused(document.hasFocus())(), true);
+    this.#store.on('connection', () => this.#update());
+    new MutationObserver(() => this.#update()).observe(
+      document.documentElement, { subtree: true, attributes: true, attributeFilter: ['open'] });
+  }
+
+  #why() {
+    if (!this.#store.connected) {
+      return 'connection';
+    }
+    if (this.#gone || document.visibilityState !== 'visible') {
+      return 'hidden';
+    }
+    if (!this.#focused) {
+      return 'focus';
+    }
+    return document.querySelector('dialog[open]') ? 'dialog' : null;
+  }
+
+  #update() {
+    const reason = this.#why();
+    if (reason !== this.reason) {
+      this.reason = reason;
+      this.#changed(reason);
+    }
+  }
+}

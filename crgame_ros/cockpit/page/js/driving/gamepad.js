@@ -1,0 +1,206 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Gamepads and wheels of the Gamepad API: which one drives, and what it asks for. */
+
+import {
+  gearAfter, loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
+} from './gamepad_profile.js';
+
+// Beyond this change of any axis or button a person means it, and not a trembling sensor.
+const MEANT = 0.2;
+// A pedal counts only after it was seen at rest: browsers report 0, half of a wheel's pedal
+// travel, for axes that have not moved since the device was plugged in.
+const AT_REST = 0.1;
+const STEPS = 1000;
+
+/** One connected device with its mapping. */
+class Device {
+  constructor(pad) {
+    this.id = pad.id;
+    this.index = pad.index;
+    this.baseline = sampleOf(pad);
+    this.sample = this.baseline;
+    this.rested = { throttle: false, brake: false };
+    Object.assign(this, loadProfile(pad));
+  }
+
+  /** Take the values of this frame. */
+  read(pad) {
+    this.sample = sampleOf(pad);
+    for (const name of Object.keys(this.rested)) {
+      this.rested[name] ||= pedalValue(this.sample, this.profile[name]) < AT_REST;
+    }
+  }
+
+  /** Whether somebody moved something clearly since the device was connected. */
+  get moved() {
+    const differs = (values, base) => values.some((v, i) => Math.abs(v - (base[i] ?? 0)) > MEANT);
+    return differs(this.sample.axes, this.baseline.axes)
+      || differs(this.sample.buttons, this.baseline.buttons);
+  }
+
+  /** Throttle, brake and steering after calibration. */
+  get axes() {
+    const { throttle, brake, steering } = this.profile;
+    const pedal = (name, control) => (
+      this.rested[name] ? pedalValue(this.sample, control) : 0);
+    return [pedal('throttle', throttle), pedal('brake', brake),
+      steeringValue(this.sample, steering)].map((v) => Math.round(v * STEPS) / STEPS);
+  }
+}
+
+/** All connected devices; polled in every animation frame while there is one. */
+export class Gamepads {
+  #devices = new Map();
+  #active = null;
+  #pressed = [];
+  #report;
+  #frame = 0;
+  #last = '';
+
+  /**
+   * @param {{changed: () => void, gear: (change: (reverse: boolean) => boolean) => void,
+   *   unplugged: () => void, listed: () => void}} report `changed` when the active device asks
+   *   for something else, `gear` when one of its gear buttons changed, `unplugged` when it is
+   *   gone, `listed` when the list or the choice of devices changed
+   */
+  constructor(report) {
+    this.#report = report;
+    window.addEventListener('gamepadconnected', () => this.#poll());
+    window.addEventListener('gamepaddisconnected', () => this.#poll());
+    this.#poll();
+  }
+
+  /** @returns {Device[]} the connected devices */
+  get devices() {
+    return [...this.#devices.values()];
+  }
+
+  /** @returns {Device|null} the device that drives when no key is held */
+  get active() {
+    return this.#active;
+  }
+
+  /** @returns {number[]|null} throttle, brake and steering of the active device */
+  get axes() {
+    return this.#active?.axes ?? null;
+  }
+
+  /** @returns {boolean} whether the lever of the active device stands in reverse */
+  get gateHeld() {
+    return this.#active?.profile.reverse.held.some((i) => this.#pressed[i]) ?? false;
+  }
+
+  /**
+   * Choose the device that drives.
+   *
+   * @param {number|null} index of the device; null leaves the keyboard alone
+   */
+  choose(index) {
+    const device = this.#devices.get(index) ?? null;
+    for (const other of this.#devices.values()) {
+      // From here on only a new movement brings another device in.
+      other.baseline = other.sample;
+    }
+    this.#activate(device);
+  }
+
+  /**
+   * Keep a mapping for a device, or forget it and take the default again.
+   *
+   * @param {number} index of the device
+   * @param {import('./gamepad_profile.js').Profile|null} profile
+   */
+  setProfile(index, profile) {
+    const device = this.#devices.get(index);
+    const pad = connectedPads().find((candidate) => candidate.index === index);
+    if (device && pad) {
+      saveProfile(device.id, profile);
+      Object.assign(device, loadProfile(pad));
+      device.rested = { throttle: false, brake: false };
+      this.#report.listed();
+    }
+  }
+
+  #activate(device) {
+    this.#active = device;
+    this.#pressed = device ? device.sample.buttons.map((value) => value > 0.5) : [];
+    this.#report.listed();
+    this.#report.changed();
+  }
+
+  #poll() {
+    cancelAnimationFrame(this.#frame);
+    const pads = connectedPads();
+    this.#match(pads);
+    for (const pad of pads) {
+      this.#devices.get(pad.index).read(pad);
+    }
+    this.#active ?? this.#activateMoved();
+    if (this.#active) {
+      this.#readGear();
+      this.#reportChange();
+    }
+    if (pads.length > 0) {
+      this.#frame = requestAnimationFrame(() => this.#poll());
+    }
+  }
+
+  #match(pads) {
+    let listed = false;
+    for (const pad of pads) {
+      if (this.#devices.get(pad.index)?.id !== pad.id) {
+        this.#devices.set(pad.index, new Device(pad));
+        listed = true;
+      }
+    }
+    for (const device of this.devices) {
+      if (!pads.some((pad) => pad.index === device.index)) {
+        this.#devices.delete(device.index);
+        listed = true;
+      }
+    }
+    if (this.#active && this.#devices.get(this.#active.index) !== this.#active) {
+      this.#active = null;
+      this.#report.unplugged();
+    }
+    if (listed) {
+      this.#report.listed();
+    }
+  }
+
+  #activateMoved() {
+    const moved = this.devices.find((device) => device.moved);
+    if (moved) {
+      this.#activate(moved);
+    }
+  }
+
+  #readGear() {
+    const { sample, profile } = this.#active;
+    sample.buttons.forEach((value, index) => {
+      const pressed = value > 0.5;
+      if (pressed !== this.#pressed[index]) {
+        this.#pressed[index] = pressed;
+        this.#report.gear((reverse) => gearAfter(profile.reverse, reverse, index, pressed));
+      }
+    });
+  }
+
+  #reportChange() {
+    const text = this.#active.axes.join();
+    if (text !== this.#last) {
+      this.#last = text;
+      this.#report.changed();
+    }
+  }
+}
+
+/**
+ * List the gamepads that the browser shows now.
+ *
+ * @returns {Gamepad[]}
+ */
+export function connectedPads() {
+  return [...navigator.getGamepads?.() ?? []].filter((pad) => pad?.connected);
+}

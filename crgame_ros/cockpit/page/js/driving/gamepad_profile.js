@@ -1,0 +1,187 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * Which axis or button of a gamepad or wheel does what, and over which range.
+ *
+ * @typedef {{kind: 'axis'|'button', index: number, min: number, max: number, invert: boolean,
+ *   deadzone: number, centre?: number}} Control  `centre` only for the steering; the raw value
+ *   rises from `min` to `max`, to the right or with the pedal unless `invert`.
+ * @typedef {{on: number[], off: number[], toggle: number[], held: number[]}} GearButtons
+ * @typedef {{steering: Control, throttle: Control, brake: Control, reverse: GearButtons}} Profile
+ * @typedef {{axes: number[], buttons: number[]}} Sample  raw values at one time.
+ */
+
+const PREFIX = 'crgame.gamepad.';
+const NAMES = ['steering', 'throttle', 'brake'];
+
+/**
+ * Read a gamepad's raw values.
+ *
+ * @param {Gamepad} pad
+ * @returns {Sample}
+ */
+export function sampleOf(pad) {
+  return { axes: pad.axes.map(Number), buttons: pad.buttons.map((button) => button.value) };
+}
+
+/**
+ * Give the mapping that fits a device which nobody has calibrated.
+ *
+ * @param {Gamepad} pad in its first state: Logitech pedals rest at +1.
+ * @returns {Profile}
+ */
+export function defaultProfile(pad) {
+  if (pad.mapping === 'standard') {
+    return {
+      steering: steeringOf(0, 0.08), throttle: triggerOf(7), brake: triggerOf(6),
+      reverse: { on: [4], off: [5], toggle: [], held: [] },
+    };
+  }
+  const [throttle, brake] = pedalAxes(pad);
+  return {
+    steering: steeringOf(0, 0), throttle: pedalOf(throttle), brake: pedalOf(brake),
+    reverse: { on: [5], off: [4], toggle: [], held: isLogitechWithGate(pad) ? [18] : [] },
+  };
+}
+
+function steeringOf(index, deadzone) {
+  return { kind: 'axis', index, min: -1, centre: 0, max: 1, invert: false, deadzone };
+}
+
+function triggerOf(index) {
+  return { kind: 'button', index, min: 0, max: 1, invert: false, deadzone: 0.02 };
+}
+
+function pedalOf(index) {
+  return { kind: 'axis', index, min: -1, max: 1, invert: true, deadzone: 0.02 };
+}
+
+function isLogitechWithGate(pad) {
+  return /046d.*(c24f|c266)/i.test(pad.id);
+}
+
+function pedalAxes(pad) {
+  // G920 and the Xbox version of the G923 have the clutch on the last axis, the others on 1.
+  if (/046d.*(c262|c26e)/i.test(pad.id)) {
+    return [1, 2];
+  }
+  if (isLogitechWithGate(pad)) {
+    return [2, 3];
+  }
+  const resting = [...pad.axes.keys()].filter((i) => i > 0 && pad.axes[i] > 0.9);
+  if (resting.length >= 2) {
+    return resting.length === 2 ? resting : resting.slice(1, 3);
+  }
+  return pad.axes.length >= 4 ? [2, 3] : [1, 2];
+}
+
+/**
+ * Load the calibrated mapping of a device, or its default.
+ *
+ * @param {Gamepad} pad
+ * @returns {{profile: Profile, calibrated: boolean}}
+ */
+export function loadProfile(pad) {
+  const text = localStorage.getItem(PREFIX + pad.id);
+  if (text !== null) {
+    try {
+      const profile = JSON.parse(text);
+      if (isProfile(profile)) {
+        return { profile, calibrated: true };
+      }
+    } catch (error) {
+      console.warn(`the calibration of ${pad.id} cannot be read and is not used: ${error}`);
+    }
+  }
+  return { profile: defaultProfile(pad), calibrated: false };
+}
+
+/**
+ * Keep a calibrated mapping in this browser.
+ *
+ * @param {string} id of the gamepad.
+ * @param {Profile|null} profile null forgets it.
+ */
+export function saveProfile(id, profile) {
+  if (profile === null) {
+    localStorage.removeItem(PREFIX + id);
+  } else {
+    localStorage.setItem(PREFIX + id, JSON.stringify(profile));
+  }
+}
+
+function isProfile(profile) {
+  const numbers = (control, names) => names.every((name) => Number.isFinite(control[name]));
+  return NAMES.every((name) => {
+    const control = profile?.[name];
+    return ['axis', 'button'].includes(control?.kind)
+      && numbers(control, ['index', 'min', 'max', 'deadzone'])
+      && (name !== 'steering' || numbers(control, ['centre']));
+  }) && ['on', 'off', 'toggle', 'held'].every((name) => Array.isArray(profile.reverse?.[name]));
+}
+
+/**
+ * Read one raw value of a sample.
+ *
+ * @param {Sample} sample
+ * @param {{kind: string, index: number}} control
+ * @returns {number} NaN if the device has none such.
+ */
+export function rawValue(sample, control) {
+  const values = control.kind === 'axis' ? sample.axes : sample.buttons;
+  return values[control.index] ?? NaN;
+}
+
+/**
+ * Give a pedal's share of its travel.
+ *
+ * @param {Sample} sample
+ * @param {Control} control
+ * @returns {number} 0 (released) to 1.
+ */
+export function pedalValue(sample, control) {
+  const share = (rawValue(sample, control) - control.min) / (control.max - control.min);
+  return beyond(control.invert ? 1 - share : share, control.deadzone);
+}
+
+/**
+ * Give the steering.
+ *
+ * @param {Sample} sample
+ * @param {Control} control
+ * @returns {number} -1 to 1, positive to the left.
+ */
+export function steeringValue(sample, control) {
+  const offset = rawValue(sample, control) - control.centre;
+  const side = offset > 0 ? control.max - control.centre : control.centre - control.min;
+  const size = beyond(Math.abs(offset) / side, control.deadzone);
+  return size === 0 ? 0 : size * Math.sign(offset) * (control.invert ? 1 : -1);
+}
+
+function beyond(share, deadzone) {
+  // Stretched beyond the dead zone, so that nothing jumps at its edge; no number is at rest.
+  const size = (share - deadzone) / (1 - deadzone);
+  return Number.isFinite(size) ? Math.min(1, Math.max(0, size)) : 0;
+}
+
+/**
+ * Give the gear after a button changed.
+ *
+ * @param {GearButtons} buttons
+ * @param {boolean} reverse the gear before.
+ * @param {number} index of the button.
+ * @param {boolean} pressed whether it is pressed now.
+ * @returns {boolean} whether reverse is selected.
+ */
+export function gearAfter(buttons, reverse, index, pressed) {
+  if (buttons.held.includes(index)) {
+    return pressed;
+  }
+  if (!pressed) {
+    return reverse;
+  }
+  if (buttons.toggle.includes(index)) {
+    return !reverse;
+  }
+  return buttons.on.includes(index) || (reverse && !buttons.off.includes(index));
+}

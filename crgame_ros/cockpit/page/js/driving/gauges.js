@@ -1,0 +1,75 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Bars that show a command, solid, beside the raw key that it comes from, outlined. */
+
+import { element, setAttribute, setText } from './dom.js';
+
+const scaled = (share) => (Number.isFinite(share) ? share : 0).toFixed(3);
+
+/** An upright bar of one pedal. */
+export class PedalBar {
+  #fill;
+  #key;
+  #value;
+
+  /**
+   * @param {string} kind 'throttle' or 'brake'
+   * @param {string} label under the bar
+   */
+  constructor(kind, label) {
+    this.#fill = element('div', { class: 'bar-fill' });
+    this.#key = element('div', { class: 'bar-key' });
+    this.#value = element('span', { class: 'bar-value', text: '–' });
+    this.node = element('div', { class: `pedal pedal-${kind}` },
+      element('div', { class: 'bar' }, this.#fill, this.#key),
+      this.#value, element('span', { class: 'bar-label', text: label }));
+  }
+
+  /**
+   * Show the bar and the outline of its key.
+   *
+   * @param {number} command 0 to 1, NaN where no command is in force
+   * @param {boolean} key whether its key is held
+   */
+  show(command, key) {
+    const transform = `scaleY(${scaled(command)})`;
+    if (this.#fill.style.transform !== transform) {
+      this.#fill.style.transform = transform;
+    }
+    setAttribute(this.#key, 'data-on', key);
+  }
+
+  /** @param {number} command written beside the bar in per cent */
+  write(command) {
+    setText(this.#value, Number.isFinite(command) ? `${Math.round(100 * command)} %` : '–');
+  }
+}
+
+/** A lying bar of the steering, with its zero in the middle. */
+export class SteeringBar {
+  #fill = element('div', { class: 'bar-fill' });
+  #left = element('div', { class: 'bar-key bar-left' });
+  #right = element('div', { class: 'bar-key bar-right' });
+
+  constructor() {
+    this.node = element('div', { class: 'bar steering-bar' },
+      this.#fill, this.#left, this.#right, element('div', { class: 'bar-zero' }));
+  }
+
+  /**
+   * Show the bar and the outlines of its keys.
+   *
+   * @param {number} command -1 (right) to 1 (left), NaN where no command is in force
+   * @param {boolean} left whether a left key is held
+   * @param {boolean} right whether a right key is held
+   */
+  show(command, left, right) {
+    // The fill grows from the middle to the right; a left command turns it over.
+    const transform = `scaleX(${scaled(-command)})`;
+    if (this.#fill.style.transform !== transform) {
+      this.#fill.style.transform = transform;
+    }
+    setAttribute(this.#left, 'data-on', left);
+    setAttribute(this.#right, 'data-on', right);
+  }
+}

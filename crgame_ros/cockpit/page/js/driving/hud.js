@@ -1,0 +1,209 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The instruments over the world: of the driven vehicle, or of the one that is watched. */
+
+import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { element, setAttribute, setText } from './dom.js';
+import { PedalBar, SteeringBar } from './gauges.js';
+import { Keycaps } from './keycaps.js';
+import { SpeedLimits } from './speed_limit.js';
+import { SteeringWheel } from './steering_wheel.js';
+
+// Numbers that change faster than this cannot be read [ms].
+const NUMBERS_EVERY_MS = 100;
+const LIMIT_EVERY_MS = 300;
+const STANDSTILL = 0.05;
+const KMH = 3.6;
+const DEGREES = 180 / Math.PI;
+// Rounding alone must not make a limit look exceeded [m/s].
+const LIMIT_TOLERANCE = 0.3;
+
+/** Why the hands are off, by reason. */
+const AWAY_TEXTS = Object.freeze({
+  hidden: 'Hands off: this page is hidden.',
+  focus: 'Hands off: click into this page to drive on.',
+  dialog: 'Hands off while a dialog is open.',
+  unplugged: 'The input device is unplugged: press a driving key, or plug it in and move it.',
+});
+
+/** The overlay in `#hud`. */
+export class Hud {
+  #root;
+  #store;
+  #subject;
+  #parts = buildParts();
+  #limits = new SpeedLimits(null);
+  #numbersAt_ms = -Infinity;
+  #limitAt_ms = -Infinity;
+  #vehicleId = null;
+  #vehicle = null;
+
+  /**
+   * @param {HTMLElement} root
+   * @param {import('../store.js').Store} store
+   * @param {() => {id: string|null, driven: boolean, away: string|null, lost: string,
+   *   reverse: boolean, keyboard: import('./keyboard.js').Keyboard, driver: string}} subject which
+   *   vehicle to show, what the hands do, and what has gone wrong with the connection
+   */
+  constructor(root, store, subject) {
+    this.#root = root;
+    this.#store = store;
+    this.#subject = subject;
+    root.replaceChildren(this.#parts.banner, this.#parts.board);
+    root.classList.add('hud');
+    store.on('scene', (scene) => this.#takeScene(scene));
+    this.#takeScene(store.scene);
+    const frame = (now_ms) => {
+      this.#draw(now_ms);
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  #takeScene(scene) {
+    this.#limits = new SpeedLimits(scene);
+    this.#vehicleId = null;
+  }
+
+  #draw(now_ms) {
+    const subject = this.#subject();
+    const index = subject.id === null ? -1 : this.#store.vehicleIndex(subject.id);
+    const row = index < 0 ? null : this.#row(index, now_ms);
+    setAttribute(this.#root, 'hidden', row === null);
+    if (row === null) {
+      return;
+    }
+    if (subject.id !== this.#vehicleId) {
+      this.#vehicleId = subject.id;
+      this.#vehicle = this.#store.scene.vehicles[index];
+      this.#numbersAt_ms = this.#limitAt_ms = -Infinity;
+    }
+    this.#show(row, subject);
+    if (now_ms - this.#numbersAt_ms >= NUMBERS_EVERY_MS) {
+      this.#numbersAt_ms = now_ms;
+      this.#write(row, subject);
+    }
+    if (now_ms - this.#limitAt_ms >= LIMIT_EVERY_MS) {
+      this.#limitAt_ms = now_ms;
+      this.#writeLimit(row);
+    }
+  }
+
+  #row(index, now_ms) {
+    const values = this.#store.displayed(now_ms)?.vehicles;
+    const from = index * VEHICLE_WIDTH;
+    return values && values.length >= from + VEHICLE_WIDTH && Number.isFinite(values[from])
+      ? values.subarray(from, from + VEHICLE_WIDTH) : null;
+  }
+
+  /** What moves: in every animation frame. */
+  #show(row, { driven, keyboard, reverse }) {
+    const p = this.#parts;
+    const [throttleKey, brakeKey, left, right] = driven ? keyboard.keys : [0, 0, 0, 0];
+    const command = row[VEHICLE.steering];
+    p.throttle.show(row[VEHICLE.throttle], throttleKey === 1);
+    p.brake.show(row[VEHICLE.brake], brakeKey === 1);
+    p.steering.show(command, left === 1, right === 1);
+    // A planner gives no steering command: then the wheel shows the front wheels' angle.
+    p.wheel.turn(Number.isFinite(command) ? command
+      : row[VEHICLE.steering_angle] / (this.#vehicle.max_steering_angle || 1));
+    setAttribute(p.keycaps.node, 'hidden', !driven);
+    if (driven) {
+      p.keycaps.show(keyboard, reverse);
+    }
+  }
+
+  /** What is read: now and then. */
+  #write(row, subject) {
+    const p = this.#parts;
+    const speed = row[VEHICLE.speed];
+    setText(p.kmh, String(Math.round(Math.abs(speed) * KMH)));
+    setText(p.ms, `${signed(speed, 1)} m/s`);
+    setText(p.acceleration, `${signed(row[VEHICLE.acceleration], 1)} m/s²`);
+    const [gear, asked] = gears(speed, row[VEHICLE.reverse]);
+    setText(p.gear, gear === asked ? gear : `${gear}→${asked}`);
+    setAttribute(p.gear, 'data-gear', gear);
+    setText(p.angle, `${signed(row[VEHICLE.steering_angle] * DEGREES, 1)}°`);
+    const command = row[VEHICLE.steering];
+    setText(p.command, Number.isFinite(command) ? `${signed(100 * command, 0)} %` : '–');
+    p.throttle.write(row[VEHICLE.throttle]);
+    p.brake.write(row[VEHICLE.brake]);
+    setText(p.who, subject.driven ? `You drive ${subject.id}` : `Watching ${subject.id}`);
+    setText(p.device, subject.driver);
+    setAttribute(p.board, 'data-role', this.#vehicle.role);
+    const text = subject.driven && subject.away ? AWAY_TEXTS[subject.away] ?? '' : subject.lost;
+    setText(p.banner, text);
+    setAttribute(p.banner, 'data-on', text !== '');
+  }
+
+  #writeLimit(row) {
+    const limit = this.#limits.at(row[VEHICLE.x], row[VEHICLE.y], row[VEHICLE.yaw]);
+    const { limit: sign } = this.#parts;
+    setAttribute(sign, 'data-on', limit !== null);
+    setAttribute(sign, 'data-over', limit !== null
+      && Math.abs(row[VEHICLE.speed]) > limit + LIMIT_TOLERANCE);
+    if (limit !== null) {
+      setText(sign, String(Math.round(limit * KMH)));
+      setAttribute(sign, 'aria-label', `Speed limit ${Math.round(limit * KMH)} km/h`);
+    }
+  }
+}
+
+/** The gear that is in, and the one that is asked for: it changes only at standstill. */
+function gears(speed, reverse) {
+  const asked = Number.isFinite(reverse) ? (reverse > 0.5 ? 'R' : 'D') : null;
+  const gear = Math.abs(speed) < STANDSTILL ? asked ?? 'D' : speed < 0 ? 'R' : 'D';
+  return [gear, asked ?? gear];
+}
+
+/** A number with its sign, and none for what rounds to zero. */
+function signed(value, digits) {
+  if (!Number.isFinite(value)) {
+    return '–';
+  }
+  const text = Math.abs(value).toFixed(digits);
+  if (Number(text) === 0) {
+    return text;
+  }
+  return `${value < 0 ? '−' : '+'}${text}`;
+}
+
+function buildParts() {
+  const span = (name, title) => element('span', { class: `hud-${name}`, title });
+  const parts = {
+    kmh: span('kmh', 'Speed'), ms: span('ms', 'Signed speed'), gear: span('gear', 'Gear'),
+    acceleration: span('acceleration', 'Acceleration'), who: span('who'), device: span('device'),
+    angle: span('angle', 'Angle of the front wheels, positive to the left'),
+    command: span('command', 'Steering command, positive to the left'),
+    limit: element('span', { class: 'hud-limit', role: 'img', title: 'Speed limit' }),
+    throttle: new PedalBar('throttle', 'Throttle'), brake: new PedalBar('brake', 'Brake'),
+    steering: new SteeringBar(), wheel: new SteeringWheel(), keycaps: new Keycaps(),
+    banner: element('div', { class: 'hud-banner', role: 'status', 'aria-live': 'polite' }),
+  };
+  parts.board = element('div', { class: 'hud-board' },
+    element('div', { class: 'hud-title' }, parts.who, parts.device),
+    element('div', { class: 'hud-row' },
+      element('div', { class: 'hud-pedals' }, parts.brake.node, parts.throttle.node),
+      speedBlock(parts),
+      element('div', { class: 'hud-signs' }, parts.gear, parts.limit),
+      element('div', { class: 'hud-steering' }, parts.wheel.node, turnBlock(parts)),
+      parts.keycaps.node));
+  return parts;
+}
+
+function speedBlock({ kmh, ms, acceleration }) {
+  return element('div', { class: 'hud-speed' },
+    element('div', { class: 'hud-main' }, kmh,
+      element('span', { class: 'hud-unit', text: 'km/h' })),
+    element('div', { class: 'hud-small' }, ms, acceleration));
+}
+
+function turnBlock({ angle, command, steering }) {
+  return element('div', { class: 'hud-turn' }, element('div', { class: 'hud-angles' },
+    label('Wheels', angle), label('Steering', command)), steering.node);
+}
+
+function label(text, value) {
+  return element('div', { class: 'hud-labelled' },
+    element('span', { class: 'bar-label', text }), value);
+}

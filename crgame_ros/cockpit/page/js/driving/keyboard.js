@@ -1,0 +1,101 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The driving keys, raw: which of them are held, and each press of the gear key. */
+
+import { isTyping } from './focus.js';
+
+/** What each key does, by its place on the keyboard, so that every layout drives alike. */
+export const ACTIONS = Object.freeze({
+  KeyW: 'throttle', ArrowUp: 'throttle',
+  KeyS: 'brake', ArrowDown: 'brake', Space: 'brake',
+  KeyA: 'left', ArrowLeft: 'left',
+  KeyD: 'right', ArrowRight: 'right',
+  KeyR: 'reverse',
+});
+
+const ORDER = ['throttle', 'brake', 'left', 'right'];
+
+/** Listens to the driving keys while `enabled` says so. */
+export class Keyboard {
+  #enabled;
+  #report;
+  #held = new Set();
+
+  /**
+   * @param {() => boolean} enabled whether keys drive now
+   * @param {{changed: () => void, reversed: () => void}} report `changed` at each change of the
+   *   held keys, `reversed` at each press of R
+   */
+  constructor(enabled, report) {
+    this.#enabled = enabled;
+    this.#report = report;
+    // Capturing comes before any widget, so that a focused button does not take the space bar.
+    window.addEventListener('keydown', (event) => this.#down(event), true);
+    window.addEventListener('keyup', (event) => this.#up(event), true);
+    document.addEventListener('focusin', (event) => {
+      if (isTyping(event.target)) {
+        this.release();
+      }
+    });
+  }
+
+  /** @returns {number[]} throttle, brake, left, right: 1 while a key of it is held */
+  get keys() {
+    const active = new Set([...this.#held].map((code) => ACTIONS[code]));
+    return ORDER.map((action) => Number(active.has(action)));
+  }
+
+  /** @returns {boolean} whether any key that steers or moves a pedal is held */
+  get anyHeld() {
+    return this.#held.size > 0;
+  }
+
+  /**
+   * @param {string} code place of a key, such as 'KeyW'
+   * @returns {boolean} whether it is held
+   */
+  isHeld(code) {
+    return this.#held.has(code);
+  }
+
+  /** Let go of everything; a key that is still down must be pressed anew. */
+  release() {
+    if (this.#held.size > 0) {
+      this.#held.clear();
+      this.#report.changed();
+    }
+  }
+
+  #down(event) {
+    // While the command key is held, macOS tells no key's release.
+    if (event.key === 'Meta') {
+      this.release();
+      return;
+    }
+    const action = ACTIONS[event.code];
+    if (!action || event.ctrlKey || event.metaKey || event.altKey || event.isComposing
+        || isTyping(event.target) || !this.#enabled()) {
+      return;
+    }
+    event.preventDefault();
+    event.stopPropagation();
+    if (event.repeat) {
+      return;
+    }
+    if (action === 'reverse') {
+      this.#report.reversed();
+    } else if (!this.#held.has(event.code)) {
+      this.#held.add(event.code);
+      this.#report.changed();
+    }
+  }
+
+  #up(event) {
+    if (this.#held.delete(event.code)) {
+      // Firefox activates a focused button when the space bar is released.
+      event.preventDefault();
+      event.stopPropagation();
+      this.#report.changed();
+    }
+  }
+}

@@ -1,0 +1,60 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The name under which the others see this person; kept in this browser. */
+
+import { element } from './dom.js';
+
+const KEY = 'crgame.name';
+const LONGEST = 40;
+
+/** The field; `node` goes into the page. */
+export class NameField {
+  #store;
+  #connection;
+  #input = element('input', { type: 'text', id: 'my-name', maxlength: LONGEST,
+    autocomplete: 'nickname', placeholder: 'Your name' });
+
+  /**
+   * @param {import('../store.js').Store} store
+   * @param {import('../connection.js').Connection} connection
+   */
+  constructor(store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    this.node = element('form', { class: 'name-field' },
+      element('label', { for: 'my-name', text: 'You are' }), this.#input);
+    this.node.addEventListener('submit', (event) => {
+      event.preventDefault();
+      // Leaving the field gives the keys back to the vehicle.
+      this.#input.blur();
+    });
+    this.#input.addEventListener('change', () => this.#rename());
+    this.#input.addEventListener('focus', () => this.#input.select());
+    store.on('hello', () => this.#greet());
+    this.#greet();
+  }
+
+  #greet() {
+    if (this.#store.me.id === '') {
+      return;
+    }
+    const kept = localStorage.getItem(KEY);
+    if (kept) {
+      this.#connection.send({ type: 'name', name: kept });
+    }
+    if (document.activeElement !== this.#input) {
+      this.#input.value = kept ?? this.#store.me.name;
+    }
+  }
+
+  #rename() {
+    const name = this.#input.value.trim();
+    if (name === '') {
+      this.#input.value = this.#store.me.name;
+      return;
+    }
+    this.#store.me.name = name;
+    localStorage.setItem(KEY, name);
+    this.#connection.send({ type: 'name', name });
+  }
+}

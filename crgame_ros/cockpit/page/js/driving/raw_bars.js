@@ -1,0 +1,53 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Live bars of everything that a device reports, before any mapping. */
+
+import { element, setAttribute, setText } from './dom.js';
+
+/** Bars for each axis (-1 to 1) and button (0 to 1). */
+export class RawBars {
+  #rows = { axis: [], button: [] };
+
+  /** @param {import('./gamepad_profile.js').Sample} sample of the device, for how much it has */
+  constructor(sample) {
+    const axes = sample.axes.map((_, i) => this.#row('axis', `Axis ${i}`));
+    const buttons = sample.buttons.map((_, i) => this.#row('button', `${i}`));
+    this.node = element('div', { class: 'raw-bars' },
+      element('div', { class: 'raw-axes' }, ...axes),
+      element('div', { class: 'raw-buttons', 'aria-label': 'Buttons' },
+        element('span', { class: 'bar-label', text: 'Buttons' }), ...buttons));
+  }
+
+  /**
+   * Show a sample.
+   *
+   * @param {import('./gamepad_profile.js').Sample} sample
+   * @param {{kind: string, index: number}|null} found what the person moves, marked
+   */
+  show(sample, found) {
+    this.#showAll('axis', sample.axes, found);
+    this.#showAll('button', sample.buttons, found);
+  }
+
+  #showAll(kind, values, found) {
+    this.#rows[kind].forEach((row, index) => {
+      const value = values[index] ?? 0;
+      row.fill.style.transform = kind === 'axis' ? `scaleX(${value.toFixed(3)})`
+        : `scaleY(${value.toFixed(3)})`;
+      if (row.value) {
+        setText(row.value, value.toFixed(2));
+      }
+      setAttribute(row.node, 'data-found', found?.kind === kind && found.index === index);
+    });
+  }
+
+  #row(kind, text) {
+    const fill = element('div', { class: 'bar-fill' });
+    const value = kind === 'axis' ? element('span', { class: 'bar-value' }) : null;
+    const node = element('div', { class: `raw-${kind}` },
+      element('span', { class: 'bar-label', text }),
+      element('div', { class: 'bar' }, fill), value);
+    this.#rows[kind].push({ node, fill, value });
+    return node;
+  }
+}

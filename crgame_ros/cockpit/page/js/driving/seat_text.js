@@ -1,0 +1,39 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Who drives a seat, in words. */
+
+const GAME_DRIVERS = {
+  auto: () => 'Driven by a device on the simulation machine, if one is there',
+  evdev: (name) => (name ? `Driven by the device ${name}` : 'Driven by a device'),
+  idle: () => 'Nobody drives',
+  joy: (file) => (file ? `Driven by the script ${file}` : 'Driven by a ROS joy node'),
+  keys: (file) => `Driven by the script ${file}`,
+  replay: (bag) => `Replays the recording ${bag}`,
+};
+
+/**
+ * Describe who drives a seat.
+ *
+ * @param {{source: string, driver?: string, holder: string|null, holder_name?: string}} seat
+ * @param {string} role 'human' or 'autonomous'
+ * @param {string|undefined} planner name of the AV's planner
+ * @param {string} me id of this client
+ * @returns {string}
+ */
+export function describeSeat(seat, role, planner, me) {
+  if (seat.holder !== null) {
+    return seat.holder === me && me !== '' ? 'You drive'
+      : `Driven by ${seat.holder_name || seat.holder} in a cockpit`;
+  }
+  if (seat.source === 'cockpit') {
+    return 'Left by its driver in a cockpit';
+  }
+  if (seat.source !== 'game' && seat.source !== 'planner') {
+    return `Driven by the source ${seat.source}`;
+  }
+  if (role === 'autonomous') {
+    return planner ? `Driven by the planner ${planner}` : 'Driven by its planner';
+  }
+  const [kind, ...rest] = (seat.driver ?? '').split(':');
+  return GAME_DRIVERS[kind]?.(rest.join(':')) ?? 'Driven as the game says';
+}

@@ -1,0 +1,68 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Sends what the hands do for the held seat: at once at each change, and again and again. */
+
+// The server lets go of the controls after 200 ms of silence.
+const REPEAT_MS = 50;
+
+/** The stream of input messages of one seat. */
+export class InputSender {
+  #connection;
+  #hands;
+  #seat = null;
+  #last = '';
+
+  /**
+   * @param {import('../connection.js').Connection} connection
+   * @param {() => object} hands what the hands do now: {away: true}, {keys, reverse} or
+   *   {axes, reverse}
+   */
+  constructor(connection, hands) {
+    this.#connection = connection;
+    this.#hands = hands;
+    setInterval(() => this.#repeat(), REPEAT_MS);
+  }
+
+  /** @returns {string|null} the seat that gets the input */
+  get seat() {
+    return this.#seat;
+  }
+
+  /** @param {string|null} seat the seat that is held from now on, or none */
+  set seat(seat) {
+    if (seat !== this.#seat) {
+      this.#seat = seat;
+      this.#last = '';
+      this.update();
+    }
+  }
+
+  /** Send at once if the hands do something else than before. */
+  update() {
+    if (this.#seat === null) {
+      return;
+    }
+    const input = this.#hands();
+    const text = JSON.stringify(input);
+    if (text !== this.#last) {
+      this.#last = text;
+      this.#send(input);
+    }
+  }
+
+  #repeat() {
+    if (this.#seat === null) {
+      return;
+    }
+    const input = this.#hands();
+    // Hands off is said once: silence then means the same.
+    if (!input.away) {
+      this.#last = JSON.stringify(input);
+      this.#send(input);
+    }
+  }
+
+  #send(input) {
+    this.#connection.send({ type: 'input', seat: this.#seat, ...input });
+  }
+}

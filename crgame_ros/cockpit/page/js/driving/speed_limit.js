@@ -1,0 +1,87 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The speed limit where a vehicle is, from the lanelets of the scene. */
+
+/** Finds the lanelet under a point. */
+export class SpeedLimits {
+  #lanes = [];
+
+  /** @param {object|null} scene the scene document */
+  constructor(scene) {
+    for (const lanelet of scene?.lanelets ?? []) {
+      this.#lanes.push({
+        limit: lanelet.speed_limit ?? null, center: lanelet.center, one_way: lanelet.one_way,
+        ring: ringOf(lanelet), box: boxOf([...lanelet.left, ...lanelet.right]),
+      });
+    }
+  }
+
+  /**
+   * Give the limit of the lane that is driven on; at a crossing, of the one that leads the
+   * vehicle's way.
+   *
+   * @param {number} x of the vehicle [m]
+   * @param {number} y of the vehicle [m]
+   * @param {number} yaw of the vehicle [rad]
+   * @returns {number|null} [m/s], null where none is known
+   */
+  at(x, y, yaw) {
+    let best = null;
+    let bestAlong = -Infinity;
+    for (const lane of this.#lanes) {
+      const [x0, y0, x1, y1] = lane.box;
+      if (x >= x0 && x <= x1 && y >= y0 && y <= y1 && contains(lane.ring, x, y)) {
+        const cosine = Math.cos(yaw - headingNear(lane.center, x, y));
+        const along = lane.one_way === false ? Math.abs(cosine) : cosine;
+        if (along > bestAlong) {
+          [best, bestAlong] = [lane, along];
+        }
+      }
+    }
+    return best?.limit ?? null;
+  }
+}
+
+function ringOf({ left, right }) {
+  const ring = [...left];
+  for (let i = right.length - 2; i >= 0; i -= 2) {
+    ring.push(right[i], right[i + 1]);
+  }
+  return ring;
+}
+
+function boxOf(flat) {
+  const box = [Infinity, Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < flat.length; i += 2) {
+    box[0] = Math.min(box[0], flat[i]);
+    box[1] = Math.min(box[1], flat[i + 1]);
+    box[2] = Math.max(box[2], flat[i]);
+    box[3] = Math.max(box[3], flat[i + 1]);
+  }
+  return box;
+}
+
+function contains(ring, x, y) {
+  let inside = false;
+  for (let i = 0, j = ring.length - 2; i < ring.length; j = i, i += 2) {
+    if ((ring[i + 1] > y) !== (ring[j + 1] > y)
+        && x < ring[i] + (ring[j] - ring[i]) * (y - ring[i + 1]) / (ring[j + 1] - ring[i + 1])) {
+      inside = !inside;
+    }
+  }
+  return inside;
+}
+
+function headingNear(center, x, y) {
+  let nearest = 0;
+  let least = Infinity;
+  for (let i = 0; i + 3 < center.length; i += 2) {
+    const distance = Math.hypot((center[i] + center[i + 2]) / 2 - x,
+      (center[i + 1] + center[i + 3]) / 2 - y);
+    if (distance < least) {
+      [nearest, least] = [i, distance];
+    }
+  }
+  return Math.atan2(center[nearest + 3] - center[nearest + 1],
+    center[nearest + 2] - center[nearest]);
+}

@@ -1,0 +1,75 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Vehicles between and shortly after their samples; objects between their scenario steps. */
+
+import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from './frames.js';
+
+const TURN = 2 * Math.PI;
+
+/**
+ * Turn from one angle to another by the shortest way.
+ *
+ * @param {number} from [rad]
+ * @param {number} to [rad]
+ * @param {number} share 0 gives `from`, 1 the direction of `to`
+ * @returns {number} angle [rad]
+ */
+export function turn(from, to, share) {
+  const difference = to - from;
+  return from + share * (difference - TURN * Math.round(difference / TURN));
+}
+
+/**
+ * Interpolate all vehicles linearly between two samples.
+ *
+ * @param {Float64Array} out rows of VEHICLE_WIDTH, written
+ * @param {Float64Array} before the sample at or before the time
+ * @param {Float64Array} after the sample after it
+ * @param {number} share of the way, 0 to 1
+ */
+export function interpolateVehicles(out, before, after, share) {
+  for (let i = 0; i < out.length; i += 1) {
+    const column = i % VEHICLE_WIDTH;
+    if (column === VEHICLE.yaw) {
+      out[i] = turn(before[i], after[i], share);
+    } else if (column === VEHICLE.reverse || Number.isNaN(after[i])) {
+      out[i] = before[i];
+    } else {
+      out[i] = before[i] + share * (after[i] - before[i]);
+    }
+  }
+}
+
+/**
+ * Move all vehicles on from a sample with their speeds and yaw rates.
+ *
+ * @param {Float64Array} out rows of VEHICLE_WIDTH, written
+ * @param {Float64Array} sample the newest rows
+ * @param {number} dt since the sample [s]
+ */
+export function extrapolateVehicles(out, sample, dt) {
+  out.set(sample);
+  for (let row = 0; row < out.length; row += VEHICLE_WIDTH) {
+    const turned = sample[row + VEHICLE.yaw_rate] * dt;
+    const heading = sample[row + VEHICLE.yaw] + 0.5 * turned;
+    out[row + VEHICLE.x] += sample[row + VEHICLE.speed] * dt * Math.cos(heading);
+    out[row + VEHICLE.y] += sample[row + VEHICLE.speed] * dt * Math.sin(heading);
+    out[row + VEHICLE.yaw] += turned;
+  }
+}
+
+/**
+ * Move all objects on from their scenario step: pose + velocity * dt, velocities unchanged.
+ *
+ * @param {Float64Array} out rows of OBJECT_WIDTH, written
+ * @param {Float64Array} sample rows at the step
+ * @param {number} dt since the step [s]
+ */
+export function moveObjects(out, sample, dt) {
+  for (let row = 0; row < out.length; row += OBJECT_WIDTH) {
+    for (let column = 0; column < 3; column += 1) {
+      out[row + column] = sample[row + column] + dt * sample[row + column + 3];
+      out[row + column + 3] = sample[row + column + 3];
+    }
+  }
+}

@@ -1,0 +1,44 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Entry of the page: one store, one connection, the world, and the parts around it. */
+
+import { Connection } from './connection.js';
+import { Store } from './store.js';
+import { createWorld } from './world/world.js';
+
+// [module, its create function, selector of its root, name in window.crgame]. They are loaded one
+// by one, so that a part that cannot be loaded is named on the page and the others still work.
+const PARTS = [
+  ['./panels/notices.js', 'createNotices', '#notices', 'notices'],
+  ['./driving/driving.js', 'createDriving', '#hud', 'driving'],
+  ['./run_control.js', 'createRunControl', '#bar', 'runControl'],
+  ['./panels/settings.js', 'createSettings', '#bar-end', 'settings'],
+  ['./panels/title.js', 'createTitle', '#title', 'title'],
+  ['./panels/alarms.js', 'createAlarms', '#alarms', 'alarms'],
+  ['./panels/tabs.js', 'createTabs', '#panels', 'panels'],
+  ['./panels/scenario.js', 'createScenario', '#panel-scenario', 'scenario'],
+  ['./panels/events.js', 'createEvents', '#panel-events', 'events'],
+  ['./panels/planners.js', 'createPlanners', '#planners', 'planners'],
+  ['./panels/timing.js', 'createTiming', '#timekeeping', 'timing'],
+  ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
+  ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
+];
+
+const store = new Store();
+const connection = new Connection(store);
+const world = createWorld(document.querySelector('#world'), store, {
+  connection, covered: document.querySelector('#hud'),
+});
+window.crgame = { store, connection, world };
+
+for (const [path, create, root, name] of PARTS) {
+  try {
+    const module = await import(path);
+    window.crgame[name] = module[create](document.querySelector(root), store, connection);
+  } catch (error) {
+    console.error(`${path}: ${error}`);
+    store.receive({ type: 'notice', level: 'error', text: `${path} failed: ${error.message}` });
+  }
+}
+// Every part had its turn.
+window.crgame.ready = true;

@@ -1,0 +1,131 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Alarms: a frame around the world and a sign over it, an icon and a word in the header. */
+
+import { element, setText } from '../driving/dom.js';
+import { clockTime, oneLine } from './format.js';
+import { icon } from './icons.js';
+
+// kind: [word for the header, urgent]. Urgent ones frame the whole world, others mark its top.
+const KINDS = {
+  collision: ['Collision', true],
+  off_road: ['Off road', true],
+  lost_device: ['Input lost', true],
+  connection: ['No connection', true],
+  stale_plan: ['Plan stale', false],
+  recording: ['Recording failed', false],
+  late: ['Running late', false],
+};
+// So long an alarm stays to be seen after it has ended [ms].
+const LINGERS_MS = 4000;
+const CONNECTS_WITHIN_MS = 3000;
+
+/**
+ * Show the alarms.
+ *
+ * @param {HTMLElement} root #alarms in the header
+ * @param {import('../store.js').Store} store
+ * @returns {{kinds: function(): string[]}} kinds: those on the page now
+ */
+export function createAlarms(root, store) {
+  const frame = document.querySelector('#alarm-frame');
+  const signs = document.querySelector('#alarm-signs');
+  const alarms = new Map();
+  const remove = (id) => {
+    alarms.get(id).chip.remove();
+    alarms.delete(id);
+    paint(frame, signs, alarms);
+    fitWords(root);
+  };
+  let wasConnected = false;
+  const update = () => {
+    wasConnected ||= store.connected;
+    const active = [...store.alarms, ...(wasConnected ? ownAlarms(store) : [])];
+    for (const alarm of active) {
+      if (!alarms.has(alarm.id)) {
+        alarms.set(alarm.id, { ...alarm, chip: makeChip(alarm), timer: 0 });
+        root.append(alarms.get(alarm.id).chip);
+      }
+      const entry = alarms.get(alarm.id);
+      clearTimeout(entry.timer);
+      Object.assign(entry, alarm, { ended: false });
+      describe(entry, store.scene);
+    }
+    const ids = new Set(active.map((alarm) => alarm.id));
+    for (const [id, entry] of alarms) {
+      if (!ids.has(id) && !entry.ended) {
+        entry.ended = true;
+        entry.timer = setTimeout(() => remove(id), LINGERS_MS);
+        describe(entry, store.scene);
+      }
+    }
+    paint(frame, signs, alarms);
+    fitWords(root);
+  };
+  store.on('alarms', update);
+  window.addEventListener('resize', () => fitWords(root));
+  store.on('connection', update);
+  update();
+  // A page that has just been opened is given time to connect.
+  setTimeout(() => {
+    wasConnected = true;
+    update();
+  }, CONNECTS_WITHIN_MS);
+  return { kinds: () => [...alarms.values()].map((alarm) => alarm.kind) };
+}
+
+/** What only the page can know: that it hears nothing from the server any more. */
+function ownAlarms(store) {
+  return store.connected ? [] : [{
+    id: 'page-connection', kind: 'connection', subject: '',
+    text: 'This page has lost its connection to the simulation and tries to get it back.',
+  }];
+}
+
+function makeChip(alarm) {
+  return element('div', { class: 'alarm' }, icon(alarm.kind),
+    element('span', { class: 'alarm-word' }), element('span', { class: 'alarm-subject' }));
+}
+
+function describe(entry, scene) {
+  const [word, urgent] = KINDS[entry.kind] ?? [oneLine(entry.kind).replaceAll('_', ' '), true];
+  entry.urgent = urgent;
+  entry.chip.className = `alarm ${urgent ? 'urgent' : 'minor'}${entry.ended ? ' ended' : ''}`;
+  entry.chip.dataset.kind = entry.kind;
+  const since = Number.isFinite(entry.since_t) ? ` (since ${clockTime(entry.since_t)})` : '';
+  entry.chip.title = oneLine(entry.text) + since;
+  setText(entry.chip.querySelector('.alarm-word'), word);
+  // Which vehicle it is must be said; that the recorder records need not.
+  const isVehicle = scene?.vehicles.some((vehicle) => vehicle.id === entry.subject);
+  setText(entry.chip.querySelector('.alarm-subject'), isVehicle ? entry.subject : '');
+}
+
+/** Leave out words, those of minor and ended alarms first, until all alarms are to be seen. */
+function fitWords(root) {
+  for (const words of ['all', 'urgent', 'none']) {
+    root.dataset.words = words;
+    // One pixel for rounding: the title gives way almost, not wholly, alone.
+    if (root.scrollWidth <= root.clientWidth + 1) {
+      return;
+    }
+  }
+}
+
+function paint(frame, signs, alarms) {
+  const all = [...alarms.values()];
+  const active = all.filter((alarm) => !alarm.ended);
+  const worst = ['urgent', 'minor'].find(
+    (level) => all.some((alarm) => alarm.urgent === (level === 'urgent'))) ?? '';
+  const relevant = all.filter((alarm) => alarm.urgent === (worst === 'urgent'));
+  frame.hidden = worst === '';
+  frame.className = worst;
+  frame.classList.toggle('ended', !relevant.some((alarm) => !alarm.ended));
+  frame.dataset.kind = (active.find((alarm) => relevant.includes(alarm)) ?? relevant[0])?.kind
+    ?? '';
+  const kinds = [...new Set(relevant.map((alarm) => alarm.kind))];
+  if (signs.dataset.kinds !== kinds.join(' ')) {
+    signs.dataset.kinds = kinds.join(' ');
+    signs.className = worst;
+    signs.replaceChildren(...kinds.map((kind) => icon(kind)));
+  }
+}

@@ -1,0 +1,50 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** A bar that moves while something takes long, with words and the seconds it has taken. */
+
+import { element, setText } from '../driving/dom.js';
+
+const SHOWN_AFTER_MS = 300;
+const COUNTED_AFTER_S = 2;
+
+/** Hidden until begun. */
+export class Busy {
+  #text = element('span', {});
+  #timer = 0;
+  #since = 0;
+  #words = '';
+
+  constructor() {
+    this.root = element('div', { class: 'busy', role: 'status', hidden: true },
+      element('div', { class: 'busy-bar', 'aria-hidden': 'true' }), this.#text);
+  }
+
+  /**
+   * Begin, or go on with other words; the seconds are counted from the first.
+   *
+   * @param {string} words what is being done
+   */
+  say(words) {
+    this.#words = words;
+    if (this.#timer === 0) {
+      this.#since = performance.now();
+      this.#timer = setInterval(() => this.#show(), 100);
+    }
+    this.#show();
+  }
+
+  /** Hide it. */
+  end() {
+    clearInterval(this.#timer);
+    this.#timer = 0;
+    this.root.hidden = true;
+  }
+
+  #show() {
+    const passed_ms = performance.now() - this.#since;
+    this.root.hidden = passed_ms < SHOWN_AFTER_MS;
+    const seconds = Math.floor(passed_ms / 1e3);
+    setText(this.#text,
+      seconds >= COUNTED_AFTER_S ? `${this.#words} ${seconds} s` : this.#words);
+  }
+}

@@ -1,0 +1,104 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** One scrolling plot: a title with the newest values, and Plotly below. */
+
+import { element, setAttribute, setText } from '../driving/dom.js';
+import { fixed } from './format.js';
+
+const CONFIG = { displayModeBar: false, doubleClick: 'reset', showTips: false };
+// While it scrolls nothing can be pointed at, which saves setting up handlers at each redrawing.
+const SCROLLING = { ...CONFIG, staticPlot: true };
+const HOVER_DIGITS = 3;
+
+/** A plot of one quantity over time. */
+export class Chart {
+  #Plotly;
+  #quantity;
+  #plot = element('div', { class: 'chart-plot' });
+  #values = element('span', { class: 'chart-values' });
+  #shown = new Map();
+  #box = null;
+
+  /**
+   * @param {object} Plotly the library
+   * @param {object} quantity key, title, unit, digits and, where it has several lines, lines
+   */
+  constructor(Plotly, quantity) {
+    this.#Plotly = Plotly;
+    this.#quantity = quantity;
+    const lines = quantity.lines?.length > 1 ? quantity.lines.map((line, i) => element('span', {
+      class: `line-name line-${i}`, text: line.name,
+    })) : [];
+    this.root = element('div', { class: 'chart', 'data-key': quantity.key },
+      element('div', { class: 'chart-head' },
+        element('h3', { text: quantity.title }),
+        element('span', { class: 'dim', text: quantity.unit }), ...lines, this.#values),
+      this.#plot);
+    // Asking for the size at each redrawing would make the browser lay out the page.
+    new ResizeObserver(([entry]) => { this.#box = entry.contentRect; }).observe(this.#plot);
+  }
+
+  /**
+   * Draw.
+   *
+   * @param {object[]} traces name, color, dash, x, y and now, the newest value
+   * @param {object} view from and to [s], cursor [s] or null, colours, rem [px], frozen
+   */
+  update(traces, view) {
+    this.#showValues(traces);
+    const box = this.#box;
+    if (box === null || box.width === 0) {
+      return;
+    }
+    this.#Plotly.react(this.#plot, traces.map((trace) => ({
+      type: 'scatter', mode: 'lines', x: trace.x, y: trace.y, name: trace.name,
+      line: { color: trace.color, width: 1.5 + 0.03 * view.rem, dash: trace.dash },
+      hovertemplate: `%{y:.${HOVER_DIGITS}f}`, connectgaps: false,
+    })), this.#layout(view, box), view.frozen ? CONFIG : SCROLLING);
+  }
+
+  #layout(view, box) {
+    const { colours, rem } = view;
+    const axis = {
+      gridcolor: colours.grid, linecolor: colours.grid, zeroline: false, fixedrange: !view.frozen,
+      tickfont: { size: 0.72 * rem, color: colours.text }, ticks: '',
+    };
+    return {
+      width: box.width, height: box.height, showlegend: false,
+      margin: { l: 2.9 * rem, r: 0.5 * rem, t: 0.4 * rem, b: 1.4 * rem },
+      paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
+      font: { family: 'system-ui, sans-serif', size: 0.75 * rem, color: colours.text },
+      hovermode: view.frozen ? 'x unified' : false, dragmode: view.frozen ? 'zoom' : false,
+      hoverlabel: { bgcolor: colours.surface, bordercolor: colours.grid },
+      xaxis: { ...axis, range: [view.from, view.to], nticks: 6, hoverformat: '.2f' },
+      yaxis: {
+        ...axis, nticks: 5, zeroline: !this.#quantity.range, zerolinecolor: colours.grid,
+        ...(this.#quantity.range ? { range: this.#quantity.range } : { rangemode: 'normal' }),
+      },
+      shapes: view.cursor === null ? [] : [{
+        type: 'line', x0: view.cursor, x1: view.cursor, yref: 'paper', y0: 0, y1: 1,
+        line: { color: colours.text, width: 1 },
+      }],
+    };
+  }
+
+  #showValues(traces) {
+    if (this.#shown.size !== traces.length
+        || traces.some((trace) => this.#shown.get(trace.name)?.dataset.color !== trace.color)) {
+      this.#shown = new Map(traces.map((trace) => {
+        const node = element('span', {
+          class: 'chart-value', title: trace.name, 'data-color': trace.color,
+          'data-dash': trace.dash,
+        });
+        node.style.setProperty('--line', trace.color);
+        return [trace.name, node];
+      }));
+      this.#values.replaceChildren(...this.#shown.values());
+    }
+    for (const trace of traces) {
+      const node = this.#shown.get(trace.name);
+      setText(node, fixed(trace.now, this.#quantity.digits));
+      setAttribute(node, 'hidden', !Number.isFinite(trace.now));
+    }
+  }
+}

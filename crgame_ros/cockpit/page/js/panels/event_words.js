@@ -1,0 +1,98 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What an event of a game does, and when it happens by itself, in words. */
+
+import { fixed, NONE } from './format.js';
+
+const THINGS = {
+  constructionZone: 'a construction zone', parkedVehicle: 'a parked vehicle',
+  roadBoundary: 'a barrier', unknown: 'an obstacle',
+};
+const KMH = 3.6;
+
+const ACTIONS = {
+  release: (event) => `Lets obstacle ${event.object} go, which waits until then`,
+  brake: (event) => `Obstacle ${event.object} brakes at ${fixed(event.deceleration, 1)} m/s² to `
+    + (event.speed > 0 ? speed(event.speed) : 'a stop'),
+  obstacle: (event) => `Puts ${THINGS[event.type] ?? THINGS.unknown} of `
+    + `${fixed(event.length, 1)} × ${fixed(event.width, 1)} m ${place(event)}`,
+  speed_limit: (event) => `Sets the speed limit of ${lanelets(event.lanelets)} to `
+    + speed(event.speed),
+  plan_display: (event) => `${event.show ? 'Shows' : 'Hides'} the plan of ${event.av}`,
+  planner: (event) => `Replaces the planner of ${event.av} by ${baseName(event.planner)}`,
+  planner_run: (event) => (event.run ? `Lets the planner of ${event.av} go on`
+    : `Stops the planner of ${event.av}: it is asked for no plan`),
+};
+
+const TITLES = {
+  release: 'Release', brake: 'Brake', obstacle: 'Obstacle', speed_limit: 'Speed limit',
+  plan_display: 'Plan display', planner: 'Planner', planner_run: 'Planner stop or go',
+};
+
+/**
+ * @param {object} event an entry of scene.events
+ * @returns {string} its kind, for people
+ */
+export function eventKind(event) {
+  return Object.hasOwn(TITLES, event.kind) ? TITLES[event.kind]
+    : String(event.kind ?? '').replaceAll('_', ' ');
+}
+
+/**
+ * @param {object} event an entry of scene.events
+ * @returns {string} a sentence on what it does; for an unknown kind its parameters
+ */
+export function eventWords(event) {
+  if (Object.hasOwn(ACTIONS, event.kind)) {
+    return `${ACTIONS[event.kind](event)}.`;
+  }
+  return Object.entries(event)
+    .filter(([key, value]) => !['name', 'label', 'kind', 'when'].includes(key)
+      && ['string', 'number', 'boolean'].includes(typeof value))
+    .map(([key, value]) => `${key} ${value}`).join(', ');
+}
+
+/**
+ * @param {object|null|undefined} when the condition of an event
+ * @returns {string} under which it fires by itself; empty if only the button does
+ */
+export function conditionWords(when) {
+  if (!when) {
+    return '';
+  }
+  if ('time' in when) {
+    return `by itself at ${fixed(when.time, 1)} s`;
+  }
+  if ('step' in when) {
+    return `by itself at step ${when.step}`;
+  }
+  if ('between' in when) {
+    return `by itself when ${when.between.join(' and ')} are within ${fixed(when.distance, 0)} m`;
+  }
+  return `by itself when ${when.vehicle} is within ${fixed(when.radius, 0)} m of `
+    + `(${fixed(when.x, 0)}, ${fixed(when.y, 0)})`;
+}
+
+function speed(value) {
+  const shown = fixed(value * KMH, 0);
+  return shown === NONE ? 'another speed' : `${shown} km/h`;
+}
+
+function place(event) {
+  return `at (${fixed(event.x, 0)}, ${fixed(event.y, 0)})`;
+}
+
+function lanelets(ids) {
+  if (!ids?.length) {
+    return 'all roads';
+  }
+  return `${ids.length === 1 ? 'lanelet' : 'lanelets'} ${ids.join(', ')}`;
+}
+
+/**
+ * @param {string} spec of a planner or a driver
+ * @returns {string} the same with the name instead of the path of a file in it
+ */
+export function baseName(spec) {
+  return String(spec ?? '').replace(/(?:[^\s:]*\/)+/g, '');
+}

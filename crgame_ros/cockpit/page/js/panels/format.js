@@ -1,0 +1,56 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Numbers, times and lists as people read them. */
+
+/** What stands where there is no value. */
+export const NONE = '–';
+
+/**
+ * @param {number|null|undefined} value
+ * @param {number} digits after the point
+ * @returns {string} with a true minus sign; NONE when it is no number
+ */
+export function fixed(value, digits) {
+  if (value === null || value === undefined || !Number.isFinite(Number(value))) {
+    return NONE;
+  }
+  const text = Number(value).toFixed(digits);
+  const rounded = Number(text) === 0 ? (0).toFixed(digits) : text;
+  return rounded.replace('-', '−');
+}
+
+/**
+ * @param {number|null|undefined} seconds simulation time [s]
+ * @returns {string} as the clock in the header shows it: 65.2 s
+ */
+export function clockTime(seconds) {
+  return Number.isFinite(seconds) ? `${fixed(seconds, 1)} s` : NONE;
+}
+
+/**
+ * @param {number|null|undefined} value a whole number
+ * @returns {string} with thin spaces between thousands
+ */
+export function count(value) {
+  return fixed(value, 0).replace(/\B(?=(\d{3})+(?!\d))/g, '\u202f');
+}
+
+/**
+ * @param {number} number how many
+ * @param {string} one the noun in the singular
+ * @param {string} [many] the plural; by default with an s
+ * @returns {string} "1 vehicle", "3 vehicles"
+ */
+export function plural(number, one, many = `${one}s`) {
+  return `${number} ${number === 1 ? one : many}`;
+}
+
+/**
+ * Make one readable line of whatever a server or an exception said.
+ *
+ * @param {unknown} text
+ * @returns {string}
+ */
+export function oneLine(text) {
+  return String(text ?? '').replace(/\s+/g, ' ').trim();
+}

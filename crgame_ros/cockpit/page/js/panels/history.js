@@ -1,0 +1,294 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The panel of scrolling plots (FastSim's history of the host vehicle). */
+
+import { element, setAttribute, setText } from '../driving/dom.js';
+import { onThemeChange, themeColor } from '../world/palette.js';
+import { Chart } from './chart.js';
+import { recall, remember } from './memory.js';
+import { loadPlotly } from './plotly.js';
+import { QUANTITIES, traces } from './quantities.js';
+import { HealthLog } from './series.js';
+
+const WINDOWS_S = [10, 30, 120];
+const KEPT_S = 120;
+// Each visible plot is redrawn so often [ms]; only one of them in an animation frame, because
+// drawing all at once would take the time of several.
+const PERIOD_MS = 400;
+// The share of a replay's window that lies after the shown time.
+const AHEAD = 0.35;
+// Colours by role in the order of the vehicles; the first two are those of the map.
+const COLOURS = {
+  human: ['human', 'series-1', 'series-2'], autonomous: ['av', 'series-3', 'series-4'],
+};
+const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'text-dim', 'surface'];
+
+/** The panel's parts and what is chosen in it. */
+class HistoryPanel {
+  /** Script time of the last redrawing of one plot [ms]. */
+  cost_ms = 0;
+  /** Redrawings so far. */
+  redrawn = 0;
+
+  #root;
+  #store;
+  #health = new HealthLog(KEPT_S);
+  #charts = new Map();
+  #inView = new Set();
+  #waiting = [];
+  #pasts = null;
+  #rem_px = 16;
+  #selected = new Set();
+  #window_s = Number(recall('window')) || 30;
+  #frozen = null;
+  #due_ms = 0;
+  #loading = false;
+  #theme = {};
+  #chosen = false;
+  #chips = element('div', { class: 'chips', role: 'group', 'aria-label': 'Vehicles' });
+  #windows = element('div', { class: 'segments', role: 'group', 'aria-label': 'Time window' });
+  #freeze = element('button', {
+    type: 'button', 'aria-pressed': 'false', text: 'Freeze', title: 'Stop the plots to look at '
+      + 'them: point for values, drag to zoom, double-click to zoom out',
+    on: { click: () => this.freeze(this.#frozen === null) },
+  });
+  #hint = element('p', { class: 'hint', text: 'Loading the plots …' });
+  #body = element('div', { class: 'charts' });
+
+  constructor(root, store) {
+    this.#root = root;
+    this.#store = store;
+    for (const seconds of WINDOWS_S) {
+      this.#windows.append(element('button', {
+        type: 'button', text: `${seconds} s`, 'data-seconds': seconds,
+        on: { click: () => this.setWindow(seconds) },
+      }));
+    }
+    root.append(element('div', { class: 'history-bar' }, this.#windows, this.#freeze),
+      this.#chips, this.#hint, this.#body);
+    this.setWindow(WINDOWS_S.includes(this.#window_s) ? this.#window_s : 30);
+    store.on('scene', () => this.#newScene());
+    store.on('seats', () => this.#selectOwn());
+    store.on('epoch', () => this.#health.clear());
+    store.on('status', (status) => this.#health.take(status));
+    onThemeChange(() => this.#readTheme());
+    this.#readTheme();
+    if (store.scene !== null) {
+      this.#newScene();
+    }
+    const frame = (now_ms) => {
+      this.#frame(now_ms);
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  /** @param {boolean} on whether the plots stand still, to be looked at closely */
+  freeze(on) {
+    this.#frozen = on ? this.#now() : null;
+    setAttribute(this.#freeze, 'aria-pressed', String(on));
+    setText(this.#freeze, on ? 'Go on' : 'Freeze');
+    this.#redrawAll();
+  }
+
+  /** @param {number} seconds how much time the plots show */
+  setWindow(seconds) {
+    this.#window_s = seconds;
+    remember('window', String(seconds));
+    for (const button of this.#windows.children) {
+      button.setAttribute('aria-pressed', String(Number(button.dataset.seconds) === seconds));
+    }
+    this.#redrawAll();
+  }
+
+  /**
+   * @param {string} id of a vehicle
+   * @param {boolean} on whether it is plotted
+   */
+  select(id, on) {
+    if (on) {
+      this.#selected.add(id);
+    } else {
+      this.#selected.delete(id);
+    }
+    this.#showChips();
+    this.#redrawAll();
+  }
+
+  #newScene() {
+    const ids = new Set(this.#store.scene.vehicles.map((vehicle) => vehicle.id));
+    this.#selected = new Set([...this.#selected].filter((id) => ids.has(id)));
+    this.#chosen = this.#chosen && this.#selected.size > 0;
+    this.#selectOwn();
+    this.#frozen = null;
+    setAttribute(this.#freeze, 'aria-pressed', 'false');
+    setText(this.#freeze, 'Freeze');
+    this.#makeChips();
+  }
+
+  /** Until somebody chooses, the vehicle is shown that this page drives, or the first. */
+  #selectOwn() {
+    const vehicles = this.#store.scene?.vehicles ?? [];
+    const own = vehicles.find(
+      (vehicle) => this.#store.seats[vehicle.id]?.holder === this.#store.me.id);
+    if (!this.#chosen && vehicles.length > 0 && (own || this.#selected.size === 0)) {
+      this.#selected = new Set([(own ?? vehicles[0]).id]);
+      this.#showChips();
+    }
+  }
+
+  #makeChips() {
+    this.#chips.replaceChildren(...(this.#store.scene?.vehicles ?? []).map(({ id }) => element(
+      'button', {
+        type: 'button', class: 'chip', 'data-id': id, text: id,
+        on: {
+          click: () => {
+            this.#chosen = true;
+            this.select(id, !this.#selected.has(id));
+          },
+        },
+      })));
+    this.#showChips();
+  }
+
+  #showChips() {
+    const colours = this.#lineColours();
+    for (const chip of this.#chips.children) {
+      const { id } = chip.dataset;
+      setAttribute(chip, 'aria-pressed', String(this.#selected.has(id)));
+      chip.style.setProperty('--line', colours.get(id));
+    }
+  }
+
+  /** Colours cost a style calculation each, so they are read when they change. */
+  #readTheme() {
+    this.#theme = Object.fromEntries(THEME.map((name) => [name, themeColor(name)]));
+    this.#showChips();
+    this.#redrawAll();
+  }
+
+  #lineColours() {
+    const seen = { human: 0, autonomous: 0 };
+    return new Map((this.#store.scene?.vehicles ?? []).map(({ id, role }) => {
+      const names = COLOURS[role] ?? COLOURS.human;
+      const name = names[seen[role] % names.length];
+      seen[role] += 1;
+      return [id, this.#theme[name]];
+    }));
+  }
+
+  #now() {
+    return this.#store.mode === 'replay'
+      ? this.#store.displayed(performance.now())?.t ?? 0 : this.#store.latest?.t ?? 0;
+  }
+
+  #redrawAll() {
+    this.#pasts = null;
+    this.#waiting = [...this.#charts.values()].filter((chart) => this.#inView.has(chart.root));
+  }
+
+  #frame(now_ms) {
+    if (this.#root.closest('[hidden]') || document.hidden) {
+      return;
+    }
+    if (this.#charts.size === 0) {
+      this.#load();
+      return;
+    }
+    if (this.#waiting.length === 0 && this.#frozen === null && now_ms >= this.#due_ms) {
+      this.#due_ms = now_ms + PERIOD_MS;
+      this.#redrawAll();
+    }
+    const before_ms = performance.now();
+    if (this.#waiting.length > 0 && this.#pasts === null) {
+      this.#pasts = this.#gather();
+    } else if (this.#waiting.length > 0) {
+      this.#draw(this.#waiting.shift());
+      this.cost_ms = performance.now() - before_ms;
+      this.redrawn += 1;
+    }
+  }
+
+  async #load() {
+    if (this.#loading) {
+      return;
+    }
+    this.#loading = true;
+    try {
+      const Plotly = await loadPlotly();
+      this.#hint.hidden = true;
+      this.#makeCharts(Plotly);
+      this.#loading = false;
+    } catch (error) {
+      setText(this.#hint, error.message);
+      // The next opening of the panel tries again.
+      const observer = new MutationObserver(() => {
+        observer.disconnect();
+        this.#loading = false;
+      });
+      observer.observe(this.#root, { attributeFilter: ['hidden'] });
+    }
+  }
+
+  #makeCharts(Plotly) {
+    const observer = new IntersectionObserver((entries) => {
+      for (const entry of entries) {
+        if (entry.isIntersecting) {
+          this.#inView.add(entry.target);
+          this.#waiting.push(...[...this.#charts.values()].filter(
+            (chart) => chart.root === entry.target));
+        } else {
+          this.#inView.delete(entry.target);
+        }
+      }
+    }, { root: this.#root });
+    for (const quantity of QUANTITIES) {
+      const chart = new Chart(Plotly, quantity);
+      chart.quantity = quantity;
+      this.#charts.set(quantity.key, chart);
+      this.#body.append(chart.root);
+      observer.observe(chart.root);
+    }
+    new ResizeObserver(() => {
+      this.#rem_px = parseFloat(getComputedStyle(document.documentElement).fontSize);
+      this.#redrawAll();
+    }).observe(this.#body);
+  }
+
+  #draw(chart) {
+    const shown = this.#frozen ?? this.#now();
+    const replay = this.#store.mode === 'replay';
+    const to = Math.max(replay ? shown + AHEAD * this.#window_s : shown, this.#window_s);
+    const view = {
+      shown, to, from: to - this.#window_s, cursor: replay ? shown : null,
+      frozen: this.#frozen !== null,
+      rem: this.#rem_px,
+      colours: {
+        grid: this.#theme.border, text: this.#theme['text-dim'], surface: this.#theme.surface,
+      },
+    };
+    chart.update(traces(chart.quantity, {
+      vehicles: this.#pasts, health: this.#health, runColor: this.#theme.accent,
+    }, view), view);
+  }
+
+  /** What all plots of one round are made from. */
+  #gather() {
+    const colours = this.#lineColours();
+    const vehicles = this.#store.scene?.vehicles ?? [];
+    return vehicles.flatMap(({ id, role }, index) => (this.#selected.has(id) ? [{
+      id, role, color: colours.get(id), past: this.#store.history(index, KEPT_S),
+    }] : []));
+  }
+}
+
+/**
+ * Make the panel.
+ *
+ * @param {HTMLElement} root #panel-history
+ * @param {import('../store.js').Store} store
+ * @returns {HistoryPanel}
+ */
+export function createHistory(root, store) {
+  return new HistoryPanel(root, store);
+}

@@ -1,0 +1,34 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What the page keeps on this machine between visits: preferences, nothing about a run. */
+
+const PREFIX = 'crgame.';
+
+/**
+ * @param {string} name of a preference
+ * @returns {string} its value; empty if none was kept or the browser keeps nothing
+ */
+export function recall(name) {
+  try {
+    return window.localStorage.getItem(PREFIX + name) ?? '';
+  } catch {
+    // Storage may be forbidden in the browser: each visit then begins with the defaults.
+    return '';
+  }
+}
+
+/**
+ * @param {string} name of a preference
+ * @param {string} value to keep; an empty one forgets it
+ */
+export function remember(name, value) {
+  try {
+    if (value === '') {
+      window.localStorage.removeItem(PREFIX + name);
+    } else {
+      window.localStorage.setItem(PREFIX + name, value);
+    }
+  } catch {
+    // As above: a preference that cannot be kept lasts until the page is closed.
+  }
+}

@@ -1,0 +1,79 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Messages that come and go over the world. */
+
+import { element, setText } from '../driving/dom.js';
+import { oneLine } from './format.js';
+import { icon } from './icons.js';
+
+// How long a message stays [ms]; an error stays until it is closed or many came after it.
+const STAYS_MS = { info: 5000, warn: 9000, error: 0 };
+const MOST = 4;
+
+/**
+ * Show the notices of the server and of the page's own parts.
+ *
+ * @param {HTMLElement} root #notices
+ * @param {import('../store.js').Store} store
+ * @returns {{show: function(string, string): void}} show takes the level and the text
+ */
+export function createNotices(root, store) {
+  const shown = new Map();
+  const show = (level, text) => {
+    const known = Object.hasOwn(STAYS_MS, level) ? level : 'info';
+    const line = oneLine(text);
+    const key = `${known} ${line}`;
+    const toast = shown.get(key) ?? new Toast(known, line, () => shown.delete(key));
+    if (!shown.has(key)) {
+      shown.set(key, toast);
+      root.append(toast.root);
+      while (shown.size > MOST) {
+        shown.values().next().value.close();
+      }
+    }
+    toast.again();
+  };
+  store.on('notice', (notice) => show(notice.level, notice.text));
+  return { show };
+}
+
+class Toast {
+  #times = 0;
+  #timer = 0;
+  #stays_ms;
+  #closed;
+  #count = element('span', { class: 'toast-count' });
+
+  constructor(level, text, closed) {
+    this.#stays_ms = STAYS_MS[level];
+    this.#closed = closed;
+    this.root = element('div', {
+      class: `toast toast-${level}`, role: level === 'error' ? 'alert' : 'status',
+      on: { pointerenter: () => clearTimeout(this.#timer), pointerleave: () => this.#wait() },
+    }, icon(level), element('span', { class: 'toast-text', text }), this.#count,
+    element('button', {
+      type: 'button', class: 'icon-button', 'aria-label': 'Close this message',
+      on: { click: () => this.close() },
+    }, icon('close')));
+  }
+
+  /** The same message once more: counted instead of repeated. */
+  again() {
+    this.#times += 1;
+    setText(this.#count, this.#times > 1 ? `×${this.#times}` : '');
+    this.#wait();
+  }
+
+  close() {
+    clearTimeout(this.#timer);
+    this.root.remove();
+    this.#closed();
+  }
+
+  #wait() {
+    clearTimeout(this.#timer);
+    if (this.#stays_ms > 0) {
+      this.#timer = setTimeout(() => this.close(), this.#stays_ms);
+    }
+  }
+}

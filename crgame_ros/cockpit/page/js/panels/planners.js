@@ -1,0 +1,115 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** How each AV's planner does, and the switch that stops it and lets it go on. */
+
+import { element, setAttribute, setText } from '../driving/dom.js';
+import { baseName } from './event_words.js';
+import { count, fixed, oneLine } from './format.js';
+import { icon } from './icons.js';
+
+const COLUMNS = [
+  ['Latency', 'from the request to the plan', (p) => fixed(p.latency_ms, 0), 'ms'],
+  ['Age', 'of the plan that is being followed', (p) => fixed(p.age_ms, 0), 'ms'],
+  ['Accepted', 'plans taken', (p) => count(p.accepted), ''],
+  ['Refused', 'plans that broke a rule', (p) => count(p.refused), ''],
+  ['Fallbacks', 'brakings where the planner found no plan', (p) => count(p.fallbacks), ''],
+];
+
+/**
+ * Make the table.
+ *
+ * @param {HTMLElement} root #planners
+ * @param {import('../store.js').Store} store
+ * @param {import('../connection.js').Connection} connection
+ */
+export function createPlanners(root, store, connection) {
+  const empty = element('p', { class: 'hint', text: 'No autonomous vehicle takes part.' });
+  const table = element('table', { class: 'planners' },
+    element('caption', { class: 'unseen', text: 'Planners' }),
+    element('thead', {}, element('tr', {}, element('th', { scope: 'col', text: 'AV' }),
+      ...COLUMNS.map(([name, explanation, , unit]) => element('th', {
+        scope: 'col', title: explanation, text: name,
+      }, unit ? element('span', { class: 'unit', text: unit }) : null)))));
+  root.append(element('h2', { text: 'Planners' }), empty, table);
+  const rows = new Map();
+
+  const update = () => {
+    if (root.closest('[hidden]')) {
+      return;
+    }
+    for (const [av, row] of rows) {
+      row.update(store.status?.planners?.[av] ?? {}, store);
+    }
+  };
+  const rebuild = () => {
+    for (const row of rows.values()) {
+      row.root.remove();
+    }
+    rows.clear();
+    for (const vehicle of store.scene?.vehicles ?? []) {
+      if (vehicle.role === 'autonomous') {
+        rows.set(vehicle.id, makeRow(vehicle.id, connection));
+      }
+    }
+    table.append(...[...rows.values()].map((row) => row.root));
+    table.hidden = rows.size === 0;
+    empty.hidden = rows.size > 0;
+    update();
+  };
+  store.on('scene', rebuild);
+  store.on('status', update);
+  store.on('connection', update);
+  new MutationObserver(update).observe(root.parentElement, { attributeFilter: ['hidden'] });
+  rebuild();
+}
+
+function makeRow(av, connection) {
+  const name = element('span', { class: 'dim planner-name' });
+  const state = element('span', { class: 'tag' });
+  const error = element('p', { class: 'field-error', role: 'alert' });
+  const refusal = element('p', { class: 'dim refusal' });
+  const cells = COLUMNS.map(() => element('td', {}));
+  const wanted = { run: true };
+  const button = element('button', {
+    type: 'button', class: 'planner-switch',
+    on: {
+      click: async () => {
+        button.disabled = true;
+        const reply = await connection.request({ type: 'planner', av, run: wanted.run });
+        setText(error, reply.ok ? '' : oneLine(reply.text));
+        button.disabled = false;
+      },
+    },
+  });
+  return {
+    root: element('tbody', { 'data-av': av },
+      element('tr', { class: 'planner-head' }, element('td', { colspan: COLUMNS.length + 1 },
+        element('div', {}, element('strong', { class: 'av', text: av }), name, state, button),
+        refusal, error)),
+      element('tr', {}, element('td', {}), ...cells)),
+    update(planner, store) {
+      const stopped = planner.running === false;
+      wanted.run = stopped;
+      setText(name, baseName(planner.planner || store.scene?.planners?.[av]));
+      // While it is stopped a plan grows old because nobody asks for another.
+      const word = stopped ? 'stopped' : planner.stale ? 'stale' : 'running';
+      setText(state, word);
+      setAttribute(state, 'data-state', word);
+      const label = `${stopped ? 'Let the planner of' : 'Stop the planner of'} ${av}`
+        + `${stopped ? ' go on' : ''}`;
+      if (button.title !== label) {
+        button.replaceChildren(icon(stopped ? 'go' : 'stop'), stopped ? 'Go' : 'Stop');
+        button.title = label;
+        button.setAttribute('aria-label', label);
+      }
+      setAttribute(button, 'hidden', store.mode === 'replay');
+      cells.forEach((cell, at) => setText(cell, COLUMNS[at][2](planner)));
+      setAttribute(cells[1], 'data-late', Boolean(planner.stale) && !stopped);
+      const why = oneLine(planner.last_refusal);
+      setText(refusal, [
+        planner.plan_time_ms > 0 ? `plans in ${fixed(planner.plan_time_ms, 1)} ms` : '',
+        why ? `last refused: ${why}` : '',
+      ].filter(Boolean).join(', '));
+    },
+  };
+}

@@ -1,0 +1,28 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The Plotly library, which the server has: loaded when a plot is first wanted. */
+
+const ADDRESS = '/plotly.js';
+
+let loading = null;
+
+/**
+ * Load the library once; after a failure the next call tries again.
+ *
+ * @returns {Promise<object>} Plotly
+ * @throws {Error} if it cannot be loaded
+ */
+export function loadPlotly() {
+  loading ??= new Promise((resolve, reject) => {
+    const script = document.createElement('script');
+    script.src = ADDRESS;
+    script.addEventListener('load', () => resolve(window.Plotly));
+    script.addEventListener('error', () => {
+      loading = null;
+      script.remove();
+      reject(new Error('The plots cannot be drawn: the server does not give the library Plotly.'));
+    });
+    document.head.append(script);
+  });
+  return loading;
+}

@@ -1,0 +1,259 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The panel that chooses, previews and loads a scenario (FastSim's scenario loading area). */
+
+import { element, setAttribute, setText } from '../driving/dom.js';
+import { Busy } from './busy.js';
+import { acceptDrops } from './drop.js';
+import { oneLine, plural } from './format.js';
+import { icon } from './icons.js';
+import { fetchPreview, fetchScenarios, load, upload } from './scenario_api.js';
+import { ScenarioForm } from './scenario_form.js';
+import { ScenarioList } from './scenario_list.js';
+import { ScenarioPreview } from './scenario_preview.js';
+
+// What the server refuses anyway is not even sent [bytes].
+const LARGEST_FILE = 64 * 1024 * 1024;
+// After this the page no longer waits for the loaded run to begin [ms].
+const BEGINS_WITHIN_MS = 60000;
+
+/** The panel's parts and what is chosen in it. */
+class ScenarioPanel {
+  #store;
+  #connection;
+  #offered = { folders: [], planners: [], drivers: [] };
+  #chosen = '';
+  #abort = null;
+  #list = new ScenarioList((entry) => this.choose(entry.id));
+  #form = new ScenarioForm();
+  #busy = new Busy();
+  #canvas = element('canvas', { class: 'preview', 'aria-label': 'Preview of the scenario' });
+  #drawing = new ScenarioPreview(this.#canvas);
+  #facts = element('p', { class: 'dim' });
+  #name = element('h3', {});
+  #notices = element('ul', { class: 'notice-list' });
+  #errors = {
+    list: fieldError(), upload: fieldError(), preview: fieldError(), start: fieldError(),
+  };
+  #start = element('button', {
+    type: 'button', class: 'primary wide', disabled: true, on: { click: () => this.start() },
+  }, icon('go'), 'Start this scenario');
+  #warning = element('p', {
+    class: 'hint', hidden: true,
+    text: 'The present run ends for everybody. Its recording is kept.',
+  });
+  #card;
+  #dropZone;
+
+  constructor(root, store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    const file = element('input', {
+      type: 'file', accept: '.xml,text/xml,application/xml', class: 'unseen', tabindex: '-1',
+      'aria-label': 'CommonRoad file', on: {
+        change: () => {
+          this.take([...file.files]);
+          file.value = '';
+        },
+      },
+    });
+    this.#dropZone = element('div', { class: 'drop-zone' }, icon('upload'),
+      element('span', { text: 'Drop a CommonRoad file, or' }),
+      element('button', {
+        type: 'button', text: 'Choose …', on: { click: () => file.click() },
+      }), file);
+    this.#card = element('div', { class: 'card preview-card', hidden: true }, this.#canvas,
+      this.#name, this.#facts, this.#notices, this.#form.root);
+    root.append(this.#list.root, this.#errors.list,
+      this.#dropZone, this.#errors.upload, this.#card, this.#errors.preview,
+      element('div', { class: 'start-area' }, this.#busy.root, this.#warning,
+        this.#errors.start, this.#start));
+    store.on('status', () => this.#warn());
+    acceptDrops(this.#dropZone, (files) => {
+      if (store.mode !== 'live') {
+        return;
+      }
+      document.querySelector('#tab-scenario')?.click();
+      this.take(files);
+    });
+  }
+
+  /** Ask the server what there is. */
+  async refresh() {
+    try {
+      this.#offered = await fetchScenarios();
+      setText(this.#errors.list, '');
+    } catch (error) {
+      setText(this.#errors.list, error.message);
+    }
+    this.#list.show(this.#offered.folders, this.#chosen);
+  }
+
+  /** Preview an entry, so that it can be started. */
+  async choose(id) {
+    this.#abort?.abort();
+    const abort = new AbortController();
+    this.#abort = abort;
+    this.#chosen = id;
+    this.#clearErrors();
+    this.#list.mark(id);
+    this.#start.disabled = true;
+    this.#busy.say('Reading the scenario …');
+    try {
+      const preview = await fetchPreview(id, abort.signal);
+      this.#show(preview);
+    } catch (error) {
+      if (abort.signal.aborted) {
+        return;
+      }
+      this.#card.hidden = true;
+      setText(this.#errors.preview, error.message);
+    }
+    this.#busy.end();
+  }
+
+  /** Upload a file that somebody chose or dropped. */
+  async take(files) {
+    this.#clearErrors();
+    const [file] = files;
+    const wrong = refusal(files);
+    if (wrong) {
+      setText(this.#errors.upload, wrong);
+      return;
+    }
+    this.#busy.say(`Sending ${file.name} …`);
+    try {
+      const id = await upload(file);
+      await this.refresh();
+      await this.choose(id);
+    } catch (error) {
+      setText(this.#errors.upload, error.message);
+    }
+    this.#busy.end();
+  }
+
+  /** Load the chosen scenario and wait until its run begins. */
+  async start() {
+    this.#clearErrors();
+    this.#start.disabled = true;
+    this.#busy.say('Loading …');
+    const begun = this.#nextRun();
+    try {
+      const text = await load({ id: this.#chosen, ...this.#form.choices });
+      this.#busy.say(text ? `${text.replace(/[.…\s]+$/, '')} …` : 'Loading …');
+      await begun.promise;
+      if (this.#store.status?.run === 'paused') {
+        await this.#connection.request({ type: 'control', action: 'start' });
+      }
+    } catch (error) {
+      begun.cancel();
+      if (!this.#form.blame(error.message)) {
+        setText(this.#errors.start, error.message);
+      }
+    }
+    this.#busy.end();
+    this.#start.disabled = false;
+  }
+
+  /** Before it happens, say whose run it ends. */
+  #warn() {
+    const goesOn = ['running', 'paused'].includes(this.#store.status?.run);
+    setAttribute(this.#warning, 'hidden', this.#start.disabled || !goesOn);
+  }
+
+  /** Resolves when a run of a new epoch is no longer waiting for its planners. */
+  #nextRun() {
+    const before = this.#store.scene?.time?.epoch ?? this.#store.epoch;
+    const ends = [];
+    const cancel = () => ends.splice(0).forEach((end) => end());
+    const promise = new Promise((resolve, reject) => {
+      const timer = setTimeout(() => {
+        cancel();
+        reject(new Error('The run has not begun within a minute; the timing panel and the '
+          + 'terminal may tell why.'));
+      }, BEGINS_WITHIN_MS);
+      const look = () => {
+        const epoch = this.#store.scene?.time?.epoch ?? -1;
+        const run = this.#store.status?.run;
+        if (epoch > before && this.#store.status?.epoch === epoch) {
+          if (run === 'waiting') {
+            this.#busy.say('Waiting for the planners …');
+          } else {
+            cancel();
+            resolve();
+          }
+        }
+      };
+      ends.push(() => clearTimeout(timer), this.#store.on('status', look));
+    });
+    // When loading fails nobody waits for it any more.
+    promise.catch(() => {});
+    return { promise, cancel };
+  }
+
+  #show(preview) {
+    this.#card.hidden = false;
+    const { scene } = preview;
+    setText(this.#name, scene.title || scene.benchmark_id);
+    setText(this.#facts, [
+      scene.title === scene.benchmark_id ? '' : scene.benchmark_id,
+      plural(scene.lanelets.length, 'lanelet'), plural(preview.humans.length, 'human'),
+      plural(preview.avs.length, 'AV'), plural(scene.objects.length, 'other object'),
+    ].filter(Boolean).join(' · '));
+    this.#notices.replaceChildren(...(preview.notices ?? []).map(
+      (text) => element('li', {}, icon('info'), element('span', { text: oneLine(text) }))));
+    this.#form.show(preview, this.#offered.drivers ?? [], this.#offered.planners ?? []);
+    this.#drawing.show(preview);
+    this.#start.disabled = false;
+  }
+
+  #clearErrors() {
+    for (const error of Object.values(this.#errors)) {
+      setText(error, '');
+    }
+    this.#form.blame('');
+  }
+}
+
+function fieldError() {
+  return element('p', { class: 'field-error', role: 'alert' });
+}
+
+function refusal(files) {
+  if (files.length !== 1) {
+    return files.length === 0 ? 'That is no file.' : 'Drop one file at a time.';
+  }
+  const [file] = files;
+  if (!file.name.toLowerCase().endsWith('.xml')) {
+    return `${file.name} is no CommonRoad file: its name does not end in .xml.`;
+  }
+  return file.size > LARGEST_FILE ? `${file.name} is larger than 64 MB.` : '';
+}
+
+/**
+ * Make the panel. What there is to choose is asked for when the panel is first seen.
+ *
+ * @param {HTMLElement} root #panel-scenario
+ * @param {import('../store.js').Store} store
+ * @param {import('../connection.js').Connection} connection
+ * @returns {{refresh: function(): Promise<void>, choose: function(string): Promise<void>}}
+ */
+export function createScenario(root, store, connection) {
+  const replay = element('p', {
+    class: 'hint', hidden: true, text: 'A recording is being shown: nothing can be loaded.',
+  });
+  const body = element('div', { class: 'stack' });
+  root.append(replay, body);
+  const panel = new ScenarioPanel(body, store, connection);
+  const seen = () => {
+    replay.hidden = store.mode !== 'replay';
+    body.hidden = store.mode === 'replay';
+    if (!root.hidden && store.mode === 'live') {
+      panel.refresh();
+    }
+  };
+  new MutationObserver(seen).observe(root, { attributeFilter: ['hidden'] });
+  store.on('hello', seen);
+  seen();
+  return panel;
+}

@@ -1,0 +1,70 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The server's part in choosing a scenario; every refusal becomes an Error with one line. */
+
+import { oneLine } from './format.js';
+
+// Sent with all that changes something: no page of another site can add it unasked.
+const OWN = { 'X-Crgame': '1' };
+
+/** @returns {Promise<object>} folders with their entries, planners, drivers */
+export function fetchScenarios() {
+  return ask('/api/scenarios');
+}
+
+/**
+ * @param {string} id of an entry
+ * @param {AbortSignal} signal ends it
+ * @returns {Promise<object>} scene, states, humans, avs, notices
+ */
+export function fetchPreview(id, signal) {
+  return ask(`/api/preview?id=${encodeURIComponent(id)}`, { signal });
+}
+
+/**
+ * @param {File} file a CommonRoad file
+ * @returns {Promise<string>} id of its entry
+ */
+export async function upload(file) {
+  const reply = await ask(`/api/upload?name=${encodeURIComponent(file.name)}`, {
+    method: 'POST', body: file, headers: { ...OWN, 'Content-Type': 'application/xml' },
+  });
+  return reply.id;
+}
+
+/**
+ * @param {object} choice id, humans [{id, driver}], avs [{id, planner}]
+ * @returns {Promise<string>} what was done
+ */
+export async function load(choice) {
+  const reply = await ask('/api/load', {
+    method: 'POST', body: JSON.stringify(choice),
+    headers: { ...OWN, 'Content-Type': 'application/json' },
+  });
+  return oneLine(reply.text);
+}
+
+async function ask(path, options = {}) {
+  let response;
+  try {
+    response = await fetch(path, { credentials: 'same-origin', ...options });
+  } catch (error) {
+    if (error.name === 'AbortError') {
+      throw error;
+    }
+    throw new Error('The server does not answer.', { cause: error });
+  }
+  const text = await response.text();
+  let content = {};
+  try {
+    content = JSON.parse(text);
+  } catch {
+    // A refusal by the web server itself is plain text, and the text is its reason.
+    content = { error: response.ok ? 'The server sent no JSON.' : text.slice(0, 200) };
+  }
+  if (!response.ok || content.error || content.ok === false) {
+    throw new Error(oneLine(content.error || content.text || response.statusText)
+      || `The server refused (${response.status}).`);
+  }
+  return content;
+}

@@ -1,0 +1,96 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Who drives what in the chosen scenario. */
+
+import { element, setText } from '../driving/dom.js';
+import { baseName } from './event_words.js';
+
+const DRIVERS = {
+  auto: "this machine's wheel, gamepad or keyboard", idle: 'nobody', cockpit: 'a cockpit page',
+  evdev: 'a wheel or gamepad at this machine', joy: 'messages on the joy topic',
+};
+
+/** One choice for each human-driven and each autonomous vehicle. */
+export class ScenarioForm {
+  #rows = new Map();
+  #humans = [];
+  #avs = [];
+
+  constructor() {
+    this.root = element('div', { class: 'who' });
+  }
+
+  /**
+   * @param {object} preview as /api/preview gives it
+   * @param {string[]} drivers that can be chosen
+   * @param {string[]} planners that can be chosen
+   */
+  show(preview, drivers, planners) {
+    this.#rows.clear();
+    this.#humans = preview.humans.map((human) => human.id);
+    this.#avs = preview.avs.map((av) => av.id);
+    const nodes = [];
+    for (const { id, driver } of preview.humans) {
+      nodes.push(this.#row(id, 'human', 'driven by', driver, drivers, driverWords));
+    }
+    for (const { id, planner, planning_problem: problem } of preview.avs) {
+      const row = this.#row(id, 'av', 'planned by', planner, planners, baseName);
+      if (problem !== null && problem !== undefined) {
+        row.title = `planning problem ${problem}`;
+      }
+      nodes.push(row);
+    }
+    this.root.replaceChildren(...nodes);
+  }
+
+  /** Forget everything. */
+  clear() {
+    this.#rows.clear();
+    this.root.replaceChildren();
+  }
+
+  /** The choices: humans [{id, driver}], avs [{id, planner}]. */
+  get choices() {
+    const value = (id) => this.#rows.get(id).select.value;
+    return {
+      humans: this.#humans.map((id) => ({ id, driver: value(id) })),
+      avs: this.#avs.map((id) => ({ id, planner: value(id) })),
+    };
+  }
+
+  /**
+   * Put an error beside the vehicle that it names.
+   *
+   * @param {string} text the error; empty removes all
+   * @returns {boolean} false if it names no vehicle here
+   */
+  blame(text) {
+    let found = false;
+    for (const [id, { select, error }] of this.#rows) {
+      const named = text.split(/\W+/).includes(id)
+        || (select.value !== '' && text.includes(`"${select.value}"`));
+      setText(error, named && !found ? text : '');
+      select.setAttribute('aria-invalid', String(named && !found));
+      found ||= named;
+    }
+    return found;
+  }
+
+  #row(id, role, label, present, known, words) {
+    const all = [...new Set([present, ...known].filter(Boolean))];
+    const select = element('select', { 'aria-label': `${id} is ${label}` },
+      ...all.map((value) => element('option', {
+        value, selected: value === present, text: words(value),
+      })));
+    const error = element('p', { class: 'field-error', role: 'alert' });
+    this.#rows.set(id, { select, error });
+    return element('div', { class: 'who-row' },
+      element('strong', { class: role, text: id }),
+      element('span', { class: 'dim', text: label }), select, error);
+  }
+}
+
+function driverWords(driver) {
+  const words = Object.hasOwn(DRIVERS, driver) ? ` – ${DRIVERS[driver]}` : '';
+  return baseName(driver) + words;
+}

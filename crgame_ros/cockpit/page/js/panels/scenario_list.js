@@ -1,0 +1,92 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The scenarios to choose from, by folder, with a filter. */
+
+import { element } from '../driving/dom.js';
+import { icon } from './icons.js';
+
+const KINDS = { game: 'game', scenario: 'CommonRoad', upload: 'uploaded' };
+
+/** Games are made to be driven; a bare scenario comes after them. */
+function gamesFirst(entries) {
+  const isGame = (entry) => entry.kind === 'game';
+  return [...entries.filter(isGame), ...entries.filter((entry) => !isGame(entry))];
+}
+
+/** A list of buttons of which one is chosen. */
+export class ScenarioList {
+  #chosen;
+  #list = element('div', { class: 'scenario-list', role: 'radiogroup', 'aria-label': 'Scenario' });
+  #nothing = element('p', { class: 'hint', hidden: true });
+  #filter;
+  #entries = new Map();
+
+  /** @param {function(object): void} chosen gets the entry that somebody chose */
+  constructor(chosen) {
+    this.#chosen = chosen;
+    this.#filter = element('input', {
+      type: 'search', placeholder: 'Filter by name', 'aria-label': 'Filter the scenarios',
+      on: { input: () => this.#sift() },
+    });
+    this.root = element('div', { class: 'scenario-choice' }, this.#filter, this.#list,
+      this.#nothing);
+  }
+
+  /**
+   * @param {object[]} folders as /api/scenarios gives them
+   * @param {string} chosen id of the entry that is marked, empty for none
+   */
+  show(folders, chosen) {
+    this.#entries.clear();
+    this.#list.replaceChildren(...folders.filter((folder) => folder.entries.length > 0).map(
+      (folder) => element('div', { class: 'scenario-folder' },
+        element('h3', { text: folder.name }),
+        ...gamesFirst(folder.entries).map((entry) => this.#item(entry)))));
+    this.mark(chosen);
+    this.#sift();
+  }
+
+  /** @param {string} id of the entry to mark as chosen */
+  mark(id) {
+    for (const [other, { button }] of this.#entries) {
+      button.setAttribute('aria-checked', String(other === id));
+    }
+    this.#entries.get(id)?.button.scrollIntoView({ block: 'nearest' });
+  }
+
+  /**
+   * @param {string} id
+   * @returns {object|undefined} the entry with it
+   */
+  entry(id) {
+    return this.#entries.get(id)?.entry;
+  }
+
+  #item(entry) {
+    const title = entry.title || entry.name;
+    const button = element('button', {
+      type: 'button', role: 'radio', class: 'scenario', 'data-id': entry.id, title: entry.name,
+      on: { click: () => this.#chosen(entry) },
+    }, icon('check'),
+    element('span', { class: 'scenario-title', text: title }));
+    this.#entries.set(entry.id, {
+      entry, button, words: `${title} ${entry.name} ${KINDS[entry.kind]}`.toLowerCase(),
+    });
+    return button;
+  }
+
+  #sift() {
+    const wanted = this.#filter.value.toLowerCase().split(/\s+/).filter(Boolean);
+    let found = 0;
+    for (const { button, words } of this.#entries.values()) {
+      button.hidden = !wanted.every((word) => words.includes(word));
+      found += button.hidden ? 0 : 1;
+    }
+    for (const folder of this.#list.children) {
+      folder.hidden = !folder.querySelector('button:not([hidden])');
+    }
+    this.#nothing.hidden = found > 0;
+    this.#nothing.textContent = this.#entries.size === 0
+      ? 'No scenario in the configured folders.' : `Nothing is called "${this.#filter.value}".`;
+  }
+}

@@ -1,0 +1,224 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** A small drawing of a scenario at its beginning. */
+
+import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
+import { onThemeChange, themeColor } from '../world/palette.js';
+
+const MARGIN_PX = 8;
+// What would be smaller is drawn this large, so that it is seen on a long road [px].
+const SMALLEST_PX = 7;
+// From this size of a car on, the whole map is drawn at once [m, px].
+const CAR_M = 4.5;
+const CAR_PX = 6;
+const LANE_M = 3;
+const LANE_PX = 4;
+// Shown around the vehicles where that is not so [m], and the overview's share of the height.
+const AROUND_M = 30;
+const OVERVIEW = 0.25;
+const VULNERABLE = new Set(['pedestrian', 'bicycle', 'motorcycle']);
+
+/** Draws on a canvas whatever its size and the theme. */
+export class ScenarioPreview {
+  #canvas;
+  #preview = null;
+
+  /** @param {HTMLCanvasElement} canvas its size is that of its box */
+  constructor(canvas) {
+    this.#canvas = canvas;
+    new ResizeObserver(() => this.#draw()).observe(canvas);
+    onThemeChange(() => this.#draw());
+  }
+
+  /** @param {object|null} preview as /api/preview gives it */
+  show(preview) {
+    this.#preview = preview;
+    this.#draw();
+  }
+
+  #draw() {
+    const canvas = this.#canvas;
+    const box = canvas.getBoundingClientRect();
+    if (box.width === 0) {
+      return;
+    }
+    canvas.width = Math.round(box.width * window.devicePixelRatio);
+    canvas.height = Math.round(box.height * window.devicePixelRatio);
+    if (this.#preview === null) {
+      return;
+    }
+    const context = canvas.getContext('2d');
+    const whole = this.#preview.scene.bounds;
+    const all = { x: 0, y: 0, width: canvas.width, height: canvas.height };
+    if (scaleOf(all, whole) * CAR_M >= CAR_PX * window.devicePixelRatio) {
+      drawScene(context, this.#preview, all, whole);
+      return;
+    }
+    // A car would be a dot: the surroundings of the vehicles, and below them the whole map.
+    const overview = { ...all, height: Math.round(OVERVIEW * all.height) };
+    overview.y = all.height - overview.height;
+    const detail = { ...all, height: overview.y };
+    const around = surroundings(this.#preview, detail);
+    drawScene(context, this.#preview, detail, around);
+    drawScene(context, this.#preview, overview, whole);
+    drawMarks(context, detail, overview, whole, around);
+  }
+}
+
+function drawScene(context, { scene, states }, area, bounds) {
+  context.save();
+  context.beginPath();
+  context.rect(area.x, area.y, area.width, area.height);
+  context.clip();
+  const scale = fit(context, area, bounds);
+  drawRoads(context, scene, scale);
+  scene.objects.forEach((object, i) => drawBody(context, {
+    shape: object.shape, pose: pose(states.objects, i, OBJECT_WIDTH), ahead: 0,
+    fill: themeColor(objectColour(object)), scale,
+  }));
+  scene.vehicles.forEach((vehicle, i) => drawBody(context, {
+    shape: vehicle.shape, pose: pose(states.vehicles, i, VEHICLE_WIDTH),
+    ahead: vehicle.rear_to_center, scale, edge: themeColor('map-outline'),
+    fill: themeColor(vehicle.role === 'human' ? 'human' : 'av'),
+  }));
+  context.restore();
+}
+
+/** A box around all driven vehicles, of the shape of its area. */
+function surroundings({ scene, states }, area) {
+  const poses = scene.vehicles.map((_, i) => pose(states.vehicles, i, VEHICLE_WIDTH));
+  if (poses.length === 0) {
+    return scene.bounds;
+  }
+  const xs = poses.map(([x]) => x);
+  const ys = poses.map(([, y]) => y);
+  const [left, right] = [Math.min(...xs), Math.max(...xs)];
+  const [bottom, top] = [Math.min(...ys), Math.max(...ys)];
+  const half = 0.5 * Math.max(right - left, (top - bottom) * area.width / area.height)
+    + AROUND_M;
+  const tall = half * area.height / area.width;
+  const [x, y] = [0.5 * (left + right), 0.5 * (bottom + top)];
+  return [x - half, y - tall, x + half, y + tall];
+}
+
+/** A line between the two drawings, and in the overview a frame around what the other shows. */
+function drawMarks(context, detail, overview, whole, around) {
+  context.save();
+  context.strokeStyle = themeColor('border');
+  context.lineWidth = window.devicePixelRatio;
+  context.strokeRect(-1, overview.y, overview.width + 2, overview.height + 2);
+  const scale = fit(context, overview, whole);
+  const smallest = SMALLEST_PX * window.devicePixelRatio / scale;
+  const tall = Math.max(around[3] - around[1], smallest);
+  context.strokeStyle = themeColor('accent');
+  context.lineWidth = 1.5 * window.devicePixelRatio / scale;
+  context.strokeRect(around[0], 0.5 * (around[1] + around[3] - tall), around[2] - around[0], tall);
+  context.restore();
+}
+
+/** Rows may come as lists or as one flat list. */
+function pose(rows, index, width) {
+  const row = Array.isArray(rows[index]) ? rows[index]
+    : rows.slice(index * width, index * width + 3);
+  return row.slice(0, 3).map((value) => (value === null ? NaN : Number(value)));
+}
+
+function scaleOf(area, [left, bottom, right, top]) {
+  const margin = MARGIN_PX * window.devicePixelRatio;
+  return Math.min((area.width - 2 * margin) / Math.max(right - left, 1),
+    (area.height - 2 * margin) / Math.max(top - bottom, 1));
+}
+
+function fit(context, area, bounds) {
+  const [left, bottom, right, top] = bounds;
+  const scale = scaleOf(area, bounds);
+  context.setTransform(scale, 0, 0, -scale,
+    area.x + 0.5 * area.width - 0.5 * scale * (left + right),
+    area.y + 0.5 * area.height + 0.5 * scale * (bottom + top));
+  return scale;
+}
+
+function trace(context, flat, close = false) {
+  for (let i = 0; i + 1 < flat.length; i += 2) {
+    if (i === 0) {
+      context.moveTo(flat[i], flat[i + 1]);
+    } else {
+      context.lineTo(flat[i], flat[i + 1]);
+    }
+  }
+  if (close) {
+    context.closePath();
+  }
+}
+
+function drawRoads(context, scene, scale) {
+  const pixel = window.devicePixelRatio / scale;
+  context.lineWidth = pixel;
+  context.fillStyle = themeColor('map-road');
+  // Where lanes are thinner than their lines, the road is drawn as one line instead.
+  const isThin = LANE_M * scale < LANE_PX * window.devicePixelRatio;
+  context.strokeStyle = themeColor(isThin ? 'map-road' : 'map-mark');
+  for (const lanelet of scene.lanelets) {
+    context.beginPath();
+    trace(context, [...lanelet.left, ...pairsReversed(lanelet.right)], true);
+    context.fill();
+  }
+  for (const lanelet of scene.lanelets) {
+    context.beginPath();
+    trace(context, lanelet.left);
+    trace(context, lanelet.right);
+    context.stroke();
+  }
+  context.fillStyle = themeColor('av');
+  context.globalAlpha = 0.25;
+  for (const polygon of scene.goals.flatMap((goal) => goal.polygons)) {
+    context.beginPath();
+    trace(context, polygon, true);
+    context.fill();
+  }
+  context.globalAlpha = 1;
+}
+
+function pairsReversed(flat) {
+  const result = [];
+  for (let i = flat.length - 2; i >= 0; i -= 2) {
+    result.push(flat[i], flat[i + 1]);
+  }
+  return result;
+}
+
+function objectColour(object) {
+  if (VULNERABLE.has(object.type)) {
+    return 'vulnerable';
+  }
+  return ['static', 'traffic'].includes(object.role) ? object.role : 'recorded';
+}
+
+function drawBody(context, { shape, pose: [x, y, yaw], ahead, fill, scale, edge = null }) {
+  if (!Number.isFinite(x + y + yaw)) {
+    return;
+  }
+  context.save();
+  context.translate(x, y);
+  context.rotate(yaw);
+  context.translate(ahead, 0);
+  const smallest = SMALLEST_PX * window.devicePixelRatio / scale;
+  const grow = Math.max(1, smallest / Math.max(shape.length, shape.width));
+  context.scale(grow, grow);
+  context.beginPath();
+  if (shape.kind === 'polygon' && shape.vertices.length > 0) {
+    trace(context, shape.vertices.flat(), true);
+  } else if (shape.kind === 'circle') {
+    context.arc(0, 0, 0.5 * shape.length, 0, 2 * Math.PI);
+  } else {
+    context.rect(-0.5 * shape.length, -0.5 * shape.width, shape.length, shape.width);
+  }
+  context.fillStyle = fill;
+  context.fill();
+  if (edge) {
+    context.lineWidth = window.devicePixelRatio / scale / grow;
+    context.strokeStyle = edge;
+    context.stroke();
+  }
+  context.restore();
+}

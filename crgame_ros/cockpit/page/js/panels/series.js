@@ -1,0 +1,137 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Series of measurements for plots: few points that keep the peaks. */
+
+/** At most so many points are drawn of a series. */
+export const MOST_POINTS = 400;
+
+/**
+ * Thin out a series: of each stretch of time its lowest and its highest value remain, in their
+ * order. Stretches begin at multiples of their length, so that what is drawn does not tremble
+ * while the window moves on.
+ *
+ * @param {number[]} t increasing [s]
+ * @param {number[]} values as many; NaN makes a gap
+ * @param {number} from first time wanted [s]
+ * @param {number} to last time wanted [s]
+ * @returns {{x: number[], y: Array<number|null>}} at most MOST_POINTS points
+ */
+export function thin(t, values, from, to) {
+  const x = [];
+  const y = [];
+  const first = t.findIndex((time) => time >= from);
+  let end = t.length;
+  while (end > 0 && t[end - 1] > to) {
+    end -= 1;
+  }
+  if (first < 0) {
+    return { x, y };
+  }
+  if (end - first <= MOST_POINTS) {
+    for (let i = first; i < end; i += 1) {
+      x.push(t[i]);
+      y.push(Number.isFinite(values[i]) ? values[i] : null);
+    }
+    return { x, y };
+  }
+  // Two points from each stretch, and one stretch more where the window cuts through two.
+  const stretch = (to - from) / (MOST_POINTS / 2 - 1);
+  for (let i = first; i < end;) {
+    const number = Math.floor(t[i] / stretch);
+    let low = i;
+    let high = i;
+    let next = i;
+    for (; next < end && Math.floor(t[next] / stretch) === number; next += 1) {
+      // A comparison with NaN is false, so a number replaces NaN only by the second test.
+      if (values[next] < values[low] || Number.isNaN(values[low])) {
+        low = next;
+      }
+      if (values[next] > values[high] || Number.isNaN(values[high])) {
+        high = next;
+      }
+    }
+    for (const at of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
+      x.push(t[at]);
+      y.push(Number.isFinite(values[at]) ? values[at] : null);
+    }
+    i = next;
+  }
+  return { x, y };
+}
+
+/**
+ * Remove the jumps of a whole turn from a series of angles.
+ *
+ * @param {number[]} angles [rad]
+ * @returns {number[]} [rad], starting between -pi and pi
+ */
+export function unwrap(angles) {
+  const turn = 2 * Math.PI;
+  let offset = 0;
+  return angles.map((angle, i) => {
+    if (i > 0 && Number.isFinite(angle - angles[i - 1])) {
+      offset -= turn * Math.round((angle - angles[i - 1]) / turn);
+    }
+    return angle + offset;
+  });
+}
+
+/** Figures of the run that come with its status, over the last two minutes. */
+export class HealthLog {
+  #rows = [];
+  #keeps_s;
+
+  /** @param {number} keeps_s how far back [s] */
+  constructor(keeps_s) {
+    this.#keeps_s = keeps_s;
+  }
+
+  /** Forget everything. */
+  clear() {
+    this.#rows = [];
+  }
+
+  /** @param {object} status as the server sends it */
+  take(status) {
+    const { t } = status;
+    if (!Number.isFinite(t)) {
+      return;
+    }
+    // A replay may go back; what came after is then told once more.
+    while (this.#rows.length > 0 && this.#rows.at(-1).t >= t) {
+      this.#rows.pop();
+    }
+    while (this.#rows.length > 0 && this.#rows[0].t < t - this.#keeps_s) {
+      this.#rows.shift();
+    }
+    const latency = {};
+    for (const [av, planner] of Object.entries(status.planners ?? {})) {
+      latency[av] = planner.latency_ms ?? NaN;
+    }
+    this.#rows.push({
+      t, latency, step_error: status.timing?.mean_step_error_ms ?? NaN,
+      lag: status.timing?.final_error_ms ?? NaN,
+    });
+  }
+
+  /** Times of all rows [s]. */
+  get t() {
+    return this.#rows.map((row) => row.t);
+  }
+
+  /**
+   * @param {string} name 'step_error' or 'lag'
+   * @returns {number[]} [ms]
+   */
+  column(name) {
+    return this.#rows.map((row) => row[name]);
+  }
+
+  /**
+   * @param {string} av
+   * @returns {number[]} its plan latency [ms]
+   */
+  latency(av) {
+    return this.#rows.map((row) => row.latency[av] ?? NaN);
+  }
+}

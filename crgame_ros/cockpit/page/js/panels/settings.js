@@ -1,0 +1,47 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The switch between the system's theme, dark and light. */
+
+import { element } from '../driving/dom.js';
+import { icon } from './icons.js';
+import { recall, remember } from './memory.js';
+
+const THEMES = [
+  ['', 'auto', "Theme: the system's"], ['dark', 'moon', 'Theme: dark'],
+  ['light', 'sun', 'Theme: light'],
+];
+
+/**
+ * Make the button that goes through the themes. Whoever draws with the colours learns of a change
+ * by `onThemeChange` of the world's palette.
+ *
+ * @param {HTMLElement} root of the button
+ * @returns {{theme: string, setTheme: function(string): void}} theme: 'dark', 'light' or '' for
+ *   the system's
+ */
+export function createSettings(root) {
+  const button = element('button', { type: 'button', id: 'theme', class: 'icon-button' });
+  const settings = {
+    theme: '',
+    setTheme(theme) {
+      const [name, picture, label] = THEMES.find(([known]) => known === theme) ?? THEMES[0];
+      settings.theme = name;
+      if (name) {
+        document.documentElement.dataset.theme = name;
+      } else {
+        delete document.documentElement.dataset.theme;
+      }
+      button.replaceChildren(icon(picture));
+      button.title = label;
+      button.setAttribute('aria-label', label);
+      remember('theme', name);
+    },
+  };
+  button.addEventListener('click', () => {
+    const at = THEMES.findIndex(([name]) => name === settings.theme);
+    settings.setTheme(THEMES[(at + 1) % THEMES.length][0]);
+  });
+  root.prepend(button);
+  settings.setTheme(recall('theme'));
+  return settings;
+}

@@ -1,0 +1,132 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The panels at the right: their tabs, their width, and putting them away. */
+
+import { element } from '../driving/dom.js';
+import { icon } from './icons.js';
+import { recall, remember } from './memory.js';
+
+const NAMES = [
+  ['drive', 'Drive'], ['history', 'History'], ['scenario', 'Scenario'], ['events', 'Events'],
+  ['timing', 'Timing'],
+];
+const NARROWEST_REM = 22;
+const WIDEST_SHARE = 0.6;
+
+/**
+ * Make the tabs.
+ *
+ * @param {HTMLElement} root aside#panels
+ * @returns {{show: function(string): void, current: string}} show opens a panel by its name
+ */
+export function createTabs(root) {
+  const tabs = new Map();
+  const list = root.querySelector('#tabs');
+  const panels = {
+    current: '',
+    show(name) {
+      panels.current = name;
+      for (const [other, tab] of tabs) {
+        tab.setAttribute('aria-selected', String(other === name));
+        root.querySelector(`#panel-${other}`).hidden = other !== name;
+      }
+      remember('panel', name);
+    },
+  };
+  // No arrow keys here, unlike in other tab lists: they steer the car.
+  for (const [name, label] of NAMES) {
+    const open = () => {
+      collapse(root, false);
+      panels.show(name);
+    };
+    const tab = element('button', {
+      type: 'button', role: 'tab', id: `tab-${name}`, text: label,
+      'aria-controls': `panel-${name}`, on: { click: open },
+    });
+    root.querySelector(`#panel-${name}`).setAttribute('aria-labelledby', tab.id);
+    tabs.set(name, tab);
+    list.append(tab);
+  }
+  const first = recall('panel');
+  panels.show(tabs.has(first) ? first : NAMES[0][0]);
+  addCollapse(root);
+  addHandle(root);
+  releaseFocus(document);
+  return panels;
+}
+
+function addCollapse(root) {
+  const button = element('button', {
+    type: 'button', id: 'collapse', class: 'icon-button', 'aria-controls': 'panels',
+    'aria-label': 'Panels', title: 'Show or hide the panels',
+    on: { click: () => collapse(root, !root.hidden) },
+  }, icon('panel'));
+  document.querySelector('#bar-end').append(button);
+  collapse(root, recall('collapsed') === 'yes');
+}
+
+function collapse(root, away) {
+  root.hidden = away;
+  document.querySelector('#collapse')?.setAttribute('aria-expanded', String(!away));
+  remember('collapsed', away ? 'yes' : 'no');
+}
+
+function addHandle(root) {
+  const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize);
+  const setWidth = (width_rem) => {
+    const most = WIDEST_SHARE * window.innerWidth / rem();
+    const width = Math.max(NARROWEST_REM, Math.min(width_rem, most));
+    document.documentElement.style.setProperty('--panel-width', `${width.toFixed(1)}rem`);
+    remember('width', width.toFixed(1));
+  };
+  const handle = element('div', {
+    id: 'panels-handle', title: 'Drag to change the width, double-click for the usual one',
+    on: {
+      pointerdown: (event) => {
+        handle.setPointerCapture(event.pointerId);
+        event.preventDefault();
+      },
+      pointermove: (event) => {
+        if (handle.hasPointerCapture(event.pointerId)) {
+          setWidth((window.innerWidth - event.clientX) / rem());
+        }
+      },
+      dblclick: () => {
+        document.documentElement.style.removeProperty('--panel-width');
+        remember('width', '');
+      },
+    },
+  });
+  root.prepend(handle);
+  const width_rem = parseFloat(recall('width'));
+  if (width_rem > 0) {
+    setWidth(width_rem);
+  }
+}
+
+/**
+ * Give the keys back to the car after a click: the space bar brakes, and would press a button
+ * that kept the focus; arrows would move a choice. Whoever walks by keyboard keeps the focus.
+ */
+function releaseFocus(scope) {
+  let byPointer = false;
+  const blur = (target) => {
+    const focused = target instanceof Element ? target.closest('button, select, input') : null;
+    focused?.blur();
+  };
+  scope.addEventListener('pointerdown', () => { byPointer = true; }, true);
+  scope.addEventListener('keydown', (event) => {
+    byPointer = byPointer && event.key !== 'Tab';
+  }, true);
+  scope.addEventListener('click', (event) => {
+    if (event.detail > 0 && event.target instanceof Element
+        && event.target.closest('button, input[type=checkbox], input[type=radio]')) {
+      blur(event.target);
+    }
+  });
+  scope.addEventListener('change', (event) => {
+    if (byPointer && event.target instanceof HTMLSelectElement) {
+      blur(event.target);
+    }
+  });
+}

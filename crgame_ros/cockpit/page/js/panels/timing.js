@@ -1,0 +1,126 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** How true the run is to the wall clock: the live figures of the time-sync supervisor. */
+
+import { element, setAttribute, setText } from '../driving/dom.js';
+import { count, fixed, plural } from './format.js';
+
+// timesync_node calls a run late from a lag of so many steps on.
+const LATE_STEPS = 10;
+
+const ms = (digits) => (value) => `${fixed(value, digits)} ms`;
+const percent = (digits) => (value) => `${fixed(100 * value, digits)} %`;
+const ratio = (value) => fixed(value, 3);
+
+// key of the figure: [name, explanation, format, when it is late (value, step [ms])]
+const TABLE_I = [
+  ['final_error_ms', 'Lag now', 'E_f: simulated behind wall-clock time, resets added back',
+    ms(2), (value, step) => value > LATE_STEPS * step],
+  ['mean_step_error_ms', 'Mean step error', 'mean of |e_n| over all steps', ms(3),
+    (value, step) => value > step],
+  ['max_cumulative_error_ms', 'Largest lag', 'E_max over the run, resets added back', ms(2),
+    (value, step) => value > LATE_STEPS * step],
+  ['timeout_ratio', 'Cycles over budget', 'share of cycles that computed longer than a step',
+    percent(2), (value) => value > 0.01],
+  ['real_time_ratio_final', 'Real-time ratio', 'simulated over wall-clock time, whole run', ratio,
+    (value) => value < 0.99],
+  ['real_time_ratio_mean', 'Real-time ratio, mean',
+    'mean of the ratio since the start of the run', ratio],
+  ['real_time_ratio_min', 'Real-time ratio, slowest step', 'of a single step', ratio],
+  ['time_efficiency', 'Time efficiency', 'simulated over wall-clock duration', percent(2),
+    (value) => value < 0.99],
+  ['precision_ratio', 'Precision ratio', 'P_r: lag now over the duration',
+    (value) => (Number.isFinite(value) ? value.toExponential(1).replace('-', '−') : '–')],
+];
+
+const MORE = [
+  ['rate_hz', 'Rate', 'steps per second', (value) => `${fixed(value, 1)} Hz`],
+  ['worst_lag_ms', 'Worst lag', 'behind the schedule in force when a cycle began', ms(1),
+    (value, step) => value > LATE_STEPS * step],
+  ['step_error_p50_ms', 'Step error, median', 'of |e_n|', ms(3)],
+  ['step_error_p99_ms', 'Step error, 99 %', '99th percentile of |e_n|', ms(3)],
+  ['busy_p50_ms', 'Computing, median', 'busy time of a cycle', ms(2),
+    (value, step) => value > step],
+  ['busy_p99_ms', 'Computing, 99 %', 'busy time of a cycle', ms(2),
+    (value, step) => value > step],
+  ['resets', 'Drift resets', 'times the schedule was moved on', count, (value) => value > 0],
+  ['dropped_ms', 'Time dropped', 'by which resets moved the schedule', ms(1),
+    (value) => value > 0],
+  ['frame_skip_orders', 'Frame skips', 'times frames were skipped to catch up', count],
+  ['cycles', 'Cycles', 'seen in this run', count],
+  ['duration_s', 'Duration', 'measured', (value) => `${fixed(value, 1)} s`],
+];
+
+/**
+ * Make the figures.
+ *
+ * @param {HTMLElement} root #timekeeping
+ * @param {import('../store.js').Store} store
+ */
+export function createTiming(root, store) {
+  const hint = element('p', { class: 'hint', text: 'Measured from the second step on.' });
+  const run = new Map();
+  const rows = new Map();
+  const tables = element('div', {},
+    element('h2', { text: 'Timekeeping' }), table(TABLE_I, rows, 'Table I'),
+    element('h3', { text: 'What explains it' }), table(MORE, rows, 'What explains it'));
+  root.append(element('h2', { text: 'Run' }), table([
+    ['factor', 'Speed of time', 'measured, and as asked for'],
+    ['skipping', 'Frames', 'frames for people are skipped while the run is late'],
+    ['clients', 'Open pages', 'connected to this cockpit'],
+    ['delay', 'Answer time', 'of the server to this page'],
+  ], run, 'Run'), tables, hint);
+
+  const update = () => {
+    const status = store.status;
+    if (status === null || root.closest('[hidden]')) {
+      return;
+    }
+    showRun(run, status, store);
+    const step_ms = 1e3 * (store.scene?.time.dt_s ?? NaN);
+    setAttribute(hint, 'hidden', Boolean(status.timing));
+    setAttribute(tables, 'hidden', !status.timing);
+    for (const [key, , , format, isLate] of status.timing ? [...TABLE_I, ...MORE] : []) {
+      const value = valueOf(status.timing, key);
+      rows.get(key).show(format(value), Boolean(isLate?.(value, step_ms)));
+    }
+  };
+  store.on('status', update);
+  new MutationObserver(update).observe(root.parentElement, { attributeFilter: ['hidden'] });
+  update();
+}
+
+function valueOf(timing, key) {
+  const nested = key.match(/^(real_time_ratio)_(\w+)$/);
+  const value = nested && !(key in timing) ? timing[nested[1]]?.[nested[2]] : timing[key];
+  return value ?? NaN;
+}
+
+function showRun(run, status, store) {
+  const asked = status.real_time_factor;
+  const measured = status.measured_factor;
+  const slow = status.run === 'running' && measured < 0.95 * asked;
+  run.get('factor').show(Number.isFinite(measured)
+    ? `${fixed(measured, 2)} × of ${fixed(asked, 2)} ×` : `${fixed(asked, 2)} ×`, slow);
+  const skipping = Boolean(status.frames_skipped);
+  run.get('skipping').show(skipping ? 'skipped to catch up' : 'all shown', skipping);
+  run.get('clients').show(plural(status.clients ?? 0, 'page'), false);
+  run.get('delay').show(`${fixed(store.round_trip_ms, 0)} ms`, store.round_trip_ms > 200);
+}
+
+function table(entries, rows, caption) {
+  return element('table', { class: 'figures' },
+    element('caption', { class: 'unseen', text: caption }),
+    element('tbody', {}, ...entries.map(([key, name, explanation]) => {
+      const value = element('td', {});
+      const row = element('tr', { 'data-key': key, title: explanation },
+        element('th', { scope: 'row', text: name }), value);
+      rows.set(key, {
+        show(text, late) {
+          setText(value, text);
+          setAttribute(row, 'data-late', late);
+        },
+      });
+      return row;
+    })));
+}

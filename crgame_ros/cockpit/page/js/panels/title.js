@@ -1,0 +1,26 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What is being shown, in the header and in the browser's tab. */
+
+import { setText } from '../driving/dom.js';
+
+const PROGRAM = 'crgame';
+
+/**
+ * Keep the title up to date.
+ *
+ * @param {HTMLElement} root #title
+ * @param {import('../store.js').Store} store
+ */
+export function createTitle(root, store) {
+  const update = () => {
+    const title = store.scene?.title || PROGRAM;
+    setText(root, title);
+    root.title = [title, store.scene?.benchmark_id].filter(Boolean).join(' · ');
+    document.title = [title, store.mode === 'replay' ? 'replay' : '', PROGRAM]
+      .filter((part, i, all) => part && all.indexOf(part) === i).join(' · ');
+  };
+  store.on('scene', update);
+  store.on('hello', update);
+  update();
+}

@@ -1,0 +1,147 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Chunks of a recorded run: fetched when they are needed, and not all of them kept. */
+
+import { KIND } from '../frames.js';
+
+// A little over what two seeks and the way between them need; 5 s each.
+const KEPT = 12;
+const LENGTH_BYTES = 4;
+const RETRY_MS = 1000;
+
+/**
+ * Read an answer of the server.
+ *
+ * @param {string} path below /api/replay/
+ * @param {object} query values by name
+ * @returns {Promise<Response>}
+ * @throws {Error} with a text for people
+ */
+export async function ask(path, query) {
+  const answer = await fetch(`/api/replay/${path}?${new URLSearchParams(query)}`);
+  if (!answer.ok) {
+    const { error } = await answer.json().catch(() => ({}));
+    throw new Error(error ?? `The server answered ${answer.status}.`);
+  }
+  return answer;
+}
+
+/**
+ * Split what the server packed.
+ *
+ * @param {ArrayBuffer} packed frames, each after its length in bytes
+ * @returns {ArrayBuffer[]}
+ */
+export function unpack(packed) {
+  const view = new DataView(packed);
+  const frames = [];
+  for (let at = 0; at < packed.byteLength;) {
+    const start = at + LENGTH_BYTES;
+    at = start + view.getUint32(at, true);
+    frames.push(packed.slice(start, at));
+  }
+  return frames;
+}
+
+/**
+ * @typedef {object} Entry a frame of a chunk
+ * @property {number} at from which time on it is to be seen [s]
+ * @property {number} kind
+ * @property {string} slot of two entries with the same slot the later replaces the earlier
+ * @property {ArrayBuffer} buffer the frame
+ */
+
+/** The chunks of one run that are in memory. */
+export class Chunks {
+  #info;
+  #chunks = new Map();
+  #asked = new Set();
+  #failed = new Map();
+  #loaded;
+  #refused;
+
+  /**
+   * @param {object} info of the run
+   * @param {function(): void} loaded called after a chunk has come
+   * @param {function(Error): void} refused called when one cannot be had
+   */
+  constructor(info, loaded, refused) {
+    this.#info = info;
+    this.#loaded = loaded;
+    this.#refused = refused;
+  }
+
+  /** How many chunks are in memory. */
+  get size() {
+    return this.#chunks.size;
+  }
+
+  /**
+   * @param {number} t [s]
+   * @returns {number} the chunk that holds this time
+   */
+  numberAt(t) {
+    const { start_s, chunk_s, chunks } = this.#info;
+    return Math.min(Math.max(Math.floor((t - start_s) / chunk_s + 1e-9), 0), chunks - 1);
+  }
+
+  /**
+   * @param {number} number of a chunk
+   * @returns {Entry[]|undefined} its frames, undefined before they have come
+   */
+  get(number) {
+    return this.#chunks.get(number);
+  }
+
+  /**
+   * Have a chunk and those after it come.
+   *
+   * @param {number} number of the chunk that is shown
+   * @param {number} ahead how many more
+   */
+  want(number, ahead) {
+    for (let i = number; i <= Math.min(number + ahead, this.#info.chunks - 1); i += 1) {
+      const known = this.#chunks.get(i);
+      if (known !== undefined) {
+        // The map keeps the order of use: the first is the next to go.
+        this.#chunks.delete(i);
+        this.#chunks.set(i, known);
+      } else if (!this.#asked.has(i) && !(performance.now() < this.#failed.get(i))) {
+        this.#fetch(i);
+      }
+    }
+  }
+
+  async #fetch(number) {
+    this.#asked.add(number);
+    try {
+      const answer = await ask('chunk', { i: number, epoch: this.#info.epoch });
+      const entries = this.#entries(unpack(await answer.arrayBuffer()), number);
+      this.#chunks.set(number, entries);
+      this.#failed.delete(number);
+      while (this.#chunks.size > KEPT) {
+        this.#chunks.delete(this.#chunks.keys().next().value);
+      }
+    } catch (error) {
+      this.#failed.set(number, performance.now() + RETRY_MS);
+      this.#refused(error);
+      return;
+    } finally {
+      this.#asked.delete(number);
+    }
+    this.#loaded();
+  }
+
+  /** Find from when on each frame is to be seen: a plan, from the state after which it came. */
+  #entries(frames, number) {
+    let at = this.#info.start_s + number * this.#info.chunk_s - 1e-9;
+    return frames.map((buffer) => {
+      const [kind, , , , t, index] = new Float64Array(buffer, 0, 6);
+      if (kind !== KIND.PLAN) {
+        at = Math.max(at, t);
+      }
+      const single = kind === KIND.STATE || kind === KIND.OBJECTS;
+      return { at, kind, slot: single ? `${kind}` : `${kind}:${index}`, buffer };
+    });
+  }
+}

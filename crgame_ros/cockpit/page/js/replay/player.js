@@ -1,0 +1,280 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Plays a recording: the time that is shown, how it moves, and the run that it belongs to. */
+
+import { ask } from './chunks.js';
+import { ReplayDocuments } from './documents.js';
+import { ReplayFeed } from './replay_feed.js';
+import { Timeline } from './timeline.js';
+
+const SLOWEST = 0.1;
+const FASTEST = 8;
+// A frame that comes later than this was a stall: what was not seen is not skipped [s].
+const LONGEST_FRAME_S = 0.25;
+const TINY_S = 1e-6;
+const SETTLED_MS = 300;
+
+/** The player; it does nothing until the server says that this is a replay. */
+class Player {
+  #store;
+  #timeline;
+  #feed = null;
+  #documents = null;
+  #t = 0;
+  #speed = 1;
+  #playing = false;
+  #jumped = false;
+  #jumped_ms = NaN;
+  #frame_ms = NaN;
+  #waiting = [];
+  #opening = false;
+  #told = '';
+
+  constructor(root, store) {
+    this.#store = store;
+    this.#timeline = new Timeline(root, this);
+    const open = () => {
+      if (store.mode === 'replay' && this.#feed === null && !this.#opening) {
+        this.open();
+      }
+    };
+    store.on('hello', open);
+    store.on('connection', open);
+    // After a lost connection the server sends the scene of the run that it shows first.
+    store.on('scene', (scene) => {
+      if (this.#feed !== null && scene.time.epoch !== this.info.epoch) {
+        store.receive({ type: 'scene', ...this.info.scene });
+      }
+    });
+    const frame = (now_ms) => {
+      this.#advance(now_ms);
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+    open();
+  }
+
+  /** What the server says of the run, null before it has. */
+  get info() {
+    return this.#feed?.info ?? null;
+  }
+
+  /** Time that is shown [s]. */
+  get t() {
+    return this.#t;
+  }
+
+  /** Simulation step that is shown: the last at or before the time. */
+  get n() {
+    return Math.floor(this.#t / this.info.dt_s + TINY_S);
+  }
+
+  /** Scenario step that is shown. */
+  get k() {
+    return this.info.k0 + Math.floor(this.n / this.info.steps_per_tick);
+  }
+
+  /** Whether the time moves. */
+  get playing() {
+    return this.#playing;
+  }
+
+  /** Whether what is to be shown has not come yet. */
+  get loading() {
+    return this.#jumped;
+  }
+
+  /** Simulated seconds per second. */
+  get speed() {
+    return this.#speed;
+  }
+
+  set speed(value) {
+    this.#speed = Math.min(Math.max(value, SLOWEST), FASTEST);
+  }
+
+  /** How many chunks are in memory. */
+  get chunksHeld() {
+    return this.#feed?.chunksHeld ?? 0;
+  }
+
+  /**
+   * Show a run from its beginning.
+   *
+   * @param {number} [epoch] which; the server's choice by default
+   * @returns {Promise<void>}
+   */
+  async open(epoch) {
+    this.#opening = true;
+    try {
+      const answer = await ask('info', epoch === undefined ? {} : { epoch });
+      this.#show(await answer.json());
+    } catch (error) {
+      this.#refuse(error);
+    } finally {
+      this.#opening = false;
+    }
+  }
+
+  /** Let the time move; from the beginning if it is at the end. */
+  play() {
+    if (this.info !== null) {
+      if (this.#t >= this.info.end_s - TINY_S) {
+        this.seek(this.info.start_s);
+      }
+      this.#playing = true;
+    }
+  }
+
+  /** Let the time stand still. */
+  pause() {
+    this.#playing = false;
+  }
+
+  /** Play or pause. */
+  toggle() {
+    if (this.#playing) {
+      this.pause();
+    } else {
+      this.play();
+    }
+  }
+
+  /**
+   * Go to a time.
+   *
+   * @param {number} t [s]; within the recording
+   * @returns {Promise<void>} when it is shown
+   */
+  seek(t) {
+    if (this.info === null) {
+      return Promise.resolve();
+    }
+    this.#t = Math.min(Math.max(t, this.info.start_s), this.info.end_s);
+    this.#jumped = true;
+    return new Promise((resolve) => {
+      this.#waiting.push(resolve);
+      this.#update(performance.now());
+    });
+  }
+
+  /**
+   * Go to the next or another scenario step, exactly; the time stands still then.
+   *
+   * @param {number} count how many steps on, negative for back
+   * @returns {Promise<void>} when it is shown
+   */
+  step(count) {
+    this.pause();
+    if (this.info === null) {
+      return Promise.resolve();
+    }
+    const { dt_s, steps_per_tick, first_n, last_n } = this.info;
+    const tick = this.#t / dt_s / steps_per_tick;
+    const near = count > 0 ? Math.floor(tick + TINY_S) : Math.ceil(tick - TINY_S);
+    const first = Math.ceil(first_n / steps_per_tick);
+    const last = Math.floor(last_n / steps_per_tick);
+    const wanted = Math.min(Math.max(near + count, first), last);
+    return this.seek(wanted * steps_per_tick * dt_s);
+  }
+
+  /**
+   * Go to the next or the previous event.
+   *
+   * @param {number} direction 1 or -1
+   * @returns {object|null} the event
+   */
+  jump(direction) {
+    const events = this.info?.events ?? [];
+    const found = direction > 0 ? events.find(({ t }) => t > this.#t + TINY_S)
+      : events.findLast(({ t }) => t < this.#t - TINY_S);
+    if (found !== undefined) {
+      this.seek(found.t);
+      this.#timeline.tell(found);
+    }
+    return found ?? null;
+  }
+
+  #show(info) {
+    const store = this.#store;
+    this.pause();
+    store.restart(info.epoch);
+    this.#feed = new ReplayFeed(store, info, {
+      loaded: () => this.#update(performance.now()), refused: (error) => this.#refuse(error),
+    });
+    this.#documents = new ReplayDocuments(store, info);
+    store.useTimeSource(() => this.#t);
+    store.useHistorySource((index, seconds) => this.#feed.history(index, seconds));
+    store.receive({ type: 'scene', ...info.scene });
+    this.#timeline.show(info);
+    for (const text of info.notices) {
+      store.receive({ type: 'notice', level: 'warn', text });
+    }
+    this.seek(info.start_s);
+  }
+
+  #advance(now_ms) {
+    const passed_s = Math.min((now_ms - this.#frame_ms) / 1000 || 0, LONGEST_FRAME_S);
+    this.#frame_ms = now_ms;
+    if (this.#feed === null) {
+      return;
+    }
+    if (this.#playing && !this.#jumped) {
+      const before = this.#t;
+      this.#t = Math.min(this.#t + passed_s * this.#speed, this.info.end_s);
+      if (!this.#update(now_ms)) {
+        // What comes next has not been fetched yet: time waits for it.
+        this.#t = before;
+      }
+      this.#playing = this.#t < this.info.end_s;
+    } else {
+      this.#update(now_ms);
+    }
+    if (now_ms - this.#jumped_ms > SETTLED_MS) {
+      this.#jumped_ms = NaN;
+      this.#documents.tellPast(this.#now());
+    }
+  }
+
+  /** Bring everything to the time; tell whether its data was there. */
+  #update(now_ms) {
+    const shown = this.#feed.show(this.#t);
+    const there = !Number.isNaN(shown);
+    if (there) {
+      this.#t = shown;
+      this.#documents.show(this.#now(), now_ms, this.#jumped);
+      if (this.#jumped) {
+        this.#jumped = false;
+        this.#jumped_ms = now_ms;
+      }
+      this.#waiting.splice(0).forEach((resolve) => resolve());
+    }
+    this.#timeline.update();
+    return there;
+  }
+
+  #now() {
+    const ended = this.#t >= this.info.end_s - TINY_S;
+    const run = this.#playing ? 'running' : ended ? 'ended' : 'paused';
+    return { t: this.#t, n: this.n, k: this.k, run, speed: this.#speed };
+  }
+
+  /** Say once what is wrong. */
+  #refuse(error) {
+    if (this.#told !== error.message) {
+      this.#told = error.message;
+      this.#store.receive({ type: 'notice', level: 'error', text: error.message });
+    }
+  }
+}
+
+/**
+ * Make the player; it shows itself when the page shows a recording.
+ *
+ * @param {HTMLElement} root footer#timeline
+ * @param {import('../store.js').Store} store
+ * @returns {Player}
+ */
+export function createReplay(root, store) {
+  return new Player(root, store);
+}

@@ -1,0 +1,200 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The run in the header: start, pause, step, reset, stop, speed of time, clock, recording. */
+
+import { element, part, setAttribute, setText } from './driving/dom.js';
+import { isTyping } from './driving/focus.js';
+import { icon } from './driving/icons.js';
+
+// In which states of the run an order makes sense, its key, and what it says.
+const ORDERS = {
+  start: { label: 'Start', key: 'KeyP', in: ['waiting', 'paused'], title: 'Start or go on (P)' },
+  pause: { label: 'Pause', key: 'KeyP', in: ['running'],
+    title: 'Pause: vehicles, planners and recording stand still (P)' },
+  step: { label: 'Step', key: 'KeyN', in: ['waiting', 'paused'], title: 'One scenario step (N)' },
+  reset: { label: 'Reset', in: ['waiting', 'running', 'paused', 'ended'],
+    title: 'Begin anew at the first step',
+    confirm: ['Reset the run?', 'All vehicles go back to where they began. The recording so far '
+      + 'is kept; a new one begins.'] },
+  stop: { label: 'Stop', in: ['waiting', 'running', 'paused'], title: 'End the simulation',
+    confirm: ['Stop the simulation?',
+      'The run ends for everybody and its recording is closed. It cannot go on afterwards.'] },
+};
+const FACTORS = [0.1, 0.2, 0.25, 0.5, 1, 2, 3, 5, 10];
+const RUN_TEXTS = {
+  waiting: 'Waiting', running: 'Running', paused: 'Paused', ended: 'Ended',
+};
+
+/** The run control; one per page. */
+class RunControl {
+  #store;
+  #connection;
+  #buttons = {};
+  #factor = element('select', { 'aria-label': 'Real-time factor',
+    title: 'Simulated seconds per second' });
+  #root;
+  #confirm = buildConfirmation();
+  #clock;
+  #lamp;
+
+  constructor(root, store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    this.#root = part(root, 'run-control');
+    this.#clock = buildClock(part(root, 'clock'));
+    this.#lamp = buildLamp(part(root, 'recording'));
+    for (const [action, order] of Object.entries(ORDERS)) {
+      this.#buttons[action] = element('button', { type: 'button', class: 'run-button',
+        'data-action': action, title: order.title, 'aria-label': order.label,
+        'aria-keyshortcuts': order.key?.slice(-1), on: { click: () => this.#order(action) } },
+      icon(action), element('span', { class: 'run-label', text: order.label }));
+    }
+    this.#offer(1);
+    this.#factor.addEventListener('change', () => this.#setFactor());
+    this.#root.append(...Object.values(this.#buttons),
+      element('label', { class: 'run-factor' }, element('span', { text: 'Speed' }), this.#factor));
+    window.addEventListener('keydown', (event) => this.#key(event));
+    for (const name of ['hello', 'status', 'connection']) {
+      store.on(name, () => this.#show());
+    }
+    this.#show();
+  }
+
+  #show() {
+    const { status, connected, mode } = this.#store;
+    setAttribute(this.#root, 'hidden', mode === 'replay');
+    setAttribute(this.#lamp.node, 'hidden', mode === 'replay' || status === null);
+    for (const [action, order] of Object.entries(ORDERS)) {
+      setAttribute(this.#buttons[action], 'disabled', !connected || !status
+        || !order.in.includes(status.run));
+    }
+    setAttribute(this.#factor, 'disabled', !connected || !status || status.run === 'ended');
+    setAttribute(this.#clock.node, 'hidden', status === null);
+    if (status) {
+      this.#clock.show(status, connected);
+      this.#lamp.show(status.recording ?? { state: 'none' });
+      if (document.activeElement !== this.#factor) {
+        this.#offer(status.real_time_factor ?? 1);
+      }
+    }
+  }
+
+  /** List the usual factors, and the present one where it is another. */
+  #offer(present) {
+    const factors = [...new Set([...FACTORS, present])].sort((a, b) => a - b);
+    if (factors.length !== this.#factor.options.length
+        || !factors.every((f, i) => Number(this.#factor.options[i].value) === f)) {
+      this.#factor.replaceChildren(...factors.map((factor) => element('option',
+        { value: factor, text: `× ${factor}` })));
+    }
+    this.#factor.value = String(present);
+  }
+
+  async #setFactor() {
+    const factor = Number(this.#factor.value);
+    // A select that keeps the focus would take the driving keys.
+    this.#factor.blur();
+    await this.#request({ type: 'rate', factor });
+    this.#show();
+  }
+
+  async #order(action) {
+    const { confirm } = ORDERS[action];
+    if (!confirm || await this.#confirm.ask(...confirm, ORDERS[action].label)) {
+      await this.#request({ type: 'control', action });
+    }
+  }
+
+  async #request(message) {
+    const { ok, text } = await this.#connection.request(message);
+    if (!ok) {
+      this.#store.receive({ type: 'notice', level: 'warn', text });
+    }
+  }
+
+  #key(event) {
+    if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)
+        || document.querySelector('dialog[open]') || this.#root.hidden) {
+      return;
+    }
+    const action = Object.keys(ORDERS).find((name) => ORDERS[name].key === event.code
+      && !this.#buttons[name].disabled);
+    if (action) {
+      event.preventDefault();
+      this.#order(action);
+    }
+  }
+}
+
+function buildClock(node) {
+  const time = element('span', { class: 'clock-time', text: '–' });
+  const step = element('span', { class: 'clock-step' });
+  const factor = element('span', { class: 'clock-factor', title: 'Measured real-time factor' });
+  const state = element('span', { class: 'clock-state', role: 'status' });
+  node.replaceChildren(time, element('span', { class: 'clock-small' }, step, factor), state);
+  return {
+    node,
+    show({ t, k, measured_factor, run }, connected) {
+      setText(time, Number.isFinite(t) ? `${t.toFixed(1)} s` : '–');
+      setText(step, `k ${k ?? '–'}`);
+      setText(factor, run === 'running' && Number.isFinite(measured_factor)
+        ? `× ${measured_factor.toFixed(2)}` : '');
+      setText(state, connected ? RUN_TEXTS[run] ?? run : 'No connection');
+      setAttribute(state, 'data-run', connected ? run : 'lost');
+    },
+  };
+}
+
+function buildLamp(node) {
+  const text = element('span', { class: 'lamp-text' });
+  node.replaceChildren(element('span', { class: 'lamp', 'aria-hidden': 'true' }), text);
+  return {
+    node,
+    show({ state, megabytes, text: reason }) {
+      setAttribute(node, 'data-state', state);
+      const size = Number.isFinite(megabytes) ? ` ${megabytes.toFixed(1)} MB` : '';
+      setText(text, state === 'recording' ? `Recording${size}`
+        : state === 'failed' ? `Recording failed: ${reason || 'no reason given'}`
+          : 'Not recording');
+      setAttribute(node, 'title', reason || null);
+    },
+  };
+}
+
+function buildConfirmation() {
+  const title = element('h2', { id: 'confirm-title' });
+  const text = element('p');
+  const yes = element('button', { type: 'button', class: 'drive-button danger' });
+  const no = element('button', { type: 'button', class: 'drive-button', text: 'Cancel' });
+  const dialog = element('dialog', { class: 'confirm', 'aria-labelledby': 'confirm-title' },
+    title, text, element('div', { class: 'dialog-buttons' }, no, yes));
+  document.body.append(dialog);
+  no.addEventListener('click', () => dialog.close('no'));
+  yes.addEventListener('click', () => dialog.close('yes'));
+  return {
+    ask(question, consequence, verb) {
+      setText(title, question);
+      setText(text, consequence);
+      setText(yes, verb);
+      dialog.returnValue = 'no';
+      dialog.showModal();
+      no.focus();
+      return new Promise((resolve) => {
+        dialog.addEventListener('close', () => resolve(dialog.returnValue === 'yes'),
+          { once: true });
+      });
+    },
+  };
+}
+
+/**
+ * Put the run control, the clock and the recording lamp into the header.
+ *
+ * @param {HTMLElement} root the header
+ * @param {import('./store.js').Store} store
+ * @param {import('./connection.js').Connection} connection
+ * @returns {object}
+ */
+export function createRunControl(root, store, connection) {
+  return new RunControl(root, store, connection);
+}

@@ -1,0 +1,97 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** A bounded ring of received samples in the order of their simulation time. */
+
+/** Samples {n, t, …}, oldest first; a new one beyond the capacity replaces the oldest. */
+export class SampleRing {
+  #items;
+  #start = 0;
+  #length = 0;
+  #spacing_s;
+
+  /**
+   * @param {number} capacity how many samples are kept
+   * @param {number} [spacing_s] samples closer than this after the one before are left out [s]
+   */
+  constructor(capacity, spacing_s = 0) {
+    this.#items = new Array(capacity);
+    this.#spacing_s = spacing_s;
+  }
+
+  /** How many samples there are. */
+  get length() {
+    return this.#length;
+  }
+
+  /** The newest sample, undefined when there is none. */
+  get newest() {
+    return this.at(this.#length - 1);
+  }
+
+  /**
+   * @param {number} index 0 is the oldest
+   * @returns {object|undefined} the sample
+   */
+  at(index) {
+    return index < 0 || index >= this.#length ? undefined
+      : this.#items[(this.#start + index) % this.#items.length];
+  }
+
+  /**
+   * Add a sample; one of the newest sample's step replaces it.
+   *
+   * @param {object} sample with n and t
+   * @returns {boolean} false for a sample that is too old or too close
+   */
+  push(sample) {
+    const newest = this.newest;
+    if (newest !== undefined) {
+      if (sample.n === newest.n) {
+        this.#items[(this.#start + this.#length - 1) % this.#items.length] = sample;
+        return true;
+      }
+      if (sample.t < newest.t + this.#spacing_s - 1e-9) {
+        return false;
+      }
+    }
+    if (this.#length < this.#items.length) {
+      this.#length += 1;
+    } else {
+      this.#start = (this.#start + 1) % this.#items.length;
+    }
+    this.#items[(this.#start + this.#length - 1) % this.#items.length] = sample;
+    return true;
+  }
+
+  /** Forget everything. */
+  clear() {
+    this.#items.fill(undefined);
+    this.#start = 0;
+    this.#length = 0;
+  }
+
+  /**
+   * Find the last sample at or before a time.
+   *
+   * @param {number} t simulation time [s]
+   * @returns {number} its index, -1 when all are later
+   */
+  indexAt(t) {
+    let low = 0;
+    let high = this.#length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.at(middle).t <= t) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    return low - 1;
+  }
+
+  /** All samples, oldest first, in a new array. */
+  toArray() {
+    return Array.from({ length: this.#length }, (_, index) => this.at(index));
+  }
+}

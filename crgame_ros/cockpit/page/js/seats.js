@@ -1,0 +1,209 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The seats in the Drive panel: who drives what, taking a seat and passing it on. */
+
+import { element, setAttribute, setText } from './driving/dom.js';
+import { NameField } from './driving/name_field.js';
+import { describeSeat } from './driving/seat_text.js';
+
+/** The list of seats, with the name field above and the input devices below. */
+class Seats {
+  #store;
+  #connection;
+  #driving;
+  #list = element('ul', { class: 'seats' });
+  #news = element('p', { class: 'drive-news', role: 'status', 'aria-live': 'polite' });
+  #shown = '';
+  #before = {};
+  // After a broken connection the seats are what they were before, until they are told anew.
+  #stale = false;
+  #live;
+  #replay;
+
+  constructor(root, store, connection, driving) {
+    this.#store = store;
+    this.#connection = connection;
+    this.#driving = driving;
+    const seats = element('section', { class: 'drive-section', 'aria-labelledby': 'seats-title' },
+      element('h2', { id: 'seats-title', text: 'Seats' }), this.#news, this.#list);
+    const replay = element('p', { class: 'drive-note', hidden: true,
+      text: 'This is a recording: nobody can take a seat. Click a vehicle to follow it.' });
+    const name = new NameField(store, connection).node;
+    this.#live = [name, seats, driving.devices];
+    this.#replay = replay;
+    root.append(replay, ...this.#live);
+    store.on('seats', () => {
+      this.#stale = false;
+      this.#show();
+    });
+    for (const event of ['hello', 'scene', 'status']) {
+      store.on(event, () => this.#show());
+    }
+    store.on('connection', (connected) => connected || this.#disconnected());
+    this.#show();
+  }
+
+  #show() {
+    const { mode, seats } = this.#store;
+    this.#live.forEach((node) => setAttribute(node, 'hidden', mode === 'replay'));
+    setAttribute(this.#replay, 'hidden', mode !== 'replay');
+    const rows = this.#order().map((id) => this.#facts(id));
+    const text = JSON.stringify(rows);
+    if (text !== this.#shown) {
+      this.#shown = text;
+      this.#rebuild(rows);
+    }
+    if (!this.#stale) {
+      this.#tell(seats);
+      this.#before = seats;
+    }
+  }
+
+  #order() {
+    const known = Object.keys(this.#store.seats);
+    const inScene = (this.#store.scene?.vehicles ?? []).map(({ id }) => id);
+    return [...inScene.filter((id) => known.includes(id)),
+      ...known.filter((id) => !inScene.includes(id))];
+  }
+
+  #facts(id) {
+    const { seats, scene, me, status } = this.#store;
+    const connected = this.#store.connected && !this.#stale;
+    const seat = seats[id];
+    const role = scene?.vehicles.find((vehicle) => vehicle.id === id)?.role ?? 'human';
+    return {
+      id, role, connected, mine: connected && seat.holder === me.id && me.id !== '',
+      holder: seat.holder, left: seat.holder === null && seat.source === 'cockpit',
+      requests: seat.requests ?? [],
+      others: seat.others ?? [],
+      asked: (seat.requests ?? []).some(({ client }) => client === me.id),
+      text: connected ? describeSeat(seat, role, scene?.planners?.[id], me.id)
+        : 'Unknown without a connection',
+      lost: Boolean(seat.lost || status?.seats_lost?.[id]),
+    };
+  }
+
+  #rebuild(rows) {
+    const focused = document.activeElement?.dataset?.key;
+    this.#list.replaceChildren(...rows.map((facts) => this.#row(facts)));
+    if (rows.length === 0) {
+      this.#list.append(element('li', { class: 'drive-note',
+        text: 'No seats: the simulation has not told of any yet.' }));
+    }
+    if (focused) {
+      this.#list.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+    }
+  }
+
+  #row(facts) {
+    const { id, role, mine, lost, text } = facts;
+    return element('li', { class: 'seat', 'data-seat': id, 'data-role': role, 'data-mine': mine,
+      'data-lost': lost },
+    element('span', { class: 'seat-colour', 'aria-hidden': 'true' }),
+    element('div', { class: 'seat-text' },
+      element('strong', { class: 'seat-id', text: id }),
+      element('span', { class: 'seat-role',
+        text: role === 'human' ? 'human seat' : 'autonomous vehicle' }),
+      element('span', { class: 'seat-source', text }),
+      lost ? element('span', { class: 'seat-lost', role: 'alert',
+        text: 'No input: the vehicle brakes by itself' }) : null),
+    element('div', { class: 'seat-buttons' }, ...this.#buttons(facts)));
+  }
+
+  #buttons({ id, role, mine, holder, left, requests, others, asked, connected }) {
+    const button = (action, text, act, title, enabled = connected) => element('button', {
+      type: 'button', class: `drive-button ${action === 'claim' ? 'primary' : ''}`, text, title,
+      'data-action': action, 'data-key': `${id} ${text}`, disabled: !enabled,
+      on: { click: () => this.#report(act()) } });
+    const giveBack = button('release', 'Give back', () => this.#giveBack(id), role === 'human'
+      ? 'Give the seat back to the driver that the game names'
+      : 'Give the vehicle back to its planner');
+    if (mine) {
+      return [...requests.map(({ client, name }) => button('hand_over', `Hand over to ${name}`,
+        () => this.#request('hand_over', { seat: id, to: client }),
+        `${name} asks for this seat`)),
+      others.length > 0 ? this.#handOver(id, others, connected) : null,
+      giveBack].filter((item) => item !== null);
+    }
+    if (holder !== null) {
+      return [button('ask', asked ? 'Asked' : 'Ask for it',
+        () => this.#request('ask', { seat: id }), 'Tell the driver that you want this seat',
+        connected && !asked)];
+    }
+    const claim = role === 'human'
+      ? button('claim', 'Drive', () => this.#driving.claim(id), `Drive ${id} from this page`)
+      : button('claim', 'Take over', () => this.#driving.claim(id),
+        `Drive ${id} instead of its planner`);
+    return left ? [claim, giveBack] : [claim];
+  }
+
+  /** A choice of those who have not asked. */
+  #handOver(id, others, connected) {
+    const choice = element('select', { class: 'seat-hand-over', disabled: !connected,
+      'aria-label': `Hand ${id} over to`, 'data-key': `${id} hand over`,
+      on: { change: () => this.#report(
+        this.#request('hand_over', { seat: id, to: choice.value })) } },
+    element('option', { value: '', text: 'Hand over to …' }),
+    ...others.map(({ client, name }) => element('option', { value: client, text: name })));
+    return choice;
+  }
+
+  #giveBack(id) {
+    return this.#driving.seat === id ? this.#driving.release()
+      : this.#request('release', { seat: id });
+  }
+
+  #request(type, content) {
+    return this.#connection.request({ type, ...content });
+  }
+
+  async #report(reply) {
+    const { ok, text } = await reply;
+    if (!ok) {
+      this.#store.receive({ type: 'notice', level: 'warn', text });
+    }
+  }
+
+  #disconnected() {
+    if (this.#stale) {
+      return;
+    }
+    const { seats, me } = this.#store;
+    const lost = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
+    this.#stale = true;
+    this.#before = {};
+    setText(this.#news, lost.length > 0
+      ? `The connection broke: you no longer hold ${lost.join()}.` : '');
+    this.#show();
+  }
+
+  /** Say what changed for this person since the last document. */
+  #tell(seats) {
+    const { me } = this.#store;
+    for (const [id, seat] of Object.entries(seats)) {
+      const before = this.#before[id];
+      const had = before?.holder === me.id && me.id !== '';
+      if (seat.holder === me.id && me.id !== '' && !had) {
+        setText(this.#news, `You drive ${id}.`);
+      } else if (had && seat.holder !== me.id) {
+        setText(this.#news, seat.holder === null ? `${id} is given back.`
+          : `${id} is now driven by ${seat.holder_name}.`);
+      } else if (had && (seat.requests?.length ?? 0) > (before.requests?.length ?? 0)) {
+        setText(this.#news, `${seat.requests.at(-1).name} asks for ${id}.`);
+      }
+    }
+  }
+}
+
+/**
+ * Put the seats into the Drive panel.
+ *
+ * @param {HTMLElement} root the panel
+ * @param {import('./store.js').Store} store
+ * @param {import('./connection.js').Connection} connection
+ * @param {import('./driving/driving.js').Driving} driving
+ * @returns {object}
+ */
+export function createSeats(root, store, connection, driving) {
+  return new Seats(root, store, connection, driving);
+}

@@ -1,0 +1,292 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Everything the page knows: the server's documents, and the samples of the running epoch. */
+
+import { DisplayClock } from './display_clock.js';
+import { decodeFrame, KIND, VEHICLE, VEHICLE_WIDTH } from './frames.js';
+import { extrapolateVehicles, interpolateVehicles, moveObjects } from './interpolation.js';
+import { SampleRing } from './samples.js';
+
+// At 100 Hz the ring of raw samples holds 5 s, that of scenario steps at 10 Hz 10 s.
+const RAW_SAMPLES = 500;
+const RAW_STEPS = 100;
+const HISTORY_SPACING_S = 0.05;
+const HISTORY_S = 120;
+// An object whose next step is late moves on so long beyond it [s].
+const LATE_S = 0.1;
+
+/** The page's data; see `on` for the events by which parts learn of changes. */
+export class Store {
+  /** Documents as the server sent them last; null or empty before. */
+  scene = null;
+  seats = {};
+  signals = { k: 0, states: {} };
+  fired = [];
+  status = null;
+  alarms = [];
+  me = { id: '', name: '' };
+  mode = null;
+  version = '';
+  connected = false;
+  round_trip_ms = NaN;
+
+  /** Counts resets; -1 before the first frame. */
+  epoch = -1;
+  /** Vehicle index -> its newest plan {epoch, n, k, t, index, points}. */
+  plans = new Map();
+  /** Index of the asking AV -> {epoch, n, k, t, index, steps, entries}. */
+  predictions = new Map();
+  /** Received raw samples, a few seconds: states and scenario steps. */
+  samples = new SampleRing(RAW_SAMPLES);
+  steps = new SampleRing(RAW_STEPS);
+  clock = new DisplayClock();
+
+  #listeners = new Map();
+  #history = new SampleRing(HISTORY_S / HISTORY_SPACING_S, HISTORY_SPACING_S);
+  #shown = {
+    t: 0, n: 0, k: 0, epoch: -1, vehicles: new Float64Array(0), objects: new Float64Array(0),
+  };
+  #shownFor_ms = NaN;
+  #timeSource = null;
+  #historySource = null;
+
+  /**
+   * Listen to an event: hello, scene, seats, signals, events, status, alarms, notice, connection,
+   * state, objects, plan, prediction, epoch. The listener gets what came.
+   *
+   * @param {string} name of the event
+   * @param {function(any): void} listener called after the store has taken the content in
+   * @returns {function(): void} ends it
+   */
+  on(name, listener) {
+    const listeners = this.#listeners.get(name) ?? new Set();
+    this.#listeners.set(name, listeners.add(listener));
+    return () => listeners.delete(listener);
+  }
+
+  /**
+   * Take in a document or an event of the server.
+   *
+   * @param {object} message with its `type`
+   */
+  receive(message) {
+    switch (message.type) {
+      case 'hello':
+        this.me = { id: message.client, name: message.name };
+        this.mode = message.mode;
+        this.version = message.version;
+        break;
+      case 'scene':
+        this.scene = message;
+        if ((message.time?.epoch ?? -1) > this.epoch) {
+          this.restart(message.time.epoch);
+        }
+        break;
+      case 'seats': this.seats = message.seats; break;
+      case 'signals': this.signals = message; break;
+      case 'events': this.fired = message.fired; break;
+      case 'alarms': this.alarms = message.active; break;
+      case 'status':
+        this.status = message;
+        this.clock.factor = message.real_time_factor ?? 1;
+        break;
+      default:
+    }
+    this.#emit(message.type, message);
+  }
+
+  /**
+   * Take in a binary frame; one of an epoch that is over is dropped.
+   *
+   * @param {ArrayBuffer} buffer the frame
+   * @param {number} now_ms when it arrived
+   */
+  receiveFrame(buffer, now_ms) {
+    const frame = decodeFrame(buffer);
+    if (frame === null || frame.epoch < this.epoch) {
+      return;
+    }
+    if (frame.epoch > this.epoch) {
+      this.restart(frame.epoch);
+    }
+    this.#shownFor_ms = NaN;
+    switch (frame.kind) {
+      case KIND.STATE: this.#takeState(frame, now_ms); break;
+      case KIND.OBJECTS:
+        this.steps.push(frame);
+        this.#emit('objects', frame);
+        break;
+      case KIND.PLAN:
+        this.plans.set(frame.index, frame);
+        this.#emit('plan', frame);
+        break;
+      case KIND.PREDICTION:
+        this.predictions.set(frame.index, frame);
+        this.#emit('prediction', frame);
+        break;
+      default:
+    }
+  }
+
+  /**
+   * Forget all samples: a reset, or a replay that jumps.
+   *
+   * @param {number} epoch of the frames to come
+   */
+  restart(epoch) {
+    this.epoch = epoch;
+    this.samples.clear();
+    this.steps.clear();
+    this.#history.clear();
+    this.plans.clear();
+    this.predictions.clear();
+    this.clock.reset();
+    this.#shownFor_ms = NaN;
+    this.#emit('epoch', epoch);
+  }
+
+  /** @param {boolean} connected whether the server can be reached */
+  setConnected(connected) {
+    this.connected = connected;
+    this.clock.reset();
+    this.#emit('connection', connected);
+  }
+
+  /**
+   * Show the times that a function gives instead of those of the live clock.
+   *
+   * @param {null|function(number): number} source wall time [ms] -> simulation time [s]
+   */
+  useTimeSource(source) {
+    this.#timeSource = source;
+    this.#shownFor_ms = NaN;
+  }
+
+  /**
+   * Take the past of vehicles from a function instead of the samples received.
+   *
+   * @param {null|function(number, number): object} source as `history`
+   */
+  useHistorySource(source) {
+    this.#historySource = source;
+  }
+
+  /** The newest state sample {epoch, n, k, t, vehicles}, undefined before the first. */
+  get latest() {
+    return this.samples.newest;
+  }
+
+  /**
+   * Give what is to be seen in an animation frame.
+   *
+   * Vehicles are interpolated linearly in t between the samples around t, and moved on from the
+   * newest where that is late; objects stand at pose + velocity * (t - t of their step).
+   *
+   * @param {number} now_ms the frame's time, as requestAnimationFrame gives it
+   * @returns {{t: number, n: number, k: number, epoch: number, vehicles: Float64Array,
+   *   objects: Float64Array}|null} the same object each time, refilled; null before any sample
+   */
+  displayed(now_ms) {
+    const newest = this.samples.newest;
+    if (newest === undefined) {
+      return null;
+    }
+    if (now_ms === this.#shownFor_ms) {
+      return this.#shown;
+    }
+    this.#shownFor_ms = now_ms;
+    const shown = this.#shown;
+    const runs = this.status === null || this.status.run === 'running';
+    shown.t = this.#timeSource === null ? this.clock.time(now_ms, newest.t, runs && this.connected)
+      : this.#timeSource(now_ms);
+    shown.epoch = this.epoch;
+    this.#fillVehicles(shown);
+    this.#fillObjects(shown);
+    return shown;
+  }
+
+  /**
+   * Give a vehicle's past for plots.
+   *
+   * @param {number} index of the vehicle in the scene
+   * @param {number} seconds how far back, at most 120 s
+   * @returns {object} t and each column of VEHICLE by its name, arrays of the same length
+   */
+  history(index, seconds) {
+    if (this.#historySource !== null) {
+      return this.#historySource(index, seconds);
+    }
+    const newest = this.#history.newest;
+    const past = { t: [] };
+    for (const name of Object.keys(VEHICLE)) {
+      past[name] = [];
+    }
+    const first = newest === undefined ? 0 : this.#history.indexAt(newest.t - seconds) + 1;
+    for (let i = first; i < this.#history.length; i += 1) {
+      const sample = this.#history.at(i);
+      past.t.push(sample.t);
+      for (const [name, column] of Object.entries(VEHICLE)) {
+        past[name].push(sample.vehicles[index * VEHICLE_WIDTH + column]);
+      }
+    }
+    return past;
+  }
+
+  /**
+   * @param {string} id of a vehicle
+   * @returns {number} its index in the scene and in STATE, -1 when there is none
+   */
+  vehicleIndex(id) {
+    return this.scene === null ? -1 : this.scene.vehicles.findIndex((v) => v.id === id);
+  }
+
+  #takeState(frame, now_ms) {
+    if (this.samples.length > 0
+        && this.samples.newest.vehicles.length !== frame.vehicles.length) {
+      this.samples.clear();
+      this.#history.clear();
+    }
+    const isNew = frame.n > (this.samples.newest?.n ?? -1);
+    if (this.samples.push(frame) && isNew) {
+      this.clock.arrived(frame.t, now_ms);
+      this.#history.push(frame);
+    }
+    this.#emit('state', frame);
+  }
+
+  #fillVehicles(shown) {
+    const index = Math.max(this.samples.indexAt(shown.t), 0);
+    const before = this.samples.at(index);
+    const after = this.samples.at(index + 1);
+    if (shown.vehicles.length !== before.vehicles.length) {
+      shown.vehicles = new Float64Array(before.vehicles.length);
+    }
+    shown.n = before.n;
+    shown.k = before.k;
+    if (after !== undefined) {
+      const share = (shown.t - before.t) / (after.t - before.t);
+      interpolateVehicles(shown.vehicles, before.vehicles, after.vehicles, Math.max(share, 0));
+    } else {
+      extrapolateVehicles(shown.vehicles, before.vehicles, shown.t - before.t);
+    }
+  }
+
+  #fillObjects(shown) {
+    const step = this.steps.at(Math.max(this.steps.indexAt(shown.t), 0));
+    const size = step === undefined ? 0 : step.objects.length;
+    if (shown.objects.length !== size) {
+      shown.objects = new Float64Array(size);
+    }
+    if (size > 0) {
+      const most = (this.scene?.time?.dt_c_s ?? 0.1) + LATE_S;
+      moveObjects(shown.objects, step.objects,
+        Math.min(Math.max(shown.t - step.t, 0), most));
+    }
+  }
+
+  #emit(name, content) {
+    for (const listener of this.#listeners.get(name) ?? []) {
+      listener(content);
+    }
+  }
+}

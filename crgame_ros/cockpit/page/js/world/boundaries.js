@@ -1,0 +1,59 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The boundary lines of all lanelets, each once, though two neighbours describe it. */
+
+// Neighbours' bounds are the same line when their ends are this close [m].
+const SAME_M = 0.3;
+
+// What is more to be seen goes before what is less.
+const RANK = [
+  'no_marking', 'unknown', 'dashed', 'dashed_dashed', 'solid', 'lowered_curb', 'curb',
+  'dashed_solid', 'solid_dashed', 'solid_solid', 'broad_dashed', 'broad_solid',
+];
+
+/**
+ * Collect the boundaries of a scene.
+ *
+ * @param {object[]} lanelets of the scene document
+ * @returns {object[]} {line, marking, owner (index of its lanelet), inner (between two lanelets)}
+ */
+export function collectBoundaries(lanelets) {
+  const index = new Map(lanelets.map((lanelet, i) => [lanelet.id, i]));
+  const drawn = new Map();
+  const boundaries = [];
+  lanelets.forEach((lanelet, owner) => {
+    for (const side of ['left', 'right']) {
+      const neighbour = index.get(lanelet[`adj_${side}`]);
+      const shared = neighbour === undefined ? undefined
+        : drawn.get(`${neighbour} ${sideOfNeighbour(lanelet, side)}`);
+      if (shared !== undefined && sameLine(shared.line, lanelet[side])) {
+        shared.marking = moreVisible(shared.marking, lanelet[`${side}_line`]);
+        shared.inner = true;
+      } else {
+        const boundary = {
+          line: lanelet[side], marking: lanelet[`${side}_line`], owner,
+          inner: neighbour !== undefined,
+        };
+        boundaries.push(boundary);
+        drawn.set(`${owner} ${side}`, boundary);
+      }
+    }
+  });
+  return boundaries;
+}
+
+function sideOfNeighbour(lanelet, side) {
+  const other = side === 'left' ? 'right' : 'left';
+  return lanelet[`adj_${side}_same`] ? other : side;
+}
+
+function sameLine(one, two) {
+  const end = one.length - 2;
+  const last = two.length - 2;
+  const near = (i, j) => Math.hypot(one[i] - two[j], one[i + 1] - two[j + 1]) < SAME_M;
+  return (near(0, 0) && near(end, last)) || (near(0, last) && near(end, 0));
+}
+
+function moreVisible(one, two) {
+  return RANK.indexOf(two) > RANK.indexOf(one) ? two : one;
+}

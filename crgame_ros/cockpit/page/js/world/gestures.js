@@ -1,0 +1,98 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Mouse, pen and fingers on the canvas: drag, wheel, right or shift drag, pinch, double click. */
+
+const WHEEL_ZOOM = 0.0015;
+const LINE_PX = 30;
+// A hand that only clicks moves less than this [px].
+const CLICK_PX = 4;
+
+/**
+ * Let pointers move a camera.
+ *
+ * @param {HTMLCanvasElement} canvas receives the pointers
+ * @param {object} actions pan(dx, dy), zoom(factor, x, y), rotate(angle, x, y), pick(x, y)
+ *   (a double click); all in CSS pixels and rad, counter-clockwise on the screen
+ */
+export function attachGestures(canvas, actions) {
+  const hands = new Map();
+  let turning = false;
+
+  const place = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  };
+
+  canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+
+  canvas.addEventListener('pointerdown', (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    hands.set(event.pointerId, { ...place(event), moved: 0 });
+    turning = event.button === 2 || event.shiftKey;
+    canvas.classList.add('dragging');
+  });
+
+  canvas.addEventListener('pointermove', (event) => {
+    const hand = hands.get(event.pointerId);
+    if (hand === undefined) {
+      return;
+    }
+    const now = place(event);
+    hand.moved += Math.hypot(now.x - hand.x, now.y - hand.y);
+    if (hands.size === 1 && hand.moved >= CLICK_PX) {
+      if (turning) {
+        const box = canvas.getBoundingClientRect();
+        actions.rotate(angleAt(box.width / 2, box.height / 2, hand, now));
+      } else {
+        actions.pan(now.x - hand.x, now.y - hand.y);
+      }
+    } else if (hands.size === 2) {
+      pinch(hands, event.pointerId, now, actions);
+    }
+    hand.x = now.x;
+    hand.y = now.y;
+  });
+
+  const leave = (event) => {
+    hands.delete(event.pointerId);
+    if (hands.size === 0) {
+      canvas.classList.remove('dragging');
+    }
+  };
+  canvas.addEventListener('pointerup', leave);
+  canvas.addEventListener('pointercancel', leave);
+
+  canvas.addEventListener('dblclick', (event) => {
+    const { x, y } = place(event);
+    actions.pick(x, y);
+  });
+
+  canvas.addEventListener('wheel', (event) => {
+    event.preventDefault();
+    const { x, y } = place(event);
+    const pixels = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY
+      : event.deltaY * LINE_PX;
+    actions.zoom(Math.exp(-WHEEL_ZOOM * pixels), x, y);
+  }, { passive: false });
+}
+
+function pinch(hands, movedId, now, actions) {
+  const [otherId] = [...hands.keys()].filter((id) => id !== movedId);
+  const other = hands.get(otherId);
+  const before = hands.get(movedId);
+  const x = (now.x + other.x) / 2;
+  const y = (now.y + other.y) / 2;
+  actions.pan((now.x - before.x) / 2, (now.y - before.y) / 2);
+  const was = Math.hypot(before.x - other.x, before.y - other.y);
+  const is = Math.hypot(now.x - other.x, now.y - other.y);
+  if (was > 1 && is > 1) {
+    actions.zoom(is / was, x, y);
+    actions.rotate(angleAt(other.x, other.y, before, now), x, y);
+  }
+}
+
+/** Counter-clockwise on the screen, whose y points down. */
+function angleAt(x, y, from, to) {
+  const angle = Math.atan2(from.y - y, from.x - x) - Math.atan2(to.y - y, to.x - x);
+  return Math.atan2(Math.sin(angle), Math.cos(angle));
+}

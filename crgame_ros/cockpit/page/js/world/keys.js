@@ -1,0 +1,51 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Keys of the world; those that drive (W A S D, arrows, space, R) are none of them. */
+
+const ZOOM_STEP = 1.25;
+const TURN_STEP = Math.PI / 12;
+
+/**
+ * Tell whether a key event belongs to a field in which somebody writes.
+ *
+ * @param {KeyboardEvent} event any key event
+ * @returns {boolean} true in text fields, selections and editable text
+ */
+export function isTyping(event) {
+  const target = event.target;
+  return target instanceof HTMLElement && (
+    target.isContentEditable || ['INPUT', 'TEXTAREA', 'SELECT'].includes(target.tagName));
+}
+
+/**
+ * Let keys move the camera.
+ *
+ * @param {object} actions zoomBy(factor), fit(), followNext(), toggleHeading(), turnBy(angle),
+ *   toggleLabels()
+ * @returns {function(): void} ends it
+ */
+export function attachKeys(actions) {
+  const bindings = {
+    '+': () => actions.zoomBy(ZOOM_STEP),
+    '=': () => actions.zoomBy(ZOOM_STEP),
+    '-': () => actions.zoomBy(1 / ZOOM_STEP),
+    0: () => actions.fit(),
+    f: () => actions.followNext(),
+    h: () => actions.toggleHeading(),
+    q: () => actions.turnBy(TURN_STEP),
+    e: () => actions.turnBy(-TURN_STEP),
+    l: () => actions.toggleLabels(),
+  };
+  const pressed = (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) {
+      return;
+    }
+    const action = bindings[event.key.toLowerCase()];
+    if (action !== undefined) {
+      event.preventDefault();
+      action();
+    }
+  };
+  window.addEventListener('keydown', pressed);
+  return () => window.removeEventListener('keydown', pressed);
+}

@@ -1,0 +1,166 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The map as few large paths: lanelets near each other share them, and are culled together. */
+
+import { collectBoundaries } from './boundaries.js';
+import { addDashes, addLine, addPolygon, lengthOf, poseAlong, shifted } from './polyline.js';
+
+const CELL_M = 120;
+const ARROW_EVERY_M = 32;
+const SHORTEST_FOR_ARROW_M = 9;
+const DOUBLE_LINE_M = 0.13;
+const ZEBRA_M = 0.5;
+
+/** Surfaces from the lowest to the highest, by what they are called in the palette. */
+export const SURFACES = ['walk', 'parking', 'cycle', 'road', 'junction'];
+
+const SURFACE_OF_TYPE = {
+  sidewalk: 'walk', crosswalk: 'junction', bicycleLane: 'cycle', parking: 'parking',
+  shoulder: 'parking', border: 'parking', restricted: 'parking',
+};
+
+/**
+ * Build the paths of a scene, each chunk around its own point, so that float32 suffices.
+ *
+ * @param {object} scene the scene document
+ * @returns {object[]} chunks {x, y, box, casing, surfaces, seams, lines, broad, curbs, arrows,
+ *   zebras}, paths in metres around (x, y)
+ */
+export function buildChunks(scene) {
+  const chunks = new Map();
+  const homes = scene.lanelets.map((lanelet) => {
+    const outline = outlineOf(lanelet);
+    const box = boxOf(outline);
+    const key = `${Math.floor((box[0] + box[2]) / 2 / CELL_M)} `
+      + `${Math.floor((box[1] + box[3]) / 2 / CELL_M)}`;
+    if (!chunks.has(key)) {
+      chunks.set(key, emptyChunk((box[0] + box[2]) / 2, (box[1] + box[3]) / 2));
+    }
+    const chunk = chunks.get(key);
+    addSurface(chunk, lanelet, outline);
+    chunk.box = union(chunk.box, box);
+    return chunk;
+  });
+  for (const boundary of collectBoundaries(scene.lanelets)) {
+    addBoundary(homes[boundary.owner], boundary, scene.lanelets[boundary.owner]);
+  }
+  return [...chunks.values()];
+}
+
+/**
+ * @param {number[]} points flat
+ * @returns {number[]} xmin, ymin, xmax, ymax
+ */
+export function boxOf(points) {
+  const box = [Infinity, Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < points.length; i += 2) {
+    box[0] = Math.min(box[0], points[i]);
+    box[1] = Math.min(box[1], points[i + 1]);
+    box[2] = Math.max(box[2], points[i]);
+    box[3] = Math.max(box[3], points[i + 1]);
+  }
+  return box;
+}
+
+function outlineOf(lanelet) {
+  const outline = [...lanelet.left];
+  for (let i = lanelet.right.length - 2; i >= 0; i -= 2) {
+    outline.push(lanelet.right[i], lanelet.right[i + 1]);
+  }
+  return outline;
+}
+
+function union(a, b) {
+  return [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])];
+}
+
+function emptyChunk(x, y) {
+  return {
+    x, y, box: [Infinity, Infinity, -Infinity, -Infinity], casing: new Path2D(),
+    surfaces: new Map(), seams: new Path2D(), lines: new Path2D(), broad: new Path2D(),
+    curbs: new Path2D(), arrows: new Path2D(), zebras: new Path2D(),
+  };
+}
+
+function addSurface(chunk, lanelet, outline) {
+  const special = lanelet.types.find((type) => type in SURFACE_OF_TYPE);
+  const surface = SURFACE_OF_TYPE[special] ?? (lanelet.intersection ? 'junction' : 'road');
+  const path = chunk.surfaces.get(surface) ?? new Path2D();
+  chunk.surfaces.set(surface, path);
+  addPolygon(path, outline, chunk.x, chunk.y);
+  addPolygon(chunk.casing, outline, chunk.x, chunk.y);
+  if (special === 'crosswalk') {
+    addZebra(chunk, lanelet);
+  } else if (special === undefined && lanelet.one_way && !lanelet.intersection) {
+    addArrows(chunk, lanelet.center);
+  }
+}
+
+/** Stripes along the traffic that crosses, which is across the way of those who walk. */
+function addZebra(chunk, lanelet) {
+  const length = Math.min(lengthOf(lanelet.left), lengthOf(lanelet.right));
+  for (let s = ZEBRA_M / 2; s + ZEBRA_M < length; s += 2 * ZEBRA_M) {
+    const corners = [[lanelet.left, s], [lanelet.left, s + ZEBRA_M],
+      [lanelet.right, s + ZEBRA_M], [lanelet.right, s]];
+    addPolygon(chunk.zebras, corners.flatMap(([line, at]) => {
+      const { x, y } = poseAlong(line, at);
+      return [x, y];
+    }), chunk.x, chunk.y);
+  }
+}
+
+function addArrows(chunk, center) {
+  const length = lengthOf(center);
+  if (length < SHORTEST_FOR_ARROW_M) {
+    return;
+  }
+  const count = Math.max(Math.round(length / ARROW_EVERY_M), 1);
+  for (let i = 0; i < count; i += 1) {
+    addArrow(chunk, poseAlong(center, (length * (i + 0.5)) / count));
+  }
+}
+
+/** A slender arrow on the lane, 3.6 m long. */
+function addArrow(chunk, { x, y, yaw }) {
+  const shape = [-1.8, 0.07, 0.5, 0.07, 0.5, 0.42, 1.8, 0, 0.5, -0.42, 0.5, -0.07, -1.8, -0.07];
+  const cos = Math.cos(yaw);
+  const sin = Math.sin(yaw);
+  const placed = [];
+  for (let i = 0; i < shape.length; i += 2) {
+    placed.push(x + cos * shape[i] - sin * shape[i + 1], y + sin * shape[i] + cos * shape[i + 1]);
+  }
+  addPolygon(chunk.arrows, placed, chunk.x, chunk.y);
+}
+
+function addBoundary(chunk, { line, marking, inner }, lanelet) {
+  const { x, y } = chunk;
+  const [left, right] = marking.split('_');
+  switch (marking) {
+    case 'solid': addLine(chunk.lines, line, x, y); break;
+    case 'dashed': addDashes(chunk.lines, line, x, y, 3, 6); break;
+    case 'broad_solid': addLine(chunk.broad, line, x, y); break;
+    case 'broad_dashed': addDashes(chunk.broad, line, x, y, 3, 3); break;
+    case 'curb':
+    case 'lowered_curb': addLine(chunk.curbs, line, x, y); break;
+    case 'solid_solid':
+    case 'dashed_dashed':
+    case 'solid_dashed':
+    case 'dashed_solid':
+      addSingle(chunk, shifted(line, DOUBLE_LINE_M), left);
+      addSingle(chunk, shifted(line, -DOUBLE_LINE_M), right);
+      break;
+    default:
+      // Without a line, lanes side by side must still be told apart.
+      if (inner && !lanelet.intersection) {
+        addLine(chunk.seams, line, x, y);
+      }
+  }
+}
+
+function addSingle(chunk, line, style) {
+  if (style === 'solid') {
+    addLine(chunk.lines, line, chunk.x, chunk.y);
+  } else {
+    addDashes(chunk.lines, line, chunk.x, chunk.y, 3, 6);
+  }
+}

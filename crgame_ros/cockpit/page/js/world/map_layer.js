@@ -1,0 +1,203 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Ground, roads and their markings, stop lines, and the AVs' goals. */
+
+import { boxOf, buildChunks, SURFACES } from './map_geometry.js';
+import { addLine, addPolygon } from './polyline.js';
+
+// Line widths [m], and the least that they are drawn with [CSS px].
+const WIDTH = {
+  lines: 0.13, broad: 0.28, curbs: 0.16, seams: 0.08, stop: 0.4, casing: 0.45, slit: 0.06,
+};
+const LEAST_PX = 0.9;
+// Scales [px/m] from which on, and fully by which, details are shown.
+const MARKS = [0.6, 2.2];
+const ARROWS = [2.2, 5];
+const KERBS = [0.8, 2.5];
+// Far out a road stays this wide on the screen [px].
+const ROAD_PX = 1.5;
+const GRID_PX = 90;
+const GOAL_DASH = [1.2, 0.8];
+
+/** The part of the world that stays as it is during a run. */
+export class MapLayer {
+  #chunks = [];
+  #visible = [];
+  #stops = [];
+  #goals = [];
+
+  /** Whether the lanes' direction arrows are shown. */
+  arrows = true;
+  /** Whether the AVs' goals are shown. */
+  goals = true;
+
+  /** @param {object} scene the scene document */
+  load(scene) {
+    this.#chunks = buildChunks(scene);
+    this.#stops = scene.stop_lines.map(({ points }) => local(points, addLine));
+    this.#goals = scene.goals.flatMap(({ polygons }) =>
+      polygons.map((polygon) => local(polygon, addPolygon)));
+  }
+
+  /** Draw everything that lies under vehicles and plans. */
+  draw(context, view) {
+    this.#drawGround(context, view);
+    this.#visible.length = 0;
+    for (const chunk of this.#chunks) {
+      if (view.camera.seesBox(chunk.box)) {
+        this.#visible.push(chunk);
+      }
+    }
+    this.#drawSurfaces(context, view);
+    if (this.goals) {
+      this.#drawGoals(context, view);
+    }
+    this.#drawMarks(context, view);
+  }
+
+  /** A faint grid, by which one sees motion where there is no road. */
+  #drawGround(context, { camera, palette, ratio }) {
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.fillStyle = palette.ground;
+    context.fillRect(0, 0, camera.width, camera.height);
+    const spacing = roundStep(GRID_PX / camera.scale);
+    const ox = Math.round(camera.x / spacing) * spacing;
+    const oy = Math.round(camera.y / spacing) * spacing;
+    camera.enterMap(context, ratio, ox, oy);
+    context.strokeStyle = palette.grid;
+    context.lineWidth = 1 / camera.scale;
+    context.beginPath();
+    for (let x = Math.floor((camera.left - ox) / spacing) * spacing;
+      x <= camera.right - ox; x += spacing) {
+      context.moveTo(x, camera.bottom - oy);
+      context.lineTo(x, camera.top - oy);
+    }
+    for (let y = Math.floor((camera.bottom - oy) / spacing) * spacing;
+      y <= camera.top - oy; y += spacing) {
+      context.moveTo(camera.left - ox, y);
+      context.lineTo(camera.right - ox, y);
+    }
+    context.stroke();
+  }
+
+  /** Edges first and all surfaces over them: what remains is the outer edge of the road. */
+  #drawSurfaces(context, { camera, palette, ratio }) {
+    context.lineJoin = 'round';
+    const kerbs = faded(camera.scale, KERBS);
+    if (kerbs > 0) {
+      context.globalAlpha = kerbs;
+      context.strokeStyle = palette.kerb;
+      context.lineWidth = Math.max(WIDTH.casing, 2 / camera.scale);
+      for (const chunk of this.#visible) {
+        camera.enterMap(context, ratio, chunk.x, chunk.y);
+        context.stroke(chunk.casing);
+      }
+      context.globalAlpha = 1;
+    }
+    // Slits of a few centimetres between neighbours close under a thin stroke.
+    context.lineWidth = Math.max(WIDTH.slit, (1 - kerbs) * ROAD_PX / camera.scale);
+    for (const surface of SURFACES) {
+      context.fillStyle = palette[surface];
+      context.strokeStyle = palette[surface];
+      for (const chunk of this.#visible) {
+        const path = chunk.surfaces.get(surface);
+        if (path !== undefined) {
+          camera.enterMap(context, ratio, chunk.x, chunk.y);
+          context.fill(path);
+          context.stroke(path);
+        }
+      }
+    }
+  }
+
+  #drawMarks(context, view) {
+    const { camera, palette } = view;
+    const marks = faded(camera.scale, MARKS);
+    if (marks > 0) {
+      this.#strokeAll(context, view, 'seams', palette.seam, marks);
+      this.#strokeAll(context, view, 'curbs', palette.kerb, marks);
+      this.#strokeAll(context, view, 'lines', palette.mark, marks);
+      this.#strokeAll(context, view, 'broad', palette.mark, marks);
+      this.#fillAll(context, view, 'zebras', palette.mark, marks);
+    }
+    const arrows = this.arrows ? faded(camera.scale, ARROWS) : 0;
+    if (arrows > 0) {
+      this.#fillAll(context, view, 'arrows', palette.arrow, arrows);
+    }
+    context.globalAlpha = 1;
+    context.strokeStyle = palette.stop;
+    context.lineCap = 'butt';
+    context.lineWidth = Math.max(WIDTH.stop, 1 / camera.scale);
+    for (const stop of this.#stops) {
+      if (camera.seesBox(stop.box)) {
+        camera.enterMap(context, view.ratio, stop.x, stop.y);
+        context.stroke(stop.path);
+      }
+    }
+  }
+
+  #strokeAll(context, { camera, ratio }, name, color, alpha) {
+    context.globalAlpha = alpha;
+    context.strokeStyle = color;
+    context.lineWidth = Math.max(WIDTH[name], LEAST_PX / camera.scale);
+    for (const chunk of this.#visible) {
+      camera.enterMap(context, ratio, chunk.x, chunk.y);
+      context.stroke(chunk[name]);
+    }
+  }
+
+  #fillAll(context, { camera, ratio }, name, color, alpha) {
+    context.globalAlpha = alpha;
+    context.fillStyle = color;
+    for (const chunk of this.#visible) {
+      camera.enterMap(context, ratio, chunk.x, chunk.y);
+      context.fill(chunk[name]);
+    }
+  }
+
+  #drawGoals(context, { camera, palette, ratio }) {
+    context.fillStyle = palette.av;
+    context.strokeStyle = palette.av;
+    for (const goal of this.#goals) {
+      if (camera.seesBox(goal.box)) {
+        camera.enterMap(context, ratio, goal.x, goal.y);
+        context.globalAlpha = 0.16;
+        context.fill(goal.path);
+        context.globalAlpha = 0.75;
+        context.lineWidth = Math.max(0.15, 1.2 / camera.scale);
+        context.setLineDash(GOAL_DASH);
+        context.stroke(goal.path);
+      }
+    }
+    context.setLineDash(NO_DASH);
+    context.globalAlpha = 1;
+  }
+}
+
+const NO_DASH = [];
+
+/** A path around the middle of its points. */
+function local(points, add) {
+  const box = boxOf(points);
+  const x = (box[0] + box[2]) / 2;
+  const y = (box[1] + box[3]) / 2;
+  const path = new Path2D();
+  add(path, points, x, y);
+  return { x, y, box, path };
+}
+
+function faded(scale, [from, to]) {
+  return Math.min(Math.max((scale - from) / (to - from), 0), 1);
+}
+
+/**
+ * Round a length up to 1, 2 or 5 times a power of ten.
+ *
+ * @param {number} length any positive length
+ * @returns {number} the rounded one
+ */
+export function roundStep(length) {
+  const power = 10 ** Math.floor(Math.log10(length));
+  const lead = length / power;
+  return power * (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10);
+}

@@ -1,0 +1,59 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The colours of the theme in force, read from the style sheets' custom properties. */
+
+const NAMES = [
+  'human', 'av', 'recorded', 'vulnerable', 'static', 'traffic', 'alarm', 'accent',
+  'map-ground', 'map-grid', 'map-road', 'map-junction', 'map-walk', 'map-cycle', 'map-parking',
+  'map-kerb', 'map-mark', 'map-seam', 'map-arrow', 'map-stop', 'map-outline', 'map-glass',
+  'map-lamp', 'map-brake', 'map-shadow', 'map-label', 'map-label-ground', 'map-overlay',
+];
+
+/**
+ * Resolve a custom property to a colour that canvas and plots understand.
+ *
+ * @param {string} name without the leading dashes
+ * @returns {string} a CSS colour without variables
+ */
+export function themeColor(name) {
+  const probe = document.createElement('span');
+  probe.style.color = `var(--${name})`;
+  document.documentElement.append(probe);
+  const color = getComputedStyle(probe).color;
+  probe.remove();
+  return color;
+}
+
+/**
+ * Call a function whenever the theme changes: the system's, or data-theme on <html>.
+ *
+ * @param {function(): void} changed called after the new colours are in force
+ * @returns {function(): void} ends it
+ */
+export function onThemeChange(changed) {
+  const observer = new MutationObserver(changed);
+  observer.observe(document.documentElement, { attributeFilter: ['data-theme', 'class'] });
+  const query = window.matchMedia('(prefers-color-scheme: dark)');
+  query.addEventListener('change', changed);
+  return () => {
+    observer.disconnect();
+    query.removeEventListener('change', changed);
+  };
+}
+
+/** Colours by name, 'map-' left out: palette.human, palette.road, palette.labelGround, … */
+export class Palette {
+  constructor() {
+    this.rem_px = 16;
+    this.read();
+  }
+
+  /** Read all colours, and the root's font size. */
+  read() {
+    for (const name of NAMES) {
+      const key = name.replace('map-', '').replace(/-(\w)/g, (_, letter) => letter.toUpperCase());
+      this[key] = themeColor(name);
+    }
+    this.rem_px = parseFloat(getComputedStyle(document.documentElement).fontSize);
+  }
+}

@@ -1,0 +1,140 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The AVs' plans: a line with dots that fade with time, and the width that will be swept. */
+
+import { PLAN_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+
+// Dots stand at whole multiples of this simulation time, so they stay where they are when a new
+// plan says the same as the one before [s].
+const DOT_EVERY_S = 0.5;
+const DOT_M = 0.26;
+const DOT_PX = [1.8, 5];
+const BAND_ALPHA = 0.22;
+const FADED = 0.2;
+
+/** Plans of all AVs that are not hidden. */
+export class PlanLayer {
+  #hidden = new Set();
+
+  /** Whether plans are shown at all. */
+  on = true;
+
+  /**
+   * Learn from the events that have fired which AVs' plans are hidden.
+   *
+   * @param {object|null} scene whose events say what each does
+   * @param {object[]} fired the events that have taken effect, in their order
+   */
+  takeEvents(scene, fired) {
+    this.#hidden.clear();
+    for (const { name } of fired) {
+      const event = scene?.events.find((entry) => entry.name === name);
+      if (event?.kind === 'plan_display') {
+        if (event.show) {
+          this.#hidden.delete(event.av);
+        } else {
+          this.#hidden.add(event.av);
+        }
+      }
+    }
+  }
+
+  /**
+   * @param {string} id of an AV
+   * @returns {boolean} whether its plan is shown
+   */
+  shows(id) {
+    return this.on && !this.#hidden.has(id);
+  }
+
+  /** Draw what of each plan is still to come. */
+  draw(context, view, vehicles) {
+    if (!this.on) {
+      return;
+    }
+    for (const plan of view.store.plans.values()) {
+      const vehicle = vehicles[plan.index];
+      if (vehicle !== undefined && this.shows(vehicle.id)) {
+        this.#drawPlan(context, view, plan, vehicle);
+      }
+    }
+  }
+
+  #drawPlan(context, view, plan, vehicle) {
+    const { shown, palette, camera, ratio } = view;
+    const { points } = plan;
+    const first = firstAfter(plan, shown.t);
+    if (first >= points.length) {
+      return;
+    }
+    const row = plan.index * VEHICLE_WIDTH;
+    const x = shown.vehicles[row];
+    const y = shown.vehicles[row + 1];
+    camera.enterMap(context, ratio, x, y);
+    context.fillStyle = palette[vehicle.color];
+    context.strokeStyle = palette[vehicle.color];
+    context.globalAlpha = BAND_ALPHA;
+    addBand(context, points, first, x, y, shown.vehicles[row + VEHICLE.yaw], vehicle);
+    context.fill();
+    context.globalAlpha = 0.9;
+    context.lineWidth = Math.max(0.1, 1.4 / camera.scale);
+    context.lineJoin = 'round';
+    context.beginPath();
+    context.moveTo(0, 0);
+    for (let i = first; i < points.length; i += PLAN_WIDTH) {
+      context.lineTo(points[i] - x, points[i + 1] - y);
+    }
+    context.stroke();
+    drawDots(context, view, plan, first, x, y);
+    context.globalAlpha = 1;
+  }
+}
+
+/** Index of the first value of the first point after a time [s]. */
+function firstAfter({ t, points }, now_t) {
+  let i = 0;
+  while (i < points.length && t + points[i + 4] <= now_t) {
+    i += PLAN_WIDTH;
+  }
+  return i;
+}
+
+/** From the vehicle's rear axle as it is, along the plan, to where its front will be. */
+function addBand(context, points, first, x, y, yaw, { shape, rear_to_center: ahead }) {
+  const half = shape.width / 2;
+  const last = points.length - PLAN_WIDTH;
+  const nose = ahead + shape.length / 2;
+  const endX = points[last] - x + nose * Math.cos(points[last + 2]);
+  const endY = points[last + 1] - y + nose * Math.sin(points[last + 2]);
+  context.beginPath();
+  context.moveTo(-half * Math.sin(yaw), half * Math.cos(yaw));
+  for (let i = first; i <= last; i += PLAN_WIDTH) {
+    context.lineTo(points[i] - x - half * Math.sin(points[i + 2]),
+      points[i + 1] - y + half * Math.cos(points[i + 2]));
+  }
+  context.lineTo(endX - half * Math.sin(points[last + 2]),
+    endY + half * Math.cos(points[last + 2]));
+  context.lineTo(endX + half * Math.sin(points[last + 2]),
+    endY - half * Math.cos(points[last + 2]));
+  for (let i = last; i >= first; i -= PLAN_WIDTH) {
+    context.lineTo(points[i] - x + half * Math.sin(points[i + 2]),
+      points[i + 1] - y - half * Math.cos(points[i + 2]));
+  }
+  context.lineTo(half * Math.sin(yaw), -half * Math.cos(yaw));
+  context.closePath();
+}
+
+function drawDots(context, { camera, shown }, { t, points }, first, x, y) {
+  const radius = Math.min(Math.max(DOT_M, DOT_PX[0] / camera.scale), DOT_PX[1] / camera.scale);
+  const horizon = t + points[points.length - 1] - shown.t;
+  for (let i = Math.max(first, PLAN_WIDTH); i < points.length; i += PLAN_WIDTH) {
+    const time = t + points[i + 4];
+    const before = t + points[i + 4 - PLAN_WIDTH];
+    if (Math.floor(time / DOT_EVERY_S + 1e-6) > Math.floor(before / DOT_EVERY_S + 1e-6)) {
+      context.globalAlpha = 1 - (1 - FADED) * Math.min((time - shown.t) / horizon, 1);
+      context.beginPath();
+      context.arc(points[i] - x, points[i + 1] - y, radius, 0, 2 * Math.PI);
+      context.fill();
+    }
+  }
+}

@@ -1,0 +1,60 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What the planners are told about the future of others: lines that end in an outline. */
+
+const STRIDE = 3;
+const LINE_ALPHA = 0.65;
+const END_ALPHA = 0.8;
+
+/** Predictions that the AVs' requests carried; off unless asked for. */
+export class PredictionLayer {
+  /** Whether predictions are shown. */
+  on = false;
+
+  /** Draw what of each prediction is still to come. */
+  draw(context, view, layer) {
+    if (!this.on) {
+      return;
+    }
+    for (const prediction of view.store.predictions.values()) {
+      const dt_c = view.scene.time.dt_c_s;
+      const passed = Math.max(Math.ceil((view.shown.t - prediction.t) / dt_c), 0);
+      if (passed < prediction.steps) {
+        for (const { column, points } of prediction.entries) {
+          const thing = column < layer.vehicles.length ? layer.vehicles[column]
+            : layer.objects[column - layer.vehicles.length];
+          if (thing !== undefined) {
+            drawEntry(context, view, thing, points, passed * STRIDE);
+          }
+        }
+      }
+    }
+    context.globalAlpha = 1;
+  }
+}
+
+function drawEntry(context, { camera, ratio, palette }, thing, points, first) {
+  const last = points.length - STRIDE;
+  const x = points[first];
+  const y = points[first + 1];
+  const length = Math.hypot(points[last] - x, points[last + 1] - y);
+  if (!(length > 0.5) || !camera.sees(x, y, length + thing.look.radius)) {
+    return;
+  }
+  camera.enterMap(context, ratio, x, y);
+  context.strokeStyle = palette[thing.color];
+  context.globalAlpha = LINE_ALPHA;
+  context.lineWidth = Math.max(0.12, 1.6 / camera.scale);
+  context.beginPath();
+  context.moveTo(0, 0);
+  for (let i = first + STRIDE; i <= last; i += STRIDE) {
+    context.lineTo(points[i] - x, points[i + 1] - y);
+  }
+  context.stroke();
+  const ahead = thing.rear_to_center ?? 0;
+  camera.enterPose(context, ratio, points[last] + ahead * Math.cos(points[last + 2]),
+    points[last + 1] + ahead * Math.sin(points[last + 2]), points[last + 2]);
+  context.globalAlpha = END_ALPHA;
+  context.lineWidth = 1.3 / camera.scale;
+  context.stroke(thing.look.body);
+}

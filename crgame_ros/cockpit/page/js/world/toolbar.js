@@ -1,0 +1,97 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The world's buttons: zoom, fit, follow, heading up, layers. */
+
+const SVG = 'http://www.w3.org/2000/svg';
+
+// Strokes in a square of 24.
+const ICONS = {
+  plus: 'M12 5v14M5 12h14',
+  minus: 'M5 12h14',
+  fit: 'M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5',
+  follow: 'M12 3v4M12 17v4M3 12h4M17 12h4M12 7a5 5 0 1 0 0 10a5 5 0 1 0 0-10',
+  heading: 'M12 3l6 17l-6-4l-6 4z',
+  plan: 'M6 21c0-9 12-7 12-16M18 5l-3 3M18 5l2.5 3.5',
+  prediction: 'M4 20L9 14M11.5 11L14 8M16 5.5L19 3M19 3l-4 .5M19 3l-.5 4',
+  labels: 'M3 6h11l6 6l-6 6H3zM7 10v4M10 10v4',
+};
+
+/**
+ * Put the buttons on the world.
+ *
+ * @param {HTMLElement} root the element that holds the canvas
+ * @param {object} actions zoomBy, fit, followNext, recenter, toggleHeading, togglePlans,
+ *   togglePredictions, toggleLabels
+ * @returns {{update: function(object): void}} update shows {followed, headingUp, plans,
+ *   predictions, labels}
+ */
+export function createToolbar(root, actions) {
+  const bar = document.createElement('div');
+  bar.className = 'world-toolbar';
+  bar.setAttribute('role', 'toolbar');
+  bar.setAttribute('aria-label', 'View');
+  const group = () => {
+    const element = document.createElement('div');
+    element.className = 'world-group';
+    bar.append(element);
+    return element;
+  };
+  const view = group();
+  button(view, 'plus', 'Zoom in (+)', () => actions.zoomBy(1.4));
+  button(view, 'minus', 'Zoom out (-)', () => actions.zoomBy(1 / 1.4));
+  button(view, 'fit', 'Show the whole map (0)', actions.fit);
+  const camera = group();
+  const follow = button(camera, 'follow', 'Follow the next vehicle (F)', actions.followNext);
+  const name = document.createElement('button');
+  name.type = 'button';
+  name.className = 'followed';
+  name.title = 'Centre on the followed vehicle';
+  name.addEventListener('click', actions.recenter);
+  camera.append(name);
+  const heading = button(camera, 'heading', 'Heading or north up (H)', actions.toggleHeading);
+  const layers = group();
+  const plans = button(layers, 'plan', 'Plans of the AVs', actions.togglePlans);
+  const predictions = button(layers, 'prediction', 'What the planners expect of others',
+    actions.togglePredictions);
+  const labels = button(layers, 'labels', 'Ids: vehicles, all, none (L)', actions.toggleLabels);
+  root.append(bar);
+  return {
+    update(state) {
+      name.textContent = state.followed ?? 'free';
+      press(follow, state.followed !== null);
+      press(heading, state.headingUp);
+      press(plans, state.plans);
+      press(predictions, state.predictions);
+      press(labels, state.labels);
+    },
+  };
+}
+
+function button(root, icon, title, action) {
+  const element = document.createElement('button');
+  element.type = 'button';
+  element.title = title;
+  element.setAttribute('aria-label', title);
+  const svg = document.createElementNS(SVG, 'svg');
+  svg.setAttribute('viewBox', '0 0 24 24');
+  const path = document.createElementNS(SVG, 'path');
+  path.setAttribute('d', ICONS[icon]);
+  for (const [key, value] of Object.entries({
+    fill: 'none', stroke: 'currentColor', 'stroke-width': '2', 'stroke-linecap': 'round',
+    'stroke-linejoin': 'round' })) {
+    path.setAttribute(key, value);
+  }
+  svg.append(path);
+  element.append(svg);
+  // The keyboard stays with the world: a button that kept it would take the space bar.
+  element.addEventListener('click', () => {
+    action();
+    element.blur();
+  });
+  root.append(element);
+  return element;
+}
+
+function press(element, pressed) {
+  element.setAttribute('aria-pressed', String(pressed));
+}

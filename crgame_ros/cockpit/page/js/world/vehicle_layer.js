@@ -1,0 +1,226 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Humans' vehicles, AVs, obstacles and pedestrians, where they are shown at this moment. */
+
+import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { lookOf, TYRE } from './vehicle_shape.js';
+
+// Far out, things stay this long on the screen [px]: driven vehicles, people
+// on foot or bicycles, and all others.
+const LEAST_PX = { driven: 15, vulnerable: 10, other: 5 };
+// Below this length on the screen a thing is its body only [px].
+const DETAIL_PX = 13;
+const BRAKE_PEDAL = 0.02;
+// Without a known pedal: the deceleration by which brake lights go on [m/s^2].
+const BRAKE_DECELERATION = 0.7;
+const STANDING = 0.1;
+const TYRE_INSET_M = 0.2;
+const SHADOW_PX = 2;
+
+/** Everything that has a pose. */
+export class VehicleLayer {
+  /** In the order of STATE and OBJECTS: {id, look, color, radius, …}. */
+  vehicles = [];
+  objects = [];
+  #braking = new Uint8Array(0);
+  #lastStep = null;
+
+  /** @param {object} scene the scene document */
+  load(scene) {
+    this.vehicles = scene.vehicles.map((vehicle) => ({
+      ...vehicle, look: lookOf('car', vehicle.shape, true),
+      color: vehicle.role === 'human' ? 'human' : 'av',
+    }));
+    this.objects = scene.objects.map((object) => ({
+      ...object, look: lookOf(object.type, object.shape, object.role !== 'static'),
+      color: colorOf(object),
+    }));
+    this.#braking = new Uint8Array(this.objects.length);
+    this.#lastStep = null;
+  }
+
+  /**
+   * Learn from a scenario step which objects slow down.
+   *
+   * @param {{k: number, t: number, objects: Float64Array}} step as the store got it
+   */
+  takeStep(step) {
+    const last = this.#lastStep;
+    this.#lastStep = step;
+    if (last === null || step.k <= last.k || last.objects.length !== step.objects.length) {
+      return;
+    }
+    for (let i = 0; i < this.#braking.length; i += 1) {
+      const speed = speedOf(step.objects, i);
+      const slower = (speedOf(last.objects, i) - speed) / (step.t - last.t);
+      this.#braking[i] = slower > BRAKE_DECELERATION && speed > STANDING ? 1 : 0;
+    }
+  }
+
+  /**
+   * Give the pose of the centre of a driven vehicle or an object in the frame shown last.
+   *
+   * @param {string} id of it
+   * @param {object} shown as Store.displayed gives it
+   * @returns {{x: number, y: number, yaw: number, speed: number}|null} null while it is absent
+   */
+  poseOf(id, shown) {
+    const index = this.vehicles.findIndex((vehicle) => vehicle.id === id);
+    if (index >= 0) {
+      return centerOf(this.vehicles[index], shown.vehicles, index);
+    }
+    const row = OBJECT_WIDTH * this.objects.findIndex((object) => object.id === id);
+    return row >= 0 && Number.isFinite(shown.objects[row])
+      ? {
+        x: shown.objects[row], y: shown.objects[row + 1], yaw: shown.objects[row + 2],
+        speed: Math.hypot(shown.objects[row + 3], shown.objects[row + 4]),
+      } : null;
+  }
+
+  /**
+   * Find what is at a point of the canvas.
+   *
+   * @returns {string|null} the id of the nearest within a finger's reach
+   */
+  pick(px, py, { camera, shown }) {
+    let best = null;
+    let reach = 24;
+    for (const { id, look } of [...this.vehicles, ...this.objects]) {
+      const pose = this.poseOf(id, shown);
+      const distance = pose === null ? Infinity
+        : Math.hypot(camera.toX(pose.x, pose.y) - px, camera.toY(pose.x, pose.y) - py)
+          - 0.4 * look.extent * camera.scale;
+      if (distance < reach) {
+        reach = distance;
+        best = id;
+      }
+    }
+    return best;
+  }
+
+  /** Draw objects, then the driven vehicles over them. */
+  draw(context, view) {
+    const { camera, shown } = view;
+    for (let i = 0; i < this.objects.length; i += 1) {
+      const row = i * OBJECT_WIDTH;
+      const x = shown.objects[row];
+      const y = shown.objects[row + 1];
+      const object = this.objects[i];
+      if (camera.sees(x, y, object.look.radius)) {
+        drawLook(context, view, object, x, y, shown.objects[row + 2], this.#braking[i] === 1,
+          LEAST_PX[object.color] ?? LEAST_PX.other);
+      }
+    }
+    for (let i = 0; i < this.vehicles.length; i += 1) {
+      this.#drawVehicle(context, view, i);
+    }
+  }
+
+  #drawVehicle(context, view, index) {
+    const { camera, shown, ratio, palette, store } = view;
+    const vehicle = this.vehicles[index];
+    const row = index * VEHICLE_WIDTH;
+    const yaw = shown.vehicles[row + VEHICLE.yaw];
+    const x = shown.vehicles[row] + vehicle.rear_to_center * Math.cos(yaw);
+    const y = shown.vehicles[row + 1] + vehicle.rear_to_center * Math.sin(yaw);
+    if (!camera.sees(x, y, vehicle.look.radius)) {
+      return;
+    }
+    const factor = drawLook(context, view, vehicle, x, y, yaw, brakes(shown.vehicles, row),
+      LEAST_PX.driven);
+    if (vehicle.look.extent * camera.scale > 2 * DETAIL_PX) {
+      drawTyres(context, view, vehicle, x, y, yaw,
+        shown.vehicles[row + VEHICLE.steering_angle]);
+    }
+    const trouble = store.status?.drivability?.[vehicle.id];
+    if (trouble?.collision || store.seats[vehicle.id]?.holder === store.me.id) {
+      camera.enterPose(context, ratio, x, y, yaw, factor);
+      context.strokeStyle = trouble?.collision ? palette.alarm : palette.label;
+      context.lineWidth = (trouble?.collision ? 3.5 : 1.6) / (camera.scale * factor);
+      context.stroke(vehicle.look.body);
+    }
+  }
+}
+
+function drawLook(context, { camera, palette, ratio }, thing, x, y, yaw, braking, leastPx) {
+  const { look } = thing;
+  const factor = Math.max(1, leastPx / (look.extent * camera.scale));
+  const detailed = look.extent * camera.scale > DETAIL_PX;
+  camera.enterPose(context, ratio, x, y, yaw, factor);
+  if (detailed) {
+    const { a, b, c, d, e, f } = context.getTransform();
+    context.setTransform(a, b, c, d, e + ratio, f + SHADOW_PX * ratio);
+    context.fillStyle = palette.shadow;
+    context.fill(look.body);
+    camera.enterPose(context, ratio, x, y, yaw, factor);
+  }
+  context.fillStyle = palette[thing.color];
+  context.fill(look.body);
+  context.strokeStyle = palette.outline;
+  context.lineWidth = 1 / (camera.scale * factor);
+  context.stroke(look.body);
+  if (look.glass !== null && detailed) {
+    context.fillStyle = palette.glass;
+    context.fill(look.glass);
+  }
+  if (look.roof !== null && detailed) {
+    context.fillStyle = palette[thing.color];
+    context.fill(look.roof);
+  }
+  if (look.lamps !== null && detailed) {
+    context.fillStyle = palette.lamp;
+    context.fill(look.lamps);
+  }
+  if (look.brakes !== null && (braking || detailed)) {
+    context.fillStyle = braking ? palette.brake : palette.glass;
+    context.fill(look.brakes);
+  }
+  return factor;
+}
+
+/** The front wheels, turned by the steering angle. */
+function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, steering) {
+  const aside = vehicle.shape.width / 2 - TYRE_INSET_M;
+  context.fillStyle = palette.outline;
+  context.strokeStyle = palette.kerb;
+  context.lineWidth = 0.05;
+  const along = vehicle.wheelbase - vehicle.rear_to_center;
+  for (let left = -aside; left <= aside; left += 2 * aside) {
+    camera.enterPose(context, ratio,
+      x + along * Math.cos(yaw) - left * Math.sin(yaw),
+      y + along * Math.sin(yaw) + left * Math.cos(yaw), yaw + steering);
+    context.fill(TYRE);
+    context.stroke(TYRE);
+  }
+}
+
+function brakes(rows, row) {
+  const pedal = rows[row + VEHICLE.brake];
+  if (!Number.isNaN(pedal)) {
+    return pedal > BRAKE_PEDAL;
+  }
+  const speed = rows[row + VEHICLE.speed];
+  return rows[row + VEHICLE.acceleration] * Math.sign(speed) < -BRAKE_DECELERATION
+    && Math.abs(speed) > STANDING;
+}
+
+function centerOf({ rear_to_center: ahead }, rows, index) {
+  const row = index * VEHICLE_WIDTH;
+  const yaw = rows[row + VEHICLE.yaw];
+  return Number.isFinite(rows[row])
+    ? {
+      x: rows[row] + ahead * Math.cos(yaw), y: rows[row + 1] + ahead * Math.sin(yaw), yaw,
+      speed: Math.abs(rows[row + VEHICLE.speed]),
+    } : null;
+}
+
+function speedOf(rows, index) {
+  return Math.hypot(rows[index * OBJECT_WIDTH + 3], rows[index * OBJECT_WIDTH + 4]);
+}
+
+function colorOf({ type, role }) {
+  if (type === 'pedestrian' || type === 'bicycle') {
+    return 'vulnerable';
+  }
+  return { traffic: 'traffic', static: 'static' }[role] ?? 'recorded';
+}

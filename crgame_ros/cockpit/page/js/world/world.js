@@ -1,0 +1,295 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The world: map, vehicles and plans, drawn on a canvas in each animation frame. */
+
+import { Camera } from './camera.js';
+import { attachGestures } from './gestures.js';
+import { attachKeys } from './keys.js';
+import { Navigation } from './navigation.js';
+import { Painter } from './painter.js';
+import { onThemeChange, Palette } from './palette.js';
+import { createToolbar } from './toolbar.js';
+
+const FRAMES_KEPT = 600;
+const REDRAWN_ON = ['state', 'objects', 'plan', 'prediction', 'signals', 'status', 'seats',
+  'events', 'epoch', 'hello'];
+
+/** One canvas that shows what a store holds. */
+export class World {
+  /** Script time of the last frames [ms], a ring: frame i is at i % its length. */
+  stats = { frames: 0, frame_ms: new Float32Array(FRAMES_KEPT) };
+  /** {t, n, k, epoch, vehicles, objects} exactly as drawn last; null before. */
+  shown = null;
+  camera = new Camera();
+
+  #canvas;
+  #context;
+  #store;
+  #connection;
+  #palette = new Palette();
+  #painter = new Painter();
+  #navigation = new Navigation(this.camera, () => this.#changed());
+  #toolbar = null;
+  #follow;
+  #dirty = true;
+  #view;
+  #ends = [];
+  #frame = 0;
+
+  /**
+   * @param {HTMLCanvasElement} canvas its parent gets the toolbar
+   * @param {import('../store.js').Store} store what is shown
+   * @param {object} options as createWorld takes them
+   */
+  constructor(canvas, store, options) {
+    this.#canvas = canvas;
+    this.#context = canvas.getContext('2d', { alpha: false });
+    this.#store = store;
+    this.#connection = options.connection ?? null;
+    this.#follow = options.follow ?? true;
+    this.#view = {
+      camera: this.camera, palette: this.#palette, ratio: 1, store, scene: null, shown: null,
+      now_ms: 0,
+    };
+    this.#attachHands(options);
+    this.#attachSizes(options.covered ?? null);
+    this.#attachStore();
+    this.#frame = requestAnimationFrame((now_ms) => this.#animate(now_ms));
+  }
+
+  /** Id of the followed vehicle or object, null while the camera is free. */
+  get followed() {
+    return this.#navigation.followed;
+  }
+
+  /**
+   * Keep the camera on a vehicle or object.
+   *
+   * @param {string|null} id null lets the camera go
+   * @param {boolean} [headingUp] turn the map so that it drives upwards; as before by default
+   */
+  follow(id, headingUp) {
+    this.#navigation.follow(id, headingUp);
+  }
+
+  /** Show a vehicle or object in the middle, without following it. */
+  centerOn(id) {
+    const pose = this.#poseOf(id);
+    if (pose !== null) {
+      this.#navigation.lookAt(pose);
+    }
+  }
+
+  /** Show the whole map, north up. */
+  fit(animated = true) {
+    this.#navigation.fit(animated);
+  }
+
+  /**
+   * Show or hide a layer.
+   *
+   * @param {string} name plans, predictions, goals, arrows, labels or object_labels, or one that
+   *   was added
+   * @param {boolean} on whether it is shown
+   * @throws {RangeError} when there is no such layer
+   */
+  setLayer(name, on) {
+    this.#painter.set(name, on);
+    if (name === 'predictions') {
+      this.#sendLayers();
+    }
+    this.#changed();
+  }
+
+  /**
+   * Add a layer of one's own.
+   *
+   * @param {string} name by which setLayer knows it
+   * @param {function(CanvasRenderingContext2D, object): void} draw called in each frame with the
+   *   context and {camera, palette, ratio, store, scene, shown, now_ms}; camera.enterMap and
+   *   enterPose set the context up for metres
+   * @param {'below'|'above'} [where] below or above the vehicles
+   */
+  addLayer(name, draw, where = 'below') {
+    this.#painter.add(name, draw, where);
+    this.redraw();
+  }
+
+  /** Draw again in the next frame though nothing has come. */
+  redraw() {
+    this.#dirty = true;
+  }
+
+  /** End it: no more frames, keys or events. */
+  close() {
+    cancelAnimationFrame(this.#frame);
+    this.#ends.forEach((end) => end());
+  }
+
+  #attachHands({ keys = true, toolbar = true }) {
+    const navigation = this.#navigation;
+    const { plans, predictions, labels } = this.#painter;
+    const actions = {
+      zoomBy: (factor) => navigation.zoomBy(factor),
+      turnBy: (angle) => navigation.turnBy(angle),
+      fit: () => navigation.fit(),
+      followNext: () => navigation.followNext(),
+      recenter: () => navigation.recenter(),
+      toggleHeading: () => navigation.toggleHeading(),
+      toggleLabels: () => {
+        labels.next();
+        this.#changed();
+      },
+      togglePlans: () => this.setLayer('plans', !plans.on),
+      togglePredictions: () => this.setLayer('predictions', !predictions.on),
+    };
+    attachGestures(this.#canvas, {
+      ...navigation.hands,
+      pick: (x, y) => {
+        const id = this.shown === null ? null
+          : this.#painter.vehicles.pick(x, y, this.#view);
+        if (id !== null) {
+          navigation.follow(id);
+        }
+      },
+    });
+    if (keys) {
+      this.#ends.push(attachKeys(actions));
+    }
+    if (toolbar) {
+      this.#toolbar = createToolbar(this.#canvas.parentElement, actions);
+    }
+    this.#changed();
+  }
+
+  #attachSizes(covered) {
+    this.#ends.push(onThemeChange(() => {
+      this.#palette.read();
+      this.redraw();
+    }));
+    const observer = new ResizeObserver(() => this.#resize(covered));
+    for (const element of [this.#canvas, covered]) {
+      if (element !== null) {
+        observer.observe(element);
+      }
+    }
+    this.#ends.push(() => observer.disconnect());
+  }
+
+  #attachStore() {
+    const store = this.#store;
+    if (store.scene !== null) {
+      this.#load(store.scene);
+    }
+    this.#ends.push(
+      store.on('scene', (scene) => this.#load(scene)),
+      store.on('objects', (step) => this.#painter.vehicles.takeStep(step)),
+      store.on('hello', () => this.#sendLayers()),
+      store.on('events', () => this.#painter.plans.takeEvents(store.scene, store.fired)),
+      ...REDRAWN_ON.map((name) => store.on(name, () => this.redraw())));
+  }
+
+  #resize(covered) {
+    const { clientWidth: width, clientHeight: height } = this.#canvas;
+    const ratio = window.devicePixelRatio || 1;
+    const first = this.camera.width <= 1;
+    // Setting the size clears a canvas, even to the size that it has.
+    if (this.#canvas.width !== Math.round(width * ratio)
+        || this.#canvas.height !== Math.round(height * ratio)) {
+      this.#canvas.width = Math.round(width * ratio);
+      this.#canvas.height = Math.round(height * ratio);
+    }
+    this.#view.ratio = ratio;
+    this.#palette.read();
+    this.camera.resize(width, height, Math.min(covered?.offsetHeight ?? 0, height / 2));
+    if (first) {
+      this.#navigation.reframe();
+    }
+    this.redraw();
+    this.#draw(performance.now());
+  }
+
+  #load(scene) {
+    this.#painter.load(scene);
+    this.#view.scene = scene;
+    this.#painter.plans.takeEvents(scene, this.#store.fired);
+    this.#navigation.load(scene, this.#follow);
+  }
+
+  #changed() {
+    this.redraw();
+    const { plans, predictions, labels } = this.#painter;
+    this.#toolbar?.update({
+      followed: this.followed, headingUp: this.#navigation.headingUp, plans: plans.on,
+      predictions: predictions.on, labels: labels.shown !== 'none',
+    });
+  }
+
+  #sendLayers() {
+    this.#connection?.send({ type: 'layers', predictions: this.#painter.predictions.on });
+  }
+
+  #poseOf(id) {
+    return id === null || this.shown === null ? null
+      : this.#painter.vehicles.poseOf(id, this.shown);
+  }
+
+  #animate(now_ms) {
+    this.#frame = requestAnimationFrame((next_ms) => this.#animate(next_ms));
+    this.#draw(now_ms);
+  }
+
+  #draw(now_ms) {
+    const begin_ms = performance.now();
+    const shown = this.#store.displayed(now_ms);
+    const stands = shown === null
+      || (shown.t === this.shown?.t && shown.epoch === this.shown.epoch);
+    if (stands && !this.#dirty && !this.camera.moves) {
+      return;
+    }
+    this.#dirty = false;
+    this.#take(shown);
+    this.#navigation.steer(this.#poseOf(this.followed), this.stats.frames > 1);
+    this.camera.update(now_ms);
+    this.#view.now_ms = now_ms;
+    this.#painter.paint(this.#context, this.#view);
+    this.stats.frame_ms[this.stats.frames % FRAMES_KEPT] = performance.now() - begin_ms;
+    this.stats.frames += 1;
+  }
+
+  /** Keep what is drawn: the store refills its own arrays for whoever asks next. */
+  #take(shown) {
+    if (shown === null) {
+      this.shown = null;
+    } else {
+      this.shown ??= { vehicles: new Float64Array(0), objects: new Float64Array(0) };
+      this.shown.vehicles = copied(this.shown.vehicles, shown.vehicles);
+      this.shown.objects = copied(this.shown.objects, shown.objects);
+      this.shown.t = shown.t;
+      this.shown.n = shown.n;
+      this.shown.k = shown.k;
+      this.shown.epoch = shown.epoch;
+    }
+    this.#view.shown = this.shown;
+  }
+}
+
+function copied(target, values) {
+  const result = target.length === values.length ? target : new Float64Array(values.length);
+  result.set(values);
+  return result;
+}
+
+/**
+ * Show a store's world on a canvas.
+ *
+ * @param {HTMLCanvasElement} canvas fills its parent
+ * @param {import('../store.js').Store} store what is shown
+ * @param {object} [options] connection: told which layers are wanted; keys, toolbar: whether it
+ *   has them; follow: begin with the first vehicle instead of the whole map; covered: an element
+ *   that lies over the lower edge
+ * @returns {World} draws from now on
+ */
+export function createWorld(canvas, store, options = {}) {
+  return new World(canvas, store, options);
+}

@@ -1,0 +1,75 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The files of the page, read once: a request names a key of this table, never a path."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+import hashlib
+import importlib.util
+from pathlib import Path
+
+from crgame_ros.errors import CrgameError
+
+PAGE = Path(__file__).resolve().parent / 'page'
+INDEX = '/'
+PLOTLY = '/plotly.js'
+TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
+         '.svg': 'image/svg+xml', '.png': 'image/png'}
+
+
+@dataclass(frozen=True)
+class PageFile:
+    """
+    One file as it is served.
+
+    :param body: its content.
+    :param content_type: without the character set.
+    :param tag: changes with the content.
+    """
+
+    body: bytes
+    content_type: str
+    tag: str
+
+    @property
+    def is_text(self) -> bool:
+        """Whether it has a character set: UTF-8."""
+        return self.content_type != 'image/png'
+
+
+def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
+    """
+    Read all files of the page, and Plotly's script.
+
+    :param directory: the folder with index.html.
+    :return: by the path of the request.
+    :raises CrgameError: if the page or Plotly is not installed.
+    """
+    table = dict(_page_files(directory))
+    index = table.pop('/static/index.html', None)
+    if index is None:
+        raise CrgameError(f'{directory}: the page of the cockpit is missing; '
+                          'install crgame_ros again')
+    return {**table, INDEX: index, PLOTLY: _read(_plotly_script())}
+
+
+def _page_files(directory: Path) -> Iterator[tuple[str, PageFile]]:
+    for path in sorted(directory.rglob('*')):
+        if path.suffix in TYPES and path.is_file():
+            yield f'/static/{path.relative_to(directory).as_posix()}', _read(path)
+
+
+def _read(path: Path) -> PageFile:
+    body = path.read_bytes()
+    return PageFile(body, TYPES[path.suffix], hashlib.sha256(body).hexdigest()[:32])
+
+
+def _plotly_script() -> Path:
+    # Importing plotly costs a second; only its script is wanted.
+    spec = importlib.util.find_spec('plotly')
+    for directory in spec.submodule_search_locations or () if spec is not None else ():
+        script = Path(directory) / 'package_data' / 'plotly.min.js'
+        if script.is_file():
+            return script
+    raise CrgameError('the package plotly is missing, which draws the diagrams of the cockpit; '
+                      'install it: pip install plotly')

@@ -1,0 +1,183 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Reading scenarios for the page, in a process of its own.
+
+A scenario can take seconds and much memory to read; the process that serves the page, and may
+carry somebody's hands on the wheel, has neither. `python -m crgame_ros.cockpit.preview` reads jobs
+from its standard input, one JSON object a line, and answers each on its standard output.
+"""
+
+from collections.abc import Callable, Mapping
+import contextlib
+from dataclasses import replace
+import json
+import math
+import os
+from pathlib import Path
+import resource
+import signal
+import struct
+import sys
+import traceback
+from typing import Any, BinaryIO
+
+from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.planner.registry import create_planner
+from crgame_ros.scenario import guard
+from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
+from crgame_ros.scenario.game_file import dump_game, load_game
+from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
+from crgame_ros.simulation.documents import game_document, parse_game_document
+from crgame_ros.simulation.setup import build_setup, Setup
+
+HEADER = struct.Struct('<?Q')
+UPLOAD = 'upload'
+_MAX_MEMORY = 4 * 2 ** 30
+_NICE = 10
+
+
+def check(path: Path) -> dict[str, Any]:
+    """
+    Check an uploaded file.
+
+    :return: its `title`.
+    :raises InputError: if it is no scenario; the file is called 'upload'.
+    """
+    return {'title': _scenario(path, UPLOAD).benchmark_id}
+
+
+def preview(path: Path, kind: str) -> dict[str, Any]:
+    """
+    Show how a game or scenario begins.
+
+    :param kind: game, scenario or upload.
+    :return: the answer of /api/preview.
+    :raises InputError: if it cannot be used.
+    """
+    setup = _setup(path, kind)
+    document = parse_game_document(
+        game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    states = setup.obstacles.states_at(setup.scheduler.k0)
+    vehicles = [[*vehicle.state, *[None] * 4] for vehicle in setup.vehicles]
+    objects = [[*pose, *velocity] for pose, velocity in zip(
+        states.poses.tolist(), states.velocities.tolist(), strict=True)]
+    return {
+        'scene': scene_document(setup.loaded, setup.descriptions, document),
+        'states': {'vehicles': _without_nan(vehicles), 'objects': _without_nan(objects)},
+        'humans': [{'id': human.id, 'driver': human.driver} for human in setup.humans],
+        'avs': [{'id': av.id, 'planner': av.spec.planner,
+                 'planning_problem': av.planning_problem.planning_problem_id}
+                for av in setup.avs],
+        'notices': list(setup.notices)}
+
+
+def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping[str, str],
+            allowed_drivers: list[str], allowed_planners: list[str]) -> dict[str, Any]:
+    """
+    Write the game that somebody chose.
+
+    :param kind: game, scenario or upload.
+    :param drivers: of humans; those left out keep the game's.
+    :param planners: of AVs; those left out keep the game's.
+    :param allowed_drivers: what may be chosen beside the game's own.
+    :param allowed_planners: what may be chosen beside the game's own.
+    :return: the game file as `text`.
+    :raises InputError: if the choice is not allowed, or the game cannot be used.
+    """
+    setup = _setup(path, kind)
+    humans = []
+    for human in setup.game.humans:
+        driver = _choice(drivers, human.id, human.driver, allowed_drivers, 'driver')
+        humans.append(replace(human, driver=driver))
+    avs = []
+    for spec in (av.spec for av in setup.avs):
+        planner = _choice(planners, spec.id, spec.planner, allowed_planners, 'planner')
+        if planner != spec.planner:
+            # Another planner's options mean nothing to it.
+            spec = replace(spec, planner=planner, options={})
+            create_planner(planner)
+        avs.append(spec)
+    _refuse_strangers(drivers, humans)
+    _refuse_strangers(planners, avs)
+    game = replace(setup.game, humans=tuple(humans), avs=tuple(avs),
+                   title=setup.game.title or setup.loaded.benchmark_id)
+    build_setup(game, setup.loaded)
+    return {'text': dump_game(game)}
+
+
+def main() -> None:
+    """Answer jobs until the standard input ends."""
+    # Ctrl-C is for the server, which closes the standard input when it ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(_NICE)
+    resource.setrlimit(resource.RLIMIT_AS, (_MAX_MEMORY, _MAX_MEMORY))
+    answers = os.fdopen(os.dup(1), 'wb')
+    # What a library prints must not get into the answers.
+    os.dup2(2, 1)
+    with contextlib.suppress(BrokenPipeError):
+        for line in sys.stdin.buffer:
+            _answer(json.loads(line), answers)
+
+
+def _answer(job: dict[str, Any], answers: BinaryIO) -> None:
+    try:
+        path = Path(job.pop('path'))
+        result = _JOBS[job.pop('job')](path, **job)
+        ok, text = True, json.dumps(result, allow_nan=False, separators=(',', ':'))
+    except CrgameError as error:
+        # Names of folders on this machine are nobody's business.
+        ok, text = False, str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
+    except (MemoryError, RecursionError):
+        ok, text = False, 'the scenario is too large to be read'
+    except Exception:
+        traceback.print_exc()
+        ok, text = False, 'the scenario cannot be read; the log of the server says why'
+    data = text.encode('utf-8', 'replace')
+    answers.write(HEADER.pack(ok, len(data)) + data)
+    answers.flush()
+
+
+_JOBS: dict[str, Callable[..., dict[str, Any]]] = {
+    'check': check, 'preview': preview, 'compose': compose}
+
+
+def _scenario(path: Path, source: str) -> LoadedScenario:
+    try:
+        text = guard.read_text(path)
+    except InputError as error:
+        raise InputError(error.what, source, error.remedy) from error
+    return parse_scenario(text, source)
+
+
+def _setup(path: Path, kind: str) -> Setup:
+    if kind == 'game':
+        return build_setup(load_game(path))
+    game = Game(path, humans=(HumanSpec('hv0'),))
+    return build_setup(game, _scenario(path, UPLOAD if kind == UPLOAD else path.name))
+
+
+def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str],
+            what: str) -> str:
+    value = chosen.get(vehicle, own)
+    if value != own and value not in allowed:
+        raise InputError(f'that {what} cannot be chosen here', vehicle,
+                         f'choose {", ".join(allowed)} or leave it as it is')
+    return value
+
+
+def _refuse_strangers(chosen: Mapping[str, str],
+                      specs: list[HumanSpec] | list[AvSpec]) -> None:
+    if not chosen.keys() <= {spec.id for spec in specs}:
+        raise InputError('names a vehicle that the game does not have', 'choice',
+                         'load the page again')
+
+
+def _without_nan(rows: list[list[Any]]) -> list[list[float | None]]:
+    return [[None if value is None or math.isnan(value) else value for value in row]
+            for row in rows]
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,190 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where in a recording the messages of one run are, by simulation step: the index of a replay."""
+
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.cockpit.replay_outline import Outline
+from crgame_ros.cockpit.replay_tracks import RunTracks, TrackCollector
+from crgame_ros.errors import InputError
+from crgame_ros.recording.epochs import Epoch
+from crgame_ros.recording.reader import BagReader, header_stamp_ns
+from crgame_ros.recording.run_log import CYCLE_TOPIC, OBJECT_STATES_TOPIC, VEHICLES_TOPIC
+from crgame_ros.recording.storage import BagMessage
+from crgame_ros.timing.cycle_rows import CycleTable
+
+_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+# Between two reports of progress, so that reporting costs nothing.
+_REPORT_EVERY = 500
+
+IntArray = NDArray[np.int64]
+
+
+class Places:
+    """
+    The messages of a topic: their log times [ns] and the simulation steps they belong to.
+
+    :ivar log_ns: in the order of the recording.
+    :ivar first: step of each message; of its first row where it holds several.
+    :ivar last: step of its last row.
+    """
+
+    def __init__(self) -> None:
+        self._log_ns, self._first, self._last = array('q'), array('q'), array('q')
+
+    def add(self, log_ns: int, first: int, last: int | None = None) -> None:
+        """Take note of one message."""
+        self._log_ns.append(log_ns)
+        self._first.append(first)
+        self._last.append(first if last is None else last)
+
+    def __len__(self) -> int:
+        return len(self._log_ns)
+
+    @property
+    def newest(self) -> int:
+        """Step of the message that was added last, -1 where there is none."""
+        return self._last[-1] if self._last else -1
+
+    @property
+    def steps(self) -> IntArray:
+        """Give the step of each message."""
+        return np.array(self._first, dtype=np.int64)
+
+    def span(self, low: int, high: int) -> tuple[int, int] | None:
+        """Give the first and the last log time of what concerns low <= n < high; None if none."""
+        if not self._log_ns:
+            return None
+        first, last = np.frombuffer(self._first, np.int64), np.frombuffer(self._last, np.int64)
+        found = np.flatnonzero((last >= low) & (first < high))
+        if not len(found):
+            return None
+        return self._log_ns[int(found[0])], self._log_ns[int(found[-1])]
+
+    def before(self, step: int) -> int | None:
+        """Give the log time of the last message of a step before this one; None if none."""
+        found = np.flatnonzero(self.steps < step)
+        return self._log_ns[int(found[-1])] if len(found) else None
+
+
+@dataclass(frozen=True)
+class RunIndex:
+    """
+    One run of a recording, ready to be read in any order.
+
+    :param run: its documents.
+    :param places: messages by topic.
+    :param tracks: what happened in it, over time.
+    :param outline: the vehicles' motion over the whole run, for plots.
+    """
+
+    run: Epoch
+    places: dict[str, Places]
+    tracks: RunTracks
+    outline: Outline
+
+    @property
+    def first_n(self) -> int:
+        """Step of the first recorded state."""
+        return int(self.places[VEHICLES_TOPIC].steps[0])
+
+    @property
+    def last_n(self) -> int:
+        """Step of the last recorded state."""
+        return self.places[VEHICLES_TOPIC].newest
+
+
+def index_run(reader: BagReader, run: Epoch,
+              progress: Callable[[float], None] | None = None) -> RunIndex:
+    """
+    Go through a recording once, without keeping its states.
+
+    :param progress: told now and then which share is done, 0 to 1.
+    :raises InputError: if no state of the run is in it, or a message is malformed.
+    """
+    indexer = _Indexer(reader, run)
+    span_ns = max(reader.end_ns - reader.start_ns, 1)
+    for count, message in enumerate(reader.messages(indexer.topics)):
+        indexer.take(message)
+        if progress is not None and count % _REPORT_EVERY == 0:
+            progress((message.log_time_ns - reader.start_ns) / span_ns)
+    return indexer.finish()
+
+
+class _Indexer:
+    """Follows a recording in the order of log time, and knows when the run goes on in it."""
+
+    def __init__(self, reader: BagReader, run: Epoch) -> None:
+        self._reader = reader
+        self._run = run
+        avs = [str(entry['id']) for entry in run.game.avs]
+        self._stamped = {OBJECT_STATES_TOPIC, *(f'/{av}/plan_request' for av in avs)}
+        self._plans = {f'/{av}/plan' for av in avs}
+        self._states = Places()
+        self._places = {topic: Places() for topic in (CYCLE_TOPIC, *self._stamped, *self._plans)}
+        self._places[VEHICLES_TOPIC] = self._states
+        self._collector = TrackCollector(run.game)
+        self._outline = Outline(run, (reader.end_ns - reader.start_ns) / 1e9)
+        self._inside = self._after = False
+        self.topics = (*self._places, *self._collector.topics)
+
+    def take(self, message: BagMessage) -> None:
+        topic, type_name, log_ns, data = message
+        if topic == CYCLE_TOPIC:
+            self._take_cycles(message)
+        elif topic not in self._places:
+            if not self._after:
+                self._collector.take(self._reader.decode(message),
+                                     self._states.newest if self._inside else None)
+        elif type_name != _TRAJECTORY:
+            raise InputError(f'{topic} is a {type_name}', str(self._reader.path),
+                             'give a recording of crgame_ros')
+        else:
+            self._take_stamped(message, header_stamp_ns(data))
+
+    def _take_stamped(self, message: BagMessage, stamp_ns: int) -> None:
+        topic, log_ns = message.topic, message.log_time_ns
+        if not self._run.holds(stamp_ns, log_ns):
+            # States of another run: what has no stamp belongs to that one from here on.
+            self._after = self._after or (topic == VEHICLES_TOPIC and self._inside)
+            return
+        n = self._run.game.scheduler.step_of_stamp(stamp_ns)
+        places = self._places[topic]
+        if topic == VEHICLES_TOPIC:
+            self._inside = True
+            if n > places.newest:
+                places.add(log_ns, n)
+                if self._outline.wants(n):
+                    self._outline.add_state(n, self._reader.decode(message).message, self._reader)
+        elif topic in self._plans:
+            # A plan is seen from the step at which it arrived.
+            places.add(log_ns, max(n, self._states.newest))
+        else:
+            places.add(log_ns, n)
+
+    def _take_cycles(self, message: BagMessage) -> None:
+        content = self._reader.decode(message).message
+        if self._after or len(content.layout.dim) != 2:
+            return
+        table = CycleTable.from_message(content.layout.dim[1].label, content.data)
+        if not len(table.rows) or table.epoch != self._run.game.epoch:
+            return
+        steps = table.column('n')
+        places = self._places[CYCLE_TOPIC]
+        if self._run.from_log_ns is not None and message.log_time_ns < self._run.from_log_ns:
+            return
+        places.add(message.log_time_ns, int(steps[0]), int(steps[-1]))
+        self._collector.take_resets(steps, table.column('resets'))
+        self._outline.add_commands(table)
+
+    def finish(self) -> RunIndex:
+        if not len(self._states):
+            raise InputError('no state of the run is in it', str(self._reader.path),
+                             'record from before the start of the run')
+        return RunIndex(self._run, self._places, self._collector.finish(self._states.steps),
+                        self._outline)

@@ -1,0 +1,175 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What happened in a recorded run over time: documents, alarms and marks for the time line."""
+
+from copy import deepcopy
+from dataclasses import dataclass
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.cockpit.replay_marks import Mark, MarkList
+from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.recording.reader import DecodedMessage
+from crgame_ros.recording.run_log import stamp_of
+from crgame_ros.simulation.documents import GameDocument, MALFORMED
+
+_DIAGNOSTICS = '/diagnostics'
+_LATCHED = {'/scenario/signals': 'signals', '/scenario/events': 'events', '/seats': 'seats'}
+_FRAME_SKIP = '/timing/frame_skip'
+# Parts of the status document that are read from the recording; the rest is the page's.
+_STATUS_PARTS = ('timing', 'planners', 'drivability', 'seats_lost')
+
+# (n, content): the content holds from step n until the next entry.
+Track = list[tuple[int, Any]]
+
+
+@dataclass(frozen=True)
+class RunTracks:
+    """
+    A run's documents over time; every entry of a track is complete in itself.
+
+    :param documents: by kind as the page knows them (signals, events, seats, alarms) and by part
+        of `status` (timing, planners, drivability, seats_lost, frames_skipped).
+    :param marks: what the time line shows.
+    """
+
+    documents: dict[str, Track]
+    marks: tuple[Mark, ...]
+
+
+class TrackCollector:
+    """Takes a run's messages in the order of log time, and keeps what changes."""
+
+    def __init__(self, game: GameDocument) -> None:
+        self._game = game
+        self._scheduler = game.scheduler
+        vehicles = [str(entry['id']) for entry in (*game.humans, *game.avs)]
+        self._planners = {str(entry['id']): str(entry['planner']) for entry in game.avs}
+        self._verdict_topics = {f'/{vehicle}/drivability' for vehicle in vehicles}
+        self.topics = (_DIAGNOSTICS, _FRAME_SKIP, *_LATCHED, *self._verdict_topics)
+        self._status = RunStatus()
+        self._status.begin(vehicles)
+        self._tracks: dict[str, Track] = {}
+        self._marks = MarkList(game.scheduler)
+        self._known_alarms: frozenset[str] = frozenset()
+        self._resets: int | None = None
+        self._fired: set[tuple[str, int]] = set()
+
+    def take(self, recorded: DecodedMessage, newest: int | None) -> None:
+        """
+        Take one message of `topics`.
+
+        :param newest: step of the run's newest state, None before the first.
+        """
+        topic, _, _, message = recorded
+        if topic in _LATCHED:
+            self._take_latched(_LATCHED[topic], message.data, newest)
+        elif topic == _FRAME_SKIP:
+            self._put('frames_skipped', newest or 0, bool(message.data))
+        elif newest is not None:
+            n = newest
+            if topic in self._verdict_topics:
+                stamp_ns = stamp_of(message)
+                if stamp_ns < self._scheduler.clock_offset_ns:
+                    return
+                n = min(self._scheduler.step_of_stamp(stamp_ns), newest)
+            for status in message.status:
+                self._take_status(status, n)
+
+    def take_resets(self, steps: NDArray[np.float64], resets: NDArray[np.float64]) -> None:
+        """Note where the count of drift resets rose."""
+        for n, count in zip(steps.tolist(), resets.tolist(), strict=True):
+            if self._resets is not None and count > self._resets:
+                self._marks.add(int(n), 'reset', '', 'too late: the clock was set back to now')
+            self._resets = int(count)
+
+    def finish(self, steps: NDArray[np.int64]) -> RunTracks:
+        """
+        Give everything.
+
+        :param steps: of the recorded states.
+        """
+        first = int(steps[0])
+        strides = np.diff(steps)
+        usual = int(np.median(strides)) if len(strides) else 1
+        for index in np.flatnonzero(strides > usual).tolist():
+            missing = round(strides[index] / usual) - 1
+            self._marks.add(int(steps[index]), 'gap', '', f'{missing} states were not recorded')
+        for track in self._tracks.values():
+            track.sort(key=lambda entry: entry[0])
+            # What was latched before the first recorded state holds from there on.
+            while len(track) > 1 and track[1][0] <= first:
+                track.pop(0)
+        return RunTracks(self._tracks, self._marks.marks())
+
+    def _put(self, kind: str, n: int, content: Any) -> None:
+        track = self._tracks.setdefault(kind, [])
+        if track and track[-1][1] == content:
+            return
+        if track and track[-1][0] == n:
+            track.pop()
+        track.append((n, deepcopy(content)))
+
+    def _take_status(self, status: Any, n: int) -> None:
+        name, text = str(status.name), str(status.message)
+        values = {str(entry.key): str(entry.value) for entry in status.values}
+        self._status.take(name, int(status.level), text, values, n * self._scheduler.dt_s)
+        content = self._status.document()
+        for av, entry in content['planners'].items():
+            entry['planner'] = entry['planner'] or self._planners.get(av, '')
+        for part in _STATUS_PARTS:
+            if content[part]:
+                self._put(part, n, content[part])
+        alarms = self._status.alarms
+        for alarm in alarms:
+            if alarm.id not in self._known_alarms:
+                self._marks.add(n, alarm.kind, alarm.subject, alarm.text)
+        self._known_alarms = frozenset(alarm.id for alarm in alarms)
+        if alarms or 'alarms' in self._tracks:
+            self._put('alarms', n, self._status.alarms_document())
+        self._mark_status(name, text, values, bool(status.level), n)
+
+    def _mark_status(self, name: str, text: str, values: dict[str, str], bad: bool,
+                     n: int) -> None:
+        """Mark what is told once and is no alarm."""
+        node, _, subject = name.partition(': ')
+        vehicle = subject.partition(' ')[0]
+        if name == 'sim_node: stop':
+            self._marks.add(n, 'stop', '', text)
+        elif node == 'sim_node' and subject.endswith(' plan refused'):
+            at = values.get('n', '')
+            self._marks.add(int(at) if at.isdecimal() else n, 'refused_plan', vehicle, text)
+        elif node == 'planner_node' and bad and vehicle in self._planners:
+            self._marks.add(n, 'fallback', vehicle, text)
+
+    def _take_latched(self, kind: str, text: str, newest: int | None) -> None:
+        try:
+            content = json.loads(text, parse_constant=_refuse)
+            if kind == 'signals':
+                k = int(content['k'])
+                n = (k - self._scheduler.k0) * self._scheduler.steps_per_tick
+                self._put(kind, max(n, 0), {'k': k, 'states': dict(content['states'])})
+            elif kind == 'seats':
+                self._put(kind, newest or 0, {'seats': dict(content)})
+            elif int(content['epoch']) == self._game.epoch:
+                self._take_fired(content['fired'], newest or 0)
+        except MALFORMED:
+            # Anybody may publish on a topic; what is no such document is passed over.
+            return
+
+    def _take_fired(self, fired: list[dict[str, Any]], newest: int) -> None:
+        for entry in fired:
+            key = (str(entry['name']), int(entry['n']))
+            if key not in self._fired:
+                self._fired.add(key)
+                self._marks.add(key[1], 'trigger', key[0], f'by {entry.get("by", "trigger")}')
+        self._put('events', max((int(entry['n']) for entry in fired), default=newest),
+                  {'fired': list(fired)})
+
+
+def _refuse(name: str) -> float:
+    """Refuse NaN and infinities: a browser reads none."""
+    raise ValueError(name)

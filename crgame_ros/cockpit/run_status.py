@@ -1,0 +1,172 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How a run is doing, gathered from what the nodes tell: the page's status and alarms."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+OK, ERROR = 0, 2
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """
+    Something that nobody should miss.
+
+    :param kind: collision, off_road, stale_plan, lost_device, recording or late.
+    :param subject: vehicle or node that it is about.
+    :param text: a few words.
+    :param since_t: when it began, time of the run [s].
+    """
+
+    kind: str
+    subject: str
+    text: str
+    since_t: float
+
+    @property
+    def id(self) -> str:
+        """Key of the alarm while it lasts."""
+        return f'{self.kind}:{self.subject}'
+
+
+class RunStatus:
+    """Takes statuses of `/diagnostics` and `/<v>/drivability` as they come."""
+
+    def __init__(self) -> None:
+        self.run = 'waiting'
+        self.real_time_factor = 1.0
+        self.recording: dict[str, Any] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
+                                          'text': 'nothing is recorded'}
+        self.seats_lost: dict[str, bool] = {}
+        self._vehicles: tuple[str, ...] = ()
+        self._alarms: dict[str, Alarm] = {}
+        self._rules: list[tuple[str, Callable[..., None]]] = [
+            ('sim_node: run', self._take_run), ('timesync_node: table I', self._take_timing),
+            ('recorder_node: recording', self._take_recording)]
+        self.begin(())
+
+    def begin(self, vehicles: Sequence[str]) -> None:
+        """Begin a run with these vehicles."""
+        self._vehicles = tuple(vehicles)
+        self.timing: dict[str, Any] | None = None
+        self.planners: dict[str, dict[str, Any]] = {}
+        self.drivability: dict[str, dict[str, Any]] = {}
+        self.seats_lost = {}
+        self._alarms = {key: alarm for key, alarm in self._alarms.items()
+                        if alarm.kind == 'recording'}
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Give what is wrong now, the oldest first."""
+        return tuple(self._alarms.values())
+
+    def take(self, name: str, level: int, text: str, values: Mapping[str, str],
+             t: float) -> None:
+        """
+        Take a status.
+
+        :param name: node and subject, or `<v>/drivability`.
+        :param level: 0 OK, 1 WARN, 2 ERROR.
+        :param text: its message.
+        :param values: of its keys.
+        :param t: time of the run [s]
+        """
+        for known, rule in self._rules:
+            if name == known:
+                rule(level, text, values, t)
+                return
+        if name.endswith('/drivability'):
+            self._take_drivability(name.partition('/')[0], values, t)
+            return
+        node, _, subject = name.partition(': ')
+        vehicle, _, rest = subject.partition(' ')
+        if vehicle not in self._vehicles:
+            return
+        if node == 'sim_node' and rest == 'plans':
+            self._take_plans(vehicle, level, text, values, t)
+        elif node == 'planner_node':
+            # An event may have changed the planner that the game names.
+            self._planner(vehicle).update(
+                planner=values.get('planner', ''), plan_time_ms=_number(values.get('plan_time_ms')),
+                fallbacks=_number(values.get('fallbacks')))
+        elif node == 'sim_node' and rest == 'seat':
+            self.seats_lost[vehicle] = level != OK
+            self._alarm('lost_device', vehicle, level != OK, 'nobody drives', t)
+        elif node == 'driver_node':
+            self._alarm('lost_device', vehicle, level == ERROR, text, t)
+
+    def document(self) -> dict[str, Any]:
+        """Give what the status document says of the run's health."""
+        return {'run': self.run, 'real_time_factor': self.real_time_factor,
+                'recording': self.recording, 'timing': self.timing, 'planners': self.planners,
+                'drivability': self.drivability, 'seats_lost': self.seats_lost}
+
+    def alarms_document(self) -> dict[str, Any]:
+        """Give the alarms document."""
+        return {'active': [
+            {'id': alarm.id, 'kind': alarm.kind, 'subject': alarm.subject, 'text': alarm.text,
+             'since_t': alarm.since_t} for alarm in self.alarms]}
+
+    def _alarm(self, kind: str, subject: str, on: bool, text: str, t: float) -> None:
+        alarm = Alarm(kind, subject, text, t)
+        if not on:
+            self._alarms.pop(alarm.id, None)
+        elif alarm.id not in self._alarms or self._alarms[alarm.id].text != text:
+            self._alarms[alarm.id] = alarm
+
+    def _planner(self, vehicle: str) -> dict[str, Any]:
+        return self.planners.setdefault(vehicle, {
+            'running': True, 'stale': False, 'latency_ms': None, 'age_ms': None, 'accepted': 0,
+            'refused': 0, 'plan_time_ms': None, 'fallbacks': 0, 'planner': '',
+            'last_refusal': ''})
+
+    def _take_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
+        self.run = text
+        self.real_time_factor = _number(values.get('real_time_factor')) or 1.0
+
+    def _take_timing(self, _: int, __: str, values: Mapping[str, str], t: float) -> None:
+        self.timing = {key: _number(value) for key, value in values.items()
+                       if key != 'frame_skipping'}
+        skipping = values.get('frame_skipping') == 'True'
+        self.timing['frame_skipping'] = skipping
+        self._alarm('late', 'simulation', skipping, 'late: frames are skipped', t)
+
+    def _take_recording(self, level: int, text: str, values: Mapping[str, str],
+                        t: float) -> None:
+        failed = level == ERROR
+        megabytes = (_number(values.get('bytes')) or 0.0) / 1e6
+        self.recording = {
+            'state': 'failed' if failed else 'recording', 'text': text,
+            'messages': int(_number(values.get('messages')) or 0), 'megabytes': megabytes}
+        self._alarm('recording', 'recorder', failed, text, t)
+
+    def _take_drivability(self, vehicle: str, values: Mapping[str, str], t: float) -> None:
+        collision = values.get('collision') == 'true'
+        off_road = values.get('road_compliance') == 'false'
+        hit = [item for item in values.get('hit', '').split(',') if item]
+        self.drivability[vehicle] = {'collision': collision, 'off_road': off_road, 'hit': hit}
+        self._alarm('collision', vehicle, collision, 'collision with ' + ', '.join(hit), t)
+        self._alarm('off_road', vehicle, off_road, 'off the road', t)
+
+    def _take_plans(self, vehicle: str, level: int, text: str, values: Mapping[str, str],
+                    t: float) -> None:
+        self._planner(vehicle).update(
+            running=values.get('running', 'True') == 'True', stale=level == ERROR,
+            latency_ms=_number(values.get('latency_ms')), age_ms=_number(values.get('age_ms')),
+            accepted=int(_number(values.get('accepted')) or 0),
+            refused=int(_number(values.get('refused')) or 0),
+            planner=self._planner(vehicle)['planner'] or values.get('planner', ''),
+            last_refusal=values.get('last_refusal', ''))
+        self._alarm('stale_plan', vehicle, level == ERROR, text, t)
+
+
+def _number(text: str | None) -> float | None:
+    """Read a number; None where there is none that JSON can carry."""
+    try:
+        value = float(text or '')
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

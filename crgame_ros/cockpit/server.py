@@ -1,0 +1,188 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The web server of the cockpit: routes, who is let in, headers, ports."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Mapping
+import contextlib
+import errno
+from pathlib import Path
+from typing import cast
+
+from aiohttp import hdrs, web
+from aiohttp.typedefs import Handler, Middleware
+
+from crgame_ros.cockpit import library_routes, page_files
+from crgame_ros.cockpit.access import Access, is_own_origin
+from crgame_ros.cockpit.backend import Backend, ReplayBackend
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.library import Library
+from crgame_ros.cockpit.page_files import PageFile
+from crgame_ros.cockpit.session import Session
+from crgame_ros.errors import InputError
+
+HUB = web.AppKey('hub', Hub)
+PORTS_TRIED = 20
+SHUTDOWN_S = 0.8
+_STALL_CHECK_S = 0.5
+_JSON_BYTES = 256 * 1024
+
+_HEADERS = {
+    'Content-Security-Policy': (
+        "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+        "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
+    'X-Content-Type-Options': 'nosniff',
+    'Referrer-Policy': 'no-referrer',
+    'Cross-Origin-Resource-Policy': 'same-origin',
+    'Server': 'crgame_ros',
+}
+
+
+def create_app(backend: Backend, access: Access, library: Library | None, *,
+               page: Path = page_files.PAGE) -> web.Application:
+    """
+    Make the server's application. It starts the backend, and stops it when it is cleaned up.
+
+    :param backend: the run or recording behind the page.
+    :param access: who is let in.
+    :param library: scenarios that can be chosen; None for none.
+    :param page: the folder of the page.
+    :raises CrgameError: if the page or Plotly is not installed.
+    """
+    hub = Hub(backend.mode)
+    sessions: set[Session] = set()
+    app = web.Application(middlewares=[_guard(access)], client_max_size=_JSON_BYTES)
+    app[HUB] = hub
+    app.cleanup_ctx.append(_running(backend, hub))
+    app.on_response_prepare.append(_add_headers)
+
+    async def connect(request: web.Request) -> web.WebSocketResponse:
+        session = Session(hub, backend)
+        sessions.add(session)
+        try:
+            return await session.run(request)
+        finally:
+            sessions.discard(session)
+
+    async def close_all(_: web.Application) -> None:
+        await asyncio.gather(*(session.end() for session in sessions))
+
+    app.on_shutdown.append(close_all)
+    app.router.add_get('/ws', connect)
+    _add_page(app, page_files.read_page(page))
+    library_routes.add_routes(app, library, backend)
+    if backend.mode == 'replay':
+        app.add_routes(cast(ReplayBackend, backend).routes())
+    return app
+
+
+async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRunner, int]:
+    """
+    Start to listen, at the next free port if the one asked for is taken.
+
+    :param app: of `create_app`; its backend is started.
+    :param host: address or name.
+    :param port: the first to try; 0 takes any.
+    :return: the runner, whose `cleanup` ends everything, and the port.
+    :raises InputError: if no port can be used.
+    """
+    # No log of requests: the first address holds the token.
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN_S,
+                           keepalive_timeout=30.0, lingering_time=1.0, auto_decompress=False)
+    try:
+        await runner.setup()
+        for candidate in range(port, port + PORTS_TRIED if port else 1):
+            try:
+                await web.TCPSite(runner, host, candidate).start()
+            except OSError as error:
+                if error.errno != errno.EADDRINUSE:
+                    raise InputError(f'cannot listen ({error.strerror})', f'{host}:{candidate}',
+                                     'choose another address or port') from error
+            except OverflowError:
+                break
+            else:
+                return runner, runner.addresses[0][1]
+        raise InputError(f'the ports {port} to {port + PORTS_TRIED - 1} are taken', host,
+                         'choose another port')
+    except BaseException:
+        await runner.cleanup()
+        raise
+
+
+def _guard(access: Access) -> Middleware:
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        sockname = request.get_extra_info('sockname')
+        if sockname is None:
+            raise ConnectionResetError
+        refusal = _refusal(access, request, sockname[1])
+        if refusal:
+            return web.Response(status=403, text=f'{refusal}\n')
+        if access.token is None:
+            return await handler(request)
+        cookie = f'crgame-{sockname[1]}'
+        if request.path == '/' and 'token' in request.query:
+            if access.knows(request.query['token']):
+                answer = web.Response(status=303, headers={'Location': '/'})
+                answer.set_cookie(cookie, access.token, httponly=True, samesite='Strict')
+                return answer
+        elif access.knows(request.cookies.get(cookie)):
+            return await handler(request)
+        return web.Response(status=403, text='Open the address with the token that the cockpit '
+                            'printed when it started.\n')
+    return guard
+
+
+def _refusal(access: Access, request: web.Request, port: int) -> str:
+    """Say why a request is refused whatever its token, empty if it is not."""
+    host = request.headers.get(hdrs.HOST, '')
+    if not access.allows_host(host, port):
+        return f'This is not the name of the cockpit: open http://127.0.0.1:{port}/'
+    if not is_own_origin(request.headers.get(hdrs.ORIGIN), host):
+        return 'Pages of other sites cannot use the cockpit.'
+    foreign = request.headers.get('Sec-Fetch-Site') in ('cross-site', 'same-site')
+    if foreign and request.path != '/':
+        return 'Pages of other sites cannot use the cockpit.'
+    if request.method == hdrs.METH_POST and request.headers.get('X-Crgame') != '1':
+        return 'The header X-Crgame: 1 is missing.'
+    return ''
+
+
+async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(_HEADERS)
+    static = request.path.startswith('/static/') or request.path == page_files.PLOTLY
+    response.headers[hdrs.CACHE_CONTROL] = 'no-cache' if static else 'no-store'
+
+
+def _add_page(app: web.Application, table: Mapping[str, PageFile]) -> None:
+    async def serve(request: web.Request) -> web.Response:
+        file = table.get(request.path)
+        if file is None:
+            return web.Response(status=404, text='There is no such file.\n')
+        if request.headers.get(hdrs.IF_NONE_MATCH) == f'"{file.tag}"':
+            return web.Response(status=304, headers={hdrs.ETAG: f'"{file.tag}"'})
+        return web.Response(body=file.body, content_type=file.content_type,
+                            charset='utf-8' if file.is_text else None,
+                            headers={hdrs.ETAG: f'"{file.tag}"'})
+
+    for path in (page_files.INDEX, page_files.PLOTLY, '/static/{name:.*}'):
+        app.router.add_get(path, serve)
+
+
+def _running(backend: Backend, hub: Hub) -> Callable[[web.Application], AsyncIterator[None]]:
+    async def running(_: web.Application) -> AsyncIterator[None]:
+        await backend.start(hub)
+        checking = asyncio.create_task(_check_stalls(hub))
+        yield
+        checking.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await checking
+        await backend.stop()
+    return running
+
+
+async def _check_stalls(hub: Hub) -> None:
+    loop = asyncio.get_running_loop()
+    while True:
+        await asyncio.sleep(_STALL_CHECK_S)
+        hub.check_stalls(loop.time())

@@ -1,0 +1,204 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One WebSocket connection from its first message to its end."""
+
+import asyncio
+from collections.abc import Mapping
+import contextlib
+import logging
+import socket
+from typing import Any
+
+from aiohttp import web, WSCloseCode, WSMsgType
+
+from crgame_ros.cockpit import messages
+from crgame_ros.cockpit.backend import Backend
+from crgame_ros.cockpit.client import Client, TokenBucket
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.errors import CrgameError, InputError
+
+MESSAGES_PER_S = 400.0
+MESSAGE_BURST = 800.0
+MAX_MALFORMED = 5
+MAX_REQUESTS = 16
+# A ping after 5 s of silence, 2.5 s for its answer.
+HEARTBEAT_S = 5.0
+CLOSE_S = 0.4
+# What the kernel may hold unsent: more would be seconds of old frames on a slow network [bytes].
+_KERNEL_UNSENT = 64 * 1024
+
+_log = logging.getLogger(__name__)
+
+
+class Session:
+    """
+    Reads a client's messages, and makes sure that the backend learns of its end.
+
+    :param hub: all clients.
+    :param backend: what the messages are for.
+    """
+
+    def __init__(self, hub: Hub, backend: Backend) -> None:
+        self._hub = hub
+        self._backend = backend
+        # One byte more: aiohttp refuses a message of exactly this size. Pings are ours to answer,
+        # because they count as messages; so are closes, because the backend comes first.
+        self.socket = web.WebSocketResponse(
+            timeout=CLOSE_S, heartbeat=HEARTBEAT_S, compress=False, autoping=False,
+            autoclose=False, max_msg_size=messages.MAX_BYTES + 1, writer_limit=0)
+        self._bucket = TokenBucket(MESSAGES_PER_S, MESSAGE_BURST)
+        self._requests: asyncio.Queue[Mapping[str, Any] | None] = asyncio.Queue(MAX_REQUESTS)
+        self._malformed = 0
+        self._transport: asyncio.WriteTransport | None = None
+        self._worker: asyncio.Task[None] | None = None
+
+    async def run(self, request: web.Request) -> web.WebSocketResponse:
+        """
+        Serve the connection until it ends.
+
+        :param request: the upgrade request.
+        """
+        await self.socket.prepare(request)
+        transport = request.transport
+        if not isinstance(transport, asyncio.WriteTransport):
+            return self.socket
+        self._transport = transport
+        _send_promptly(transport)
+        if self._hub.is_full:
+            await self.close(WSCloseCode.TRY_AGAIN_LATER, 'too many pages are open')
+            return self.socket
+        client = self._hub.add(transport.abort, transport.get_write_buffer_size)
+        writer = asyncio.create_task(client.write(self.socket))
+        writer.add_done_callback(lambda task: _end_with(task, client))
+        self._worker = asyncio.create_task(self._work(client))
+        code: int = WSCloseCode.INTERNAL_ERROR
+        reason = ''
+        try:
+            self._backend.joined(client)
+            code, reason = await self._read(client)
+        finally:
+            # Before anything that waits: a seat may be held.
+            self._leave(client)
+            writer.cancel()
+            self._requests.put_nowait(None)
+            if reason or client.dropped:
+                _log.info('%s was dropped: %s', client.id, reason or client.dropped)
+            await self.close(code, reason)
+        # A request that has begun is finished, whether or not its page has gone.
+        await asyncio.wait([self._worker])
+        return self.socket
+
+    async def end(self) -> None:
+        """Close the connection because the server ends, and give up what was asked for."""
+        await self.close(WSCloseCode.GOING_AWAY, 'the cockpit ends')
+        if self._worker is not None:
+            self._worker.cancel()
+
+    async def close(self, code: int, reason: str) -> None:
+        """
+        Close the connection within a second, whatever its other end does.
+
+        :param reason: at most 123 bytes, for people.
+        """
+        with contextlib.suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(2 * CLOSE_S):
+                await self.socket.close(code=code, message=reason.encode()[:123])
+        if self._transport is not None:
+            self._transport.abort()
+
+    def _leave(self, client: Client) -> None:
+        while not self._requests.empty():
+            self._requests.get_nowait()
+        self._hub.remove(client)
+        try:
+            self._backend.left(client)
+        except Exception:
+            _log.exception('end of %s', client.id)
+
+    async def _read(self, client: Client) -> tuple[int, str]:
+        """Take messages until the connection ends; give the code and reason to close it with."""
+        loop = asyncio.get_running_loop()
+        while True:
+            message = await self.socket.receive()
+            if message.type in (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED,
+                                WSMsgType.ERROR):
+                return WSCloseCode.OK, ''
+            if not self._bucket.take(loop.time()):
+                return (WSCloseCode.POLICY_VIOLATION,
+                        f'more than {MESSAGES_PER_S:g} messages a second')
+            if message.type is WSMsgType.PING:
+                await self.socket.pong(message.data)
+            elif message.type is WSMsgType.TEXT:
+                await self._take(client, message.data)
+            elif message.type is WSMsgType.BINARY:
+                self._blame(client, InputError('is binary', 'message'))
+            if self._malformed >= MAX_MALFORMED:
+                return (WSCloseCode.POLICY_VIOLATION,
+                        f'{MAX_MALFORMED} messages that cannot be read')
+
+    async def _take(self, client: Client, text: str) -> None:
+        try:
+            message = messages.parse_message(text)
+        except InputError as error:
+            self._blame(client, error)
+            return
+        match message['type']:
+            case 'input':
+                try:
+                    await self._backend.command(client, message)
+                except CrgameError as error:
+                    # Repeated every 50 ms, and sent for a while after a seat was lost: the seats
+                    # say who holds them.
+                    _log.debug('input of %s: %s', client.id, error)
+            case 'name':
+                client.name = message['name']
+            case 'layers':
+                client.wants_predictions = message['predictions']
+            case 'ping':
+                self._hub.send_event('pong', {'t': message['t']}, only=client)
+            case _:
+                await self._ask(client, message)
+
+    async def _ask(self, client: Client, message: Mapping[str, Any]) -> None:
+        try:
+            self._requests.put_nowait(message)
+        except asyncio.QueueFull:
+            self._reply(client, message, False, f'{MAX_REQUESTS} requests are waiting already')
+        # Let it begin before the next message is taken.
+        await asyncio.sleep(0)
+
+    def _blame(self, client: Client, error: InputError) -> None:
+        self._malformed += 1
+        self._hub.send_event('notice', {'level': 'error', 'text': str(error)}, only=client)
+
+    async def _work(self, client: Client) -> None:
+        while (message := await self._requests.get()) is not None:
+            try:
+                text = await self._backend.command(client, message)
+            except CrgameError as error:
+                self._reply(client, message, False, str(error))
+            except Exception:
+                _log.exception('%s of %s', message['type'], client.id)
+                self._reply(client, message, False, 'it failed; the log of the server says why')
+            else:
+                self._reply(client, message, True, text)
+
+    def _reply(self, client: Client, message: Mapping[str, Any], ok: bool, text: str) -> None:
+        self._hub.send_event('reply', {'to': message['id'], 'ok': ok, 'text': text}, only=client)
+
+
+def _end_with(writer: asyncio.Task[None], client: Client) -> None:
+    """Drop a client that nothing can be sent to any more."""
+    error = None if writer.cancelled() else writer.exception()
+    if error is not None and not isinstance(error, ConnectionError):
+        _log.error('cannot send to %s', client.id, exc_info=error)
+    if error is not None:
+        client.drop('cannot be sent to')
+
+
+def _send_promptly(transport: asyncio.WriteTransport) -> None:
+    """Hold back no more than one message: what is old is replaced, not sent late."""
+    transport.set_write_buffer_limits(high=0)
+    raw = transport.get_extra_info('socket')
+    if raw is not None and hasattr(socket, 'TCP_NOTSENT_LOWAT'):
+        raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _KERNEL_UNSENT)

@@ -1,0 +1,89 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which nodes a run has, and which ones a game that is chosen later adds."""
+
+from collections.abc import Mapping
+import json
+from pathlib import Path
+
+from crgame_ros.driver.source import COCKPIT
+from crgame_ros.launcher.node_process import NodeSpec
+from crgame_ros.launcher.run_plan import RunPlan
+from crgame_ros.planner.registry import EXTERNAL
+
+COMPANION_NICE = 5
+# Pictures for people give way to everybody.
+VIEWER_NICE = 10
+
+
+def node_specs(plan: RunPlan) -> list[NodeSpec]:
+    """List the nodes of a run: sim_node first, which waits for its companions, viewers last."""
+    setup, request = plan.setup, plan.request
+    companions = [
+        *vehicle_specs({human.id: human.driver for human in setup.humans},
+                       {av.id: av.spec.planner for av in setup.avs}),
+        NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
+                 nice=COMPANION_NICE, restart=True),
+        NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
+        NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True)]
+    waiting = ', '.join(f'"{spec.name}"' for spec in companions)
+    # With a driver in the browser the run begins when somebody has taken the seat.
+    paused = any(human.driver == COCKPIT for human in setup.humans)
+    simulation = NodeSpec('sim_node', 'sim_node', {
+        'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
+        'realtime_priority': str(request.realtime_priority).lower(),
+        'scenario_directories': f'["{plan.cockpit / "games"}"]', 'roster': f'"{plan.roster}"',
+        'start_paused': str(paused).lower(), 'wait_for': f'[{waiting}]'})
+    return [simulation, *companions, *_viewer_specs(plan)]
+
+
+def vehicle_specs(drivers: Mapping[str, str], planners: Mapping[str, str]) -> list[NodeSpec]:
+    """
+    List the nodes that a game's vehicles need.
+
+    :param drivers: driver source by human.
+    :param planners: planner by AV.
+    """
+    return [
+        *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av}, nice=COMPANION_NICE,
+                   restart=True) for av, planner in planners.items() if planner != EXTERNAL),
+        *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human}, restart=True)
+          for human, driver in drivers.items() if driver != COCKPIT)]
+
+
+def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
+    """List the nodes that nobody waits for: they come and go as they like."""
+    request = plan.request
+    viewers = [NodeSpec('marker_node', 'marker_node', nice=VIEWER_NICE, restart=True)]
+    if not request.headless:
+        viewers.append(NodeSpec('cockpit_node', 'cockpit_node', {
+            'port': str(request.port), 'listen': f'"{request.listen or "127.0.0.1"}"',
+            'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
+            'directory': f'"{plan.cockpit}"'}, nice=COMPANION_NICE, restart=True))
+    return viewers
+
+
+class Roster:
+    """
+    The vehicles of the game that runs now, as sim_node writes them into a file.
+
+    A game chosen in the cockpit may have other vehicles than the one that was started.
+
+    :param path: of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._seen: tuple[int, int] | None = None
+
+    def changed_specs(self) -> list[NodeSpec]:
+        """Give the nodes that the vehicles need, if the file has changed; else none."""
+        try:
+            stat = self._path.stat()
+        except OSError:
+            return []
+        if (stat.st_mtime_ns, stat.st_ino) == self._seen:
+            return []
+        self._seen = (stat.st_mtime_ns, stat.st_ino)
+        content = json.loads(self._path.read_text(encoding='utf-8'))
+        return vehicle_specs(content['humans'], content['avs'])

@@ -1,0 +1,58 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The events of a recorded run: which there were, and which took effect when."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.scenario.events import FiredEvent
+from crgame_ros.simulation.documents import (
+    EVENTS_TOPIC,
+    GAME_TOPIC,
+    parse_events_document,
+    parse_game_document,
+)
+
+_STRING = 'std_msgs/msg/String'
+
+
+class RecordedEvents(NamedTuple):
+    """
+    The events of a recorded run.
+
+    :param known: names of the events of the recorded game.
+    :param fired: what took effect, in order.
+    """
+
+    known: frozenset[str]
+    fired: tuple[FiredEvent, ...]
+
+
+def read_run_events(path: Path, epoch: int | None = None) -> RecordedEvents:
+    """
+    Read the events of a run from its recording.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if there is no such run in it.
+    """
+    games, fired = {}, {}
+    with BagReader(path) as reader:
+        for topic, type_name, _, message in reader.decoded([GAME_TOPIC, EVENTS_TOPIC]):
+            if type_name != _STRING:
+                raise InputError(f'{topic} is a {type_name}', str(path),
+                                 'give a recording of crgame_ros')
+            if topic == GAME_TOPIC:
+                game = parse_game_document(message.data)
+                games[game.epoch] = game
+            else:
+                # Each message tells everything since the start of its run.
+                number, events = parse_events_document(message.data)
+                fired[number] = events
+    chosen = max(games, default=None) if epoch is None else epoch
+    if chosen is None or chosen not in games:
+        raise InputError('no such run in it' if games else f'no {GAME_TOPIC} in it', str(path),
+                         'record all topics, from before the start of the run')
+    return RecordedEvents(frozenset(event.name for event in games[chosen].events),
+                          fired.get(chosen, ()))

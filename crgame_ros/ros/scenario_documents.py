@@ -1,0 +1,107 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The run as `/scenario/xml`, `/scenario/objects` and `/scenario/game` describe it together."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.scenario.loading import LoadedScenario, parse_scenario, scenario_digest
+from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.simulation.documents import (
+    GameDocument,
+    parse_game_document,
+    parse_objects_document,
+)
+
+# The game is read first: it is published last, so that what it speaks of is mostly there.
+KINDS = ('game', 'xml', 'objects')
+
+
+@dataclass(frozen=True)
+class ScenarioSet:
+    """
+    Documents that belong together.
+
+    :param loaded: the scenario; the same object as before while its text is the same.
+    :param objects: everything that can appear; the driven vehicles are those of the game.
+    :param game: the resolved game.
+    :param texts: the documents as they came: xml, objects, game.
+    """
+
+    loaded: LoadedScenario
+    objects: tuple[ObjectDescription, ...]
+    game: GameDocument
+    texts: Mapping[str, str]
+
+    @property
+    def driven(self) -> tuple[ObjectDescription, ...]:
+        """Driven vehicles, in the order of `/vehicles/state`."""
+        return tuple(item for item in self.objects if item.role.is_ego)
+
+    @property
+    def others(self) -> tuple[ObjectDescription, ...]:
+        """Everything else, in the order of `/traffic/objects`."""
+        return tuple(item for item in self.objects if not item.role.is_ego)
+
+
+class DocumentCollector:
+    """Puts documents together, whoever receives them and in whatever order they come."""
+
+    def __init__(self) -> None:
+        self._texts: dict[str, str] = {}
+        self._given: dict[str, str] = {}
+        self._loaded: LoadedScenario | None = None
+
+    def take(self, kind: str, text: str) -> None:
+        """
+        Take a document.
+
+        :param kind: xml, objects or game.
+        """
+        self._texts[kind] = text
+
+    def complete(self) -> ScenarioSet | None:
+        """
+        Give the set, once, when the documents belong together and one of them is new.
+
+        :raises CrgameError: if a document cannot be read.
+        """
+        if len(self._texts) < len(KINDS) or self._texts == self._given:
+            return None
+        game = parse_game_document(self._texts['game'])
+        if scenario_digest(self._texts['xml']) != game.scenario_sha256:
+            return None
+        objects = parse_objects_document(self._texts['objects'])
+        if [item.id for item in objects if item.role.is_ego] \
+                != [entry['id'] for entry in (*game.humans, *game.avs)]:
+            return None
+        if self._loaded is None or self._loaded.sha256 != game.scenario_sha256:
+            self._loaded = parse_scenario(self._texts['xml'], '/scenario/xml')
+        self._given = dict(self._texts)
+        return ScenarioSet(self._loaded, objects, game, dict(self._texts))
+
+
+class ScenarioDocuments:
+    """
+    Reads the three documents without an executor.
+
+    :param endpoints: of the node that reads them.
+    """
+
+    def __init__(self, endpoints: Endpoints) -> None:
+        self._slots = {kind: endpoints.polled(f'/scenario/{kind}') for kind in KINDS}
+        self._collector = DocumentCollector()
+
+    def poll(self) -> ScenarioSet | None:
+        """
+        Give a new complete set; None while there is nothing new.
+
+        :raises CrgameError: if a document cannot be read, once for each time it comes.
+        """
+        fresh = False
+        for kind, slot in self._slots.items():
+            if (document := slot.latest()) is not None:
+                self._collector.take(kind, document.data)
+                fresh = True
+        return self._collector.complete() if fresh else None

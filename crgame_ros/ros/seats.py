@@ -1,0 +1,189 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who drives what in a live run: one source a seat, changed by orders on /seats/order."""
+
+from collections.abc import MutableMapping
+import json
+
+from crgame_ros.driver.command import DriverCommand, RELEASED
+from crgame_ros.driver.source import COCKPIT, parse_source
+from crgame_ros.driver.watchdog import SeatWatchdog
+from crgame_ros.errors import InputError
+from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.messages import from_joy, from_time
+from crgame_ros.simulation.engine import Simulation
+from crgame_ros.simulation.setup import Setup
+
+NS = 1e-9
+# The driver that the game names, and an AV's planner; anything else names a driver of its own.
+GAME = 'game'
+PLANNER = 'planner'
+MAX_SOURCE_LENGTH = 40
+# Two drivers may speak in the moment in which a seat changes hands.
+COMMAND_DEPTH = 10
+
+
+class Seat:
+    """
+    One vehicle's seat: the latest command of its source, and how old it is on the steady clock.
+
+    :param vehicle_id: whose seat.
+    :param driver: who drives it by the game, a driver source or the AV's planner.
+    :param home: source by which the game's driver speaks.
+    :param commands: where the commands come from.
+    :param clock_offset_ns: simulation time of step 0; older commands are of a run before [ns]
+    """
+
+    def __init__(self, vehicle_id: str, driver: str, home: str, commands: PolledSubscription,
+                 clock_offset_ns: int) -> None:
+        self.id = vehicle_id
+        self.driver = driver
+        self.home = home
+        self.source = home
+        self.commands = commands
+        self._where = f'/{vehicle_id}/driver_command'
+        self._watchdog = SeatWatchdog()
+        self._last = RELEASED
+        self._heard_ns: int | None = None
+        self._clock_offset_ns = clock_offset_ns
+        self.malformed = 0
+        self.outdated = 0
+
+    @property
+    def losses(self) -> int:
+        """How often the driver has fallen silent."""
+        return self._watchdog.losses
+
+    @property
+    def lost(self) -> bool:
+        """Whether the driver is silent now."""
+        return self._watchdog.lost and self.source != PLANNER
+
+    def obey(self, source: str, now_ns: int) -> None:
+        """Take commands from another source; what was commanded last holds until it speaks."""
+        if self.source == PLANNER:
+            self._last = RELEASED
+            self._watchdog.reset()
+        self.source = source
+        self._heard_ns = now_ns
+
+    def forgive(self, now_ns: int) -> None:
+        """Count silence from now on: a pause is no loss."""
+        if self._heard_ns is not None:
+            self._heard_ns = now_ns
+
+    def listen(self, now_ns: int) -> bool:
+        """Take the latest command that has come; tell whether there was any so far."""
+        while (message := self.commands.take()) is not None:
+            if (message.header.frame_id or GAME) != self.source:
+                continue
+            if from_time(message.header.stamp) < self._clock_offset_ns:
+                self.outdated += 1
+                continue
+            try:
+                self._last = from_joy(message, self._where)
+                self._heard_ns = now_ns
+            except InputError:
+                self.malformed += 1
+        return self._heard_ns is not None
+
+    def command(self, now_ns: int, dt_s: float, speed: float) -> DriverCommand | None:
+        """
+        Give the command for this cycle; released, then gentle braking, after a loss.
+
+        :return: None for an AV that nobody has taken over.
+        """
+        if self.source == PLANNER:
+            return None
+        self.listen(now_ns)
+        if self._heard_ns is None:
+            self._heard_ns = now_ns
+        age_s = (now_ns - self._heard_ns) * NS
+        return self._watchdog.filter(self._last, age_s, dt_s, speed)
+
+
+class Seats:
+    """
+    The seats of a run, humans first, in the order of `Setup.vehicles`.
+
+    :param endpoints: of sim_node.
+    :param setup: the run.
+    :param clock_offset_ns: simulation time of step 0 [ns]
+    :param sources: what people ordered so far, by seat; outlives a reset.
+    """
+
+    def __init__(self, endpoints: Endpoints, setup: Setup, clock_offset_ns: int,
+                 sources: MutableMapping[str, str]) -> None:
+        self._orders = endpoints.polled('/seats/order')
+        self._sources = sources
+        self.humans = [
+            Seat(human.id, human.driver, _home(human.driver),
+                 endpoints.polled('/<v>/driver_command', human.id, depth=COMMAND_DEPTH),
+                 clock_offset_ns) for human in setup.humans]
+        self.avs = [
+            Seat(av.id, av.spec.planner, PLANNER,
+                 endpoints.polled('/<v>/driver_command', av.id, depth=COMMAND_DEPTH),
+                 clock_offset_ns) for av in setup.avs]
+        self.all = [*self.humans, *self.avs]
+        for seat in self.all:
+            seat.source = sources.get(seat.id, seat.home)
+
+    @property
+    def slots(self) -> list[PolledSubscription]:
+        """Every subscription, to release it."""
+        return [self._orders, *(seat.commands for seat in self.all)]
+
+    def commands(self, now_ns: int, dt_s: float,
+                 simulation: Simulation) -> list[DriverCommand | None]:
+        """Give the command of every seat for this cycle; None for AVs that follow their plan."""
+        return [
+            *(seat.command(now_ns, dt_s, human.state.speed)
+              for seat, human in zip(self.humans, simulation.humans, strict=True)),
+            *(seat.command(now_ns, dt_s, av.state.speed)
+              for seat, av in zip(self.avs, simulation.avs, strict=True))]
+
+    def document(self) -> str:
+        """Write /seats."""
+        return json.dumps({seat.id: {'source': seat.source, 'driver': seat.driver}
+                           for seat in self.all})
+
+    def take_orders(self, now_ns: int) -> tuple[bool, list[str]]:
+        """
+        Obey the orders that have come.
+
+        :param now_ns: steady clock [ns]
+        :return: whether anything changed, and why orders were refused
+        """
+        changed, refusals = False, []
+        while (message := self._orders.take()) is not None:
+            try:
+                changed |= self._obey(message.data, now_ns)
+            except InputError as error:
+                refusals.append(str(error))
+        return changed, refusals
+
+    def _obey(self, text: str, now_ns: int) -> bool:
+        try:
+            order = json.loads(text)
+            name, source = order['seat'], order['source']
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise InputError('is no order', '/seats/order', 'give seat and source') from error
+        seat = next((item for item in self.all if item.id == name), None)
+        if seat is None:
+            raise InputError(f'there is no seat {str(name)[:MAX_SOURCE_LENGTH]!r}', '/seats/order',
+                             'it has ' + ', '.join(item.id for item in self.all))
+        if not isinstance(source, str) or not 0 < len(source) <= MAX_SOURCE_LENGTH:
+            raise InputError('the source is no name', '/seats/order', 'give game or a driver')
+        source = seat.home if source == GAME else source
+        if source == PLANNER != seat.home:
+            raise InputError(f'{seat.id} has no planner', '/seats/order', 'give game')
+        self._sources[seat.id] = source
+        if source == seat.source:
+            return False
+        seat.obey(source, now_ns)
+        return True
+
+
+def _home(driver: str) -> str:
+    """Give the source by which the driver that the game names speaks."""
+    return COCKPIT if parse_source(driver).kind == COCKPIT else GAME

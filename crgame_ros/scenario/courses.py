@@ -1,0 +1,191 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The obstacles of one run: where the scenario has them, and where events have put them."""
+
+from abc import ABC, abstractmethod
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
+from crgame_ros.scenario.objects import ObjectStates
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+
+FloatArray = NDArray[np.float64]
+
+_ABSENT = np.full(3, np.nan)
+
+
+class Course(ABC):
+    """Where one obstacle is from the time step on at which an event changed its course."""
+
+    @abstractmethod
+    def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """Give pose and velocity (3) at a time step; NaN where absent."""
+
+    def path_from(self, k: int) -> FloatArray:
+        """Give the poses (n, 3) from time step k on, as far as they are known."""
+        return self.state_at(k)[0][None, :]
+
+
+class Released(Course):
+    """
+    A recorded course, begun at another time.
+
+    :param k: time step of its first pose.
+    :param track: its poses and velocities (n, 3).
+    """
+
+    def __init__(self, k: int, track: tuple[FloatArray, FloatArray]) -> None:
+        self._k = k
+        self._poses, self._velocities = track
+
+    def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """Give the state of the recording as long as it lasts."""
+        row = k - self._k
+        if not 0 <= row < len(self._poses):
+            return _ABSENT, _ABSENT
+        return self._poses[row], self._velocities[row]
+
+    def path_from(self, k: int) -> FloatArray:
+        """Give the rest of the recording."""
+        return self._poses[k - self._k:]
+
+
+class Braking(Course):
+    """
+    Slows down along a path and keeps the speed that it reaches.
+
+    With v0 <= v1 there is nothing to slow down. To stop, it goes straight on where the path is
+    too short; otherwise it is gone at the end of the path.
+
+    :param k: time step at which it begins to brake.
+    :param path: (n, 3) poses from there on.
+    :param speed: v0 at the beginning [m/s]
+    :param deceleration: [m/s^2]
+    :param final_speed: v1 [m/s]
+    :param time_step_s: Delta t_c [s]
+    """
+
+    def __init__(self, k: int, path: FloatArray, speed: float, deceleration: float,
+                 final_speed: float, time_step_s: float) -> None:
+        self._k, self._time_step_s = k, time_step_s
+        self._speed, self._deceleration = speed, deceleration
+        self._final_speed = min(speed, final_speed)
+        step = np.hypot(*np.diff(path[:, :2], axis=0).T)
+        self._s = np.concatenate(([0.0], np.cumsum(step)))
+        self._path = path.copy()
+        self._path[:, 2] = np.unwrap(path[:, 2])
+        self._stops = self._final_speed == 0.0
+
+    def _distance(self, k: int) -> float:
+        """Integrate the speed from the beginning to a time step [m]."""
+        time = (k - self._k) * self._time_step_s
+        braking = (self._speed - self._final_speed) / self._deceleration
+        first = min(time, braking)
+        return (self._speed * first - 0.5 * self._deceleration * first**2
+                + self._final_speed * (time - first))
+
+    def _pose(self, distance: float) -> FloatArray:
+        beyond = distance - float(self._s[-1])
+        pose = np.array([np.interp(distance, self._s, column) for column in self._path.T])
+        if beyond > 0.0:
+            if not self._stops:
+                return _ABSENT
+            pose[:2] += beyond * np.array((math.cos(pose[2]), math.sin(pose[2])))
+        return pose
+
+    def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """Give the state at a time step; its velocity leads to the next pose."""
+        pose = self._pose(self._distance(k))
+        following = self._pose(self._distance(k + 1))
+        if np.isnan(following[0]):
+            following = 2.0 * pose - self._pose(self._distance(k - 1))
+        velocity = (following - pose) / self._time_step_s
+        return np.array((pose[0], pose[1], wrap_pi(float(pose[2])))), velocity
+
+    def path_from(self, k: int) -> FloatArray:
+        """Give the rest of the path."""
+        distance = self._distance(k)
+        rest = self._path[self._s > distance]
+        path = np.concatenate((self._pose(distance)[None, :], rest))
+        path[:, 2] = wrap_pi_array(path[:, 2])
+        return path
+
+
+class Standing(Course):
+    """
+    Stands for good.
+
+    :param pose: x [m], y [m], yaw [rad]
+    """
+
+    def __init__(self, pose: tuple[float, float, float]) -> None:
+        self._pose = np.array((pose[0], pose[1], wrap_pi(pose[2])))
+        self._velocity = np.zeros(3)
+
+    def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """Give the pose."""
+        return self._pose, self._velocity
+
+
+class ObstacleCourses:
+    """
+    The obstacles of a scenario in one run, in which events change some of them.
+
+    :param obstacles: of the scenario; shared with other runs and never changed.
+    """
+
+    def __init__(self, obstacles: ScenarioObstacles) -> None:
+        self._obstacles = obstacles
+        self._courses: dict[int, Course] = {}
+
+    @property
+    def changed(self) -> list[int]:
+        """Columns of the obstacles that an event has changed, in order."""
+        return sorted(self._courses)
+
+    def states_at(self, k: int) -> ObjectStates:
+        """Give all states at a time step, as far as events have happened; do not write to them."""
+        states = self._obstacles.states_at(k)
+        if not self._courses:
+            return states
+        poses, velocities = states.poses.copy(), states.velocities.copy()
+        for column, course in self._courses.items():
+            poses[column], velocities[column] = course.state_at(k)
+        return ObjectStates(poses, velocities)
+
+    def is_present(self, column: int, k: int) -> bool:
+        """Tell whether an obstacle is there at a time step."""
+        return bool(np.isfinite(self.states_at(k).poses[column, 0]))
+
+    def is_held(self, column: int) -> bool:
+        """Tell whether an obstacle stands until somebody lets it go."""
+        return column in self._obstacles.held and column not in self._courses
+
+    def release(self, column: int, k: int) -> None:
+        """Let a held obstacle go at a time step."""
+        self._courses[column] = Released(k, self._obstacles.track(column))
+
+    def brake(self, column: int, k: int, deceleration: float, speed: float) -> None:
+        """
+        Let an obstacle that is there slow down along its present course.
+
+        :param deceleration: [m/s^2]
+        :param speed: that it slows down to [m/s]
+        """
+        states = self.states_at(k)
+        x, y, _ = states.velocities[column].tolist()
+        course = self._courses.get(column)
+        if course is None:
+            path = self._obstacles.poses[k - self._obstacles.first_k:, column]
+            path = path[np.isfinite(path[:, 0])]
+        else:
+            path = course.path_from(k)
+        self._courses[column] = Braking(
+            k, path, math.hypot(x, y), deceleration, speed, self._obstacles.time_step_s)
+
+    def put(self, column: int, pose: tuple[float, float, float]) -> None:
+        """Put an obstacle somewhere for good."""
+        self._courses[column] = Standing(pose)

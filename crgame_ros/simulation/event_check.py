@@ -1,0 +1,110 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Comparing a game's events with what its scenario and its vehicles are."""
+
+from collections.abc import Sequence
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.scenario.events import (
+    Between,
+    Brake,
+    EventSpec,
+    Near,
+    PlanDisplay,
+    PlannerRun,
+    PlannerSwap,
+    PutObstacle,
+    Release,
+    SpeedLimit,
+)
+from crgame_ros.scenario.game import AvSpec, Game
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.road_network import RoadNetwork
+
+MAX_LISTED = 12
+
+
+def held_obstacles(game: Game) -> frozenset[int]:
+    """Give the ids of the obstacles that wait for an event to release them."""
+    return frozenset(event.action.object for event in game.events
+                     if isinstance(event.action, Release))
+
+
+def put_obstacles(game: Game) -> tuple[ObjectDescription, ...]:
+    """Describe the obstacles that events may put."""
+    return tuple(
+        ObjectDescription(str(event.object_id), event.action.type, Role.STATIC,
+                          Shape.rectangle(event.action.length, event.action.width))
+        for event in game.events if isinstance(event.action, PutObstacle))
+
+
+def check_events(game: Game, where: str, network: RoadNetwork, obstacles: ScenarioObstacles,
+                 humans: Sequence[str], avs: Sequence[AvSpec]) -> None:
+    """
+    Refuse events about what is not there.
+
+    :param where: file name for messages.
+    :param obstacles: of the scenario, with those that events may put.
+    :param humans: ids of the humans' vehicles.
+    :raises InputError: naming the event and what there is.
+    """
+    if not game.events:
+        return
+    recorded = [item.id for item in obstacles.descriptions if item.role is Role.RECORDED]
+    ids: dict[str, list[str | int]] = {
+        'moving obstacle': [*recorded], 'lanelet': [*network.lanelet_ids],
+        'AV': [spec.id for spec in avs],
+        'vehicle or object': [*humans, *(spec.id for spec in avs),
+                              *(item.id for item in obstacles.descriptions)]}
+    for event in game.events:
+        place = f'{where}: event {event.name}'
+        for kind, name in _named(event):
+            if name not in ids[kind]:
+                raise InputError(f'there is no {kind} "{name}"', place, _listed(ids[kind]))
+        check_swap(event, place, avs)
+
+
+def _named(event: EventSpec) -> list[tuple[str, str | int]]:
+    """List what an event names, each with its kind."""
+    named: list[tuple[str, str | int]] = []
+    action, when = event.action, event.when
+    if isinstance(action, Release | Brake):
+        named.append(('moving obstacle', f'o{action.object}'))
+    elif isinstance(action, SpeedLimit):
+        named += [('lanelet', lanelet) for lanelet in action.lanelets]
+    elif isinstance(action, PlanDisplay | PlannerSwap | PlannerRun):
+        named.append(('AV', action.av))
+    if isinstance(when, Near):
+        named.append(('vehicle or object', when.vehicle))
+    elif isinstance(when, Between):
+        named += [('vehicle or object', name) for name in when.between]
+    return named
+
+
+def check_swap(event: EventSpec, where: str, avs: Sequence[AvSpec]) -> None:
+    """
+    Refuse to swap planners with a process that is none of ours.
+
+    :param where: the event, for messages.
+    :raises InputError: if an external planner is to come or to go.
+    """
+    action = event.action
+    if not isinstance(action, PlannerSwap):
+        return
+    if action.planner == EXTERNAL:
+        raise InputError('an event cannot bring in an external planner', where,
+                         'name a planner of the registry, module:Class or file.py:Class')
+    if any(spec.id == action.av and spec.planner == EXTERNAL for spec in avs):
+        raise InputError(f'{action.av} has an external planner, which cannot be replaced', where,
+                         'give it another planner, or leave the event out')
+
+
+def _listed(names: Sequence[str | int]) -> str:
+    if not names:
+        return 'the scenario has none'
+    shown = ', '.join(map(str, names[:MAX_LISTED]))
+    rest = len(names) - MAX_LISTED
+    return f'there is {shown}' + (f' and {rest} more' if rest > 0 else '')

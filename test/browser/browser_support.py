@@ -1,0 +1,142 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One headless Chromium, and what tests of the page ask of it."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import importlib.util
+import os
+from pathlib import Path
+import shutil
+import time
+from typing import Any, TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from selenium.webdriver.chrome.webdriver import WebDriver
+
+PATIENCE_S = 15.0
+_POLL_S = 0.05
+_BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+_FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+          '--disable-background-networking', '--disable-component-update', '--disable-sync',
+          '--disable-dev-shm-usage', '--force-color-profile=srgb')
+
+
+def missing_programs() -> list[str]:
+    """Name what a browser test needs and this machine lacks."""
+    missing = [] if _chromium() else ['chromium']
+    missing += [] if shutil.which('chromedriver') else ['chromedriver']
+    missing += [] if importlib.util.find_spec('selenium') else ['the Python package selenium']
+    return missing
+
+
+def _chromium() -> str | None:
+    return next(filter(None, map(shutil.which, _BROWSERS)), None)
+
+
+class Browser:
+    """
+    One browser window.
+
+    :param driver: its selenium driver, for what is not wrapped here.
+    """
+
+    def __init__(self, driver: 'WebDriver') -> None:
+        self.driver = driver
+        self._errors: list[str] = []
+
+    def open(self, address: str) -> None:
+        """Load a page."""
+        self.driver.get(address)
+
+    def resize(self, width: int, height: int, ratio: float = 1.0) -> None:
+        """Set the size of the page [CSS px], and how many pixels of the screen each has."""
+        self.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
+            'width': width, 'height': height, 'deviceScaleFactor': ratio, 'mobile': False})
+
+    def prefer(self, scheme: str) -> None:
+        """Let the system prefer the dark or the light theme."""
+        self.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+            'features': [{'name': 'prefers-color-scheme', 'value': scheme}]})
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Run a function body in the page; what it returns comes back as Python values."""
+        return self.driver.execute_script(script, *arguments)
+
+    def run_async(self, script: str, *arguments: Any) -> Any:
+        """Run the body of an async function in the page, and wait for what it returns."""
+        self.driver.set_script_timeout(PATIENCE_S)
+        answer = self.driver.execute_async_script(
+            'const done = arguments[arguments.length - 1];'
+            f'(async function () {{ {script} }}).apply(null, arguments).then('
+            '(value) => done({value}), (error) => done({error: `${error}`}));', *arguments)
+        if 'error' in answer:
+            pytest.fail(answer['error'])
+        return answer.get('value')
+
+    def wait(self, condition: str, what: str = '', patience_s: float = PATIENCE_S,
+             arguments: tuple[Any, ...] = ()) -> Any:
+        """
+        Wait until an expression of the page is true.
+
+        :param condition: JavaScript expression; `arguments` holds what is given
+        :param what: said when it stays false
+        :return: its value
+        """
+        end = time.monotonic() + patience_s
+        while True:
+            value = self.run(f'return ({condition});', *arguments)
+            if value:
+                return value
+            if time.monotonic() > end:
+                pytest.fail(f'waited {patience_s:.0f} s in vain for {what or condition}; '
+                            f'console: {self.console_errors()}')
+            time.sleep(_POLL_S)
+
+    def console_errors(self) -> list[str]:
+        """Give every error that the page has logged since it was opened, thrown ones too."""
+        self._errors += [entry['message'] for entry in self.driver.get_log('browser')
+                         if entry['level'] == 'SEVERE']
+        return list(self._errors)
+
+    def screenshot(self, path: Path) -> Path:
+        """Save what is seen as PNG."""
+        self.driver.save_screenshot(str(path))
+        return path
+
+
+@contextmanager
+def open_browser(profile: Path, width: int = 1280, height: int = 720, *,
+                 sound: bool = False) -> Iterator[Browser]:
+    """
+    Start Chromium, and end it.
+
+    :param profile: empty folder for its files
+    :param width: of the page [CSS px]
+    :param height: of the page [CSS px]
+    :param sound: let pages make sounds without a click
+    """
+    from selenium import webdriver
+    from selenium.webdriver.chrome.options import Options
+    from selenium.webdriver.chrome.service import Service
+
+    options = Options()
+    options.binary_location = _chromium() or ''
+    for flag in (*_FLAGS, f'--user-data-dir={profile}', f'--window-size={width},{height}'):
+        options.add_argument(flag)
+    if sound:
+        options.add_argument('--autoplay-policy=no-user-gesture-required')
+    options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
+    # A proxy of the machine is not for pages on this machine.
+    environment = {key: value for key, value in os.environ.items()
+                   if not key.lower().endswith('_proxy')}
+    service = Service(shutil.which('chromedriver'), env=environment)
+    driver = webdriver.Chrome(options=options, service=service)
+    try:
+        browser = Browser(driver)
+        browser.resize(width, height)
+        yield browser
+    finally:
+        driver.quit()

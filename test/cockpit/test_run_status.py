@@ -1,0 +1,112 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Status and alarms, from what the nodes say."""
+
+from crgame_ros.cockpit.run_status import RunStatus
+
+
+def _kinds(status: RunStatus) -> list[str]:
+    return [alarm.id for alarm in status.alarms]
+
+
+def _begun() -> RunStatus:
+    status = RunStatus()
+    status.begin(('hv0', 'av0'))
+    return status
+
+
+def test_collision_and_road_are_alarms_while_they_last() -> None:
+    """Each by its own kind, with what was hit and when it began."""
+    status = _begun()
+    values = {'collision': 'true', 'road_compliance': 'false', 'hit': 'av0,o12', 'n': '70',
+              'stop': 'false'}
+    status.take('hv0/drivability', 2, 'collision', values, 0.7)
+    status.take('hv0/drivability', 2, 'collision', values, 1.7)
+    assert status.alarms_document()['active'] == [
+        {'id': 'collision:hv0', 'kind': 'collision', 'subject': 'hv0',
+         'text': 'collision with av0, o12', 'since_t': 0.7},
+        {'id': 'off_road:hv0', 'kind': 'off_road', 'subject': 'hv0', 'text': 'off the road',
+         'since_t': 0.7}]
+    assert status.document()['drivability']['hv0'] == {
+        'collision': True, 'off_road': True, 'hit': ['av0', 'o12']}
+    status.take('hv0/drivability', 0, 'valid', {
+        'collision': 'false', 'road_compliance': 'true', 'hit': ''}, 2.0)
+    assert _kinds(status) == []
+
+
+def test_checks_that_are_off_give_no_alarm() -> None:
+    """`off` is neither true nor false."""
+    status = _begun()
+    status.take('hv0/drivability', 0, 'valid', {'collision': 'off', 'road_compliance': 'off'}, 0.0)
+    assert _kinds(status) == []
+
+
+def test_plans_and_planner() -> None:
+    """Counts of the simulation and times of the planner join in one row; braking is an alarm."""
+    status = _begun()
+    status.take('sim_node: av0 plans', 2, 'no plan: braking', {
+        'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1',
+        'latency_ms': '10.0', 'age_ms': '', 'last_refusal': 'late'}, 3.0)
+    status.take('planner_node: av0', 0, 'planning', {
+        'plan_time_ms': '4.5', 'fallbacks': '2', 'planner': 'reactive'}, 3.0)
+    status.take('sim_node: av0 plans', 2, 'no plan: braking', {
+        'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1',
+        'latency_ms': '10.0', 'age_ms': '', 'last_refusal': 'late'}, 4.0)
+    assert status.document()['planners']['av0'] == {
+        'running': True, 'stale': True, 'latency_ms': 10.0, 'age_ms': None, 'accepted': 7,
+        'refused': 1, 'plan_time_ms': 4.5, 'fallbacks': 2.0, 'planner': 'reactive',
+        'last_refusal': 'late'}
+    assert _kinds(status) == ['stale_plan:av0']
+
+
+def test_lost_driver_and_lost_device() -> None:
+    """A silent seat shows at the seat and as an alarm; a device's own words come with it."""
+    status = _begun()
+    status.take('sim_node: hv0 seat', 1, 'driver lost', {'losses': '1'}, 5.0)
+    assert status.document()['seats_lost'] == {'hv0': True}
+    assert _kinds(status) == ['lost_device:hv0']
+    status.take('driver_node: hv0', 2, 'G29 is unplugged', {}, 5.1)
+    assert status.alarms[0].text == 'G29 is unplugged'
+    status.take('driver_node: hv0', 0, 'device found', {}, 6.0)
+    status.take('sim_node: hv0 seat', 0, 'driven', {'losses': '1'}, 6.0)
+    assert _kinds(status) == []
+
+
+def test_recording() -> None:
+    """Its size while it goes, its last words when it fails; a new run doesn't hide a failure."""
+    status = _begun()
+    assert status.document()['recording']['state'] == 'none'
+    status.take('recorder_node: recording', 0, 'recording into bag',
+                {'messages': '120', 'bytes': '2500000'}, 1.0)
+    assert status.document()['recording'] == {
+        'state': 'recording', 'messages': 120, 'megabytes': 2.5, 'text': 'recording into bag'}
+    status.take('recorder_node: recording', 2, 'no space left', {}, 2.0)
+    status.begin(('hv0',))
+    assert status.document()['recording']['state'] == 'failed'
+    assert _kinds(status) == ['recording:recorder']
+
+
+def test_timing_numbers() -> None:
+    """Strings become numbers, what is no number null; skipped frames are an alarm."""
+    status = _begun()
+    status.take('timesync_node: table I', 1, 'late', {
+        'mean_step_error_ms': '0.05', 'real_time_ratio_min': 'nan', 'frame_skipping': 'True'}, 4.0)
+    assert status.document()['timing'] == {
+        'mean_step_error_ms': 0.05, 'real_time_ratio_min': None, 'frame_skipping': True}
+    assert _kinds(status) == ['late:simulation']
+
+
+def test_run_state() -> None:
+    """What sim_node says of itself."""
+    status = _begun()
+    status.take('sim_node: run', 0, 'paused', {'real_time_factor': '0.5'}, 0.0)
+    assert (status.document()['run'], status.document()['real_time_factor']) == ('paused', 0.5)
+
+
+def test_others_are_ignored() -> None:
+    """Vehicles of another game and nodes nobody knows change nothing."""
+    status = _begun()
+    before = status.document()
+    for name in ('sim_node: av9 plans', 'my_node: hello', 'planner_node: av9', ''):
+        status.take(name, 2, 'broken', {}, 0.0)
+    assert status.document() == before and _kinds(status) == []

@@ -1,0 +1,273 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The server as a browser sees it: files, ports, messages and replies, shutdown."""
+
+import asyncio
+import json
+from pathlib import Path
+import shutil
+import struct
+
+from aiohttp import ClientSession, web, WSMsgType
+from cockpit_support import (
+    close_code,
+    cockpit,
+    get,
+    HOST,
+    in_loop,
+    next_text,
+    PumpBackend,
+    wait_until,
+)
+import pytest
+
+from crgame_ros.cockpit import hub, page_files, server, session
+from crgame_ros.cockpit.access import Access
+from crgame_ros.cockpit.frames import FrameKind
+from crgame_ros.cockpit.server import create_app, listen
+from crgame_ros.errors import CrgameError, InputError
+
+
+@in_loop
+async def test_the_page_plotly_and_all_files_of_the_page_are_served(tmp_path: Path) -> None:
+    page = shutil.copytree(page_files.PAGE, tmp_path / 'page')
+    async with cockpit(page=page) as running:
+        async with running.http.get(f'{running.address}/') as answer:
+            assert answer.status == 200 and answer.content_type == 'text/html'
+            assert await answer.read() == (page / 'index.html').read_bytes()
+        async with running.http.get(f'{running.address}/plotly.js') as answer:
+            assert answer.content_type == 'text/javascript'
+            assert b'plotly.js v' in (await answer.read())[:200]
+        scripts = list(page.rglob('*.js'))
+        assert scripts
+        for script in scripts:
+            name = script.relative_to(page).as_posix()
+            async with running.http.get(f'{running.address}/static/{name}') as answer:
+                assert (answer.status, answer.content_type) == (200, 'text/javascript'), name
+                assert await answer.read() == script.read_bytes()
+
+
+@in_loop
+async def test_an_unchanged_file_is_not_sent_again() -> None:
+    async with cockpit() as running:
+        async with running.http.get(f'{running.address}/plotly.js') as answer:
+            tag = answer.headers['ETag']
+        again = {'If-None-Match': tag}
+        async with running.http.get(f'{running.address}/plotly.js', headers=again) as answer:
+            assert answer.status == 304 and await answer.read() == b''
+
+
+@in_loop
+async def test_only_kinds_that_a_page_has_are_read(tmp_path: Path) -> None:
+    (tmp_path / 'js').mkdir()
+    for name in ('index.html', 'js/a.js', 'notes.txt', 'key.pem', '.hidden'):
+        (tmp_path / name).write_text(name)
+    async with cockpit(page=tmp_path) as running:
+        found = {name: (await get(running.port, f'/static/{name}'))[0]
+                 for name in ('js/a.js', 'notes.txt', 'key.pem', '.hidden', 'index.html', '')}
+    assert found == {'js/a.js': 200, 'notes.txt': 404, 'key.pem': 404, '.hidden': 404,
+                     'index.html': 404, '': 404}
+
+
+def test_a_missing_page_or_plotly_is_one_clear_error(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(CrgameError, match='page of the cockpit is missing'):
+        page_files.read_page(tmp_path)
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    with pytest.raises(CrgameError, match='plotly is missing.*pip install plotly'):
+        page_files.read_page()
+
+
+@in_loop
+async def test_every_answer_has_the_headers_that_protect_the_page() -> None:
+    async with cockpit() as running:
+        kept = {}
+        for path in ('/', '/static/js/main.js', '/plotly.js', '/api/scenarios', '/nothing'):
+            async with running.http.get(f'{running.address}{path}') as answer:
+                policy = answer.headers['Content-Security-Policy']
+                assert policy.startswith("default-src 'self'; style-src 'self' 'unsafe-inline'")
+                assert "frame-ancestors 'none'" in policy and 'script-src' not in policy
+                assert answer.headers['X-Content-Type-Options'] == 'nosniff'
+                assert answer.headers['Referrer-Policy'] == 'no-referrer'
+                assert 'aiohttp' not in answer.headers['Server']
+                kept[path] = answer.headers['Cache-Control']
+    assert kept == {'/': 'no-store', '/static/js/main.js': 'no-cache', '/plotly.js': 'no-cache',
+                    '/api/scenarios': 'no-store', '/nothing': 'no-store'}
+
+
+@in_loop
+async def test_a_client_gets_hello_documents_and_frames() -> None:
+    async with cockpit() as running:
+        socket = await running.join()
+        kinds = []
+        async for message in socket:
+            if message.type is WSMsgType.BINARY:
+                break
+            kinds.append(json.loads(message.data)['type'])
+        assert kinds == ['hello', 'seats', 'scene']
+        kind, _, n = struct.unpack_from('<3d', message.data)
+        assert kind == FrameKind.STATE and n >= 1
+        await socket.close()
+
+
+@in_loop
+async def test_requests_get_the_backends_reply_and_inputs_do_not() -> None:
+    async with cockpit() as running:
+        socket = await running.join()
+        for event, ok, text in (('go', True, 'did trigger'),
+                                ('forbidden', False, 'event: is not to be'),
+                                ('broken', False, 'it failed; the log of the server says why')):
+            await socket.send_json({'type': 'trigger', 'event': event, 'id': 7})
+            assert await next_text(socket, 'reply') == {
+                'type': 'reply', 'to': 7, 'ok': ok, 'text': text}
+        await socket.send_json({'type': 'input', 'seat': 'hv0', 'keys': [1, 0, 0, 0]})
+        await socket.send_json({'type': 'ping', 't': 5.5})
+        async for message in socket:
+            if message.type is WSMsgType.TEXT:
+                assert json.loads(message.data) == {'type': 'pong', 't': 5.5}
+                break
+        assert running.backend.commands[-1] == ('c1', {
+            'type': 'input', 'seat': 'hv0', 'keys': [True, False, False, False],
+            'reverse': False})
+        await socket.close()
+
+
+@in_loop
+async def test_a_request_that_takes_long_does_not_hold_up_inputs() -> None:
+    async with cockpit() as running:
+        socket = await running.join()
+        running.backend.held.clear()
+        await socket.send_json({'type': 'trigger', 'event': 'slow', 'id': 1})
+        await socket.send_json({'type': 'control', 'action': 'start', 'id': 2})
+        await socket.send_json({'type': 'input', 'seat': 'hv0', 'away': True})
+        await wait_until(lambda: len(running.backend.commands) == 2, 'the input')
+        assert [message['type'] for _, message in running.backend.commands] == [
+            'trigger', 'input']
+        running.backend.held.set()
+        # Requests are answered in their order.
+        assert [(await next_text(socket, 'reply'))['to'] for _ in range(2)] == [1, 2]
+        await socket.close()
+
+
+@in_loop
+async def test_a_request_is_finished_though_its_page_has_gone() -> None:
+    async with cockpit() as running:
+        socket = await running.join()
+        running.backend.held.clear()
+        for number in range(2):
+            await socket.send_json({'type': 'trigger', 'event': f'{number}', 'id': number})
+        await wait_until(lambda: len(running.backend.commands) == 1, 'the first')
+        await socket.close()
+        await wait_until(lambda: running.backend.gone == ['c1'], 'the end')
+        running.backend.held.set()
+        await asyncio.sleep(0.05)
+        assert len(running.backend.commands) == 1
+
+
+@in_loop
+async def test_too_many_waiting_requests_are_refused_one_by_one() -> None:
+    async with cockpit() as running:
+        socket = await running.join()
+        running.backend.held.clear()
+        await socket.send_json({'type': 'trigger', 'event': 'slow', 'id': 0})
+        await wait_until(lambda: len(running.backend.commands) == 1, 'the first')
+        for number in range(1, session.MAX_REQUESTS + 2):
+            await socket.send_json({'type': 'claim', 'seat': 'hv0', 'id': number})
+        reply = await next_text(socket, 'reply')
+        assert (reply['to'], reply['ok']) == (session.MAX_REQUESTS + 1, False)
+        running.backend.held.set()
+        assert (await next_text(socket, 'reply'))['ok']
+        await socket.close()
+
+
+@in_loop
+async def test_names_and_layers_are_kept() -> None:
+    async with cockpit() as running:
+        socket = await running.join()
+        await socket.send_json({'type': 'name', 'name': 'Ada'})
+        await socket.send_json({'type': 'layers', 'predictions': True})
+        client = running.hub.clients['c1']
+        await wait_until(lambda: client.wants_predictions, 'the layers')
+        assert client.name == 'Ada' and not running.backend.commands
+        await socket.close()
+
+
+@in_loop
+async def test_no_more_than_32_pages_are_let_in() -> None:
+    async with cockpit(backend=PumpBackend(period_s=0.1)) as running:
+        sockets = [await running.join() for _ in range(hub.MAX_CLIENTS)]
+        late = await running.join()
+        assert await close_code(late) == 1013
+        assert len(running.backend.present) == hub.MAX_CLIENTS
+        await sockets[0].close()
+        await wait_until(lambda: not running.hub.is_full, 'a free place')
+        again = await running.join()
+        await next_text(again, 'hello')
+        for socket in [*sockets[1:], again]:
+            await socket.close()
+
+
+@in_loop
+async def test_the_next_free_port_is_taken() -> None:
+    async with cockpit() as running:
+        app = create_app(PumpBackend(), Access(HOST, running.port), None)
+        runner, port = await listen(app, HOST, running.port)
+        assert running.port < port < running.port + server.PORTS_TRIED
+        assert (await get(port, '/'))[0] == 200
+        # The name of the first server with its port is not the name of the second.
+        assert (await get(port, '/', host=f'{HOST}:{running.port}'))[0] == 403
+        await runner.cleanup()
+
+
+@in_loop
+async def test_ports_that_cannot_be_used_are_an_error_and_stop_the_backend(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, 'PORTS_TRIED', 1)
+    async with cockpit() as running:
+        for host, port, message in ((HOST, running.port, 'are taken'),
+                                    ('203.0.113.1', 8000, 'cannot listen')):
+            backend = PumpBackend()
+            app = create_app(backend, Access(host, port, 'x' * 16), None)
+            with pytest.raises(InputError, match=message):
+                await listen(app, host, port)
+            assert backend.stopped
+
+
+@in_loop
+async def test_the_end_closes_every_socket_within_a_second() -> None:
+    backend = PumpBackend()
+    runner, port = await listen(create_app(backend, Access(HOST, 0), None), HOST, 0)
+    async with ClientSession() as http:
+        reading = await http.ws_connect(f'http://{HOST}:{port}/ws')
+        # This one never answers the server's farewell.
+        deaf = await http.ws_connect(f'http://{HOST}:{port}/ws', autoclose=False)
+        backend.held.clear()
+        await reading.send_json({'type': 'trigger', 'event': 'never ends', 'id': 1})
+        await wait_until(lambda: bool(backend.commands) and len(backend.present) == 2, 'both')
+        closing = asyncio.create_task(close_code(reading))
+        loop = asyncio.get_running_loop()
+        start_s = loop.time()
+        await runner.cleanup()
+        # A second is the server's; the rest is for a busy machine.
+        assert loop.time() - start_s < 2.0
+        assert await closing == 1001
+        assert sorted(backend.gone) == ['c1', 'c2'] and backend.stopped
+        await deaf.close()
+
+
+@in_loop
+async def test_a_replay_brings_its_own_routes() -> None:
+    class Replay(PumpBackend):
+        mode = 'replay'
+
+        def routes(self) -> list[web.RouteDef]:
+            async def info(_: web.Request) -> web.Response:
+                return web.json_response({'chunks': 3})
+            return [web.get('/api/replay/info', info)]
+
+    async with cockpit(backend=Replay()) as running:
+        async with running.http.get(f'{running.address}/api/replay/info') as answer:
+            assert await answer.json() == {'chunks': 3}
+        socket = await running.join()
+        assert (await next_text(socket, 'hello'))['mode'] == 'replay'
+        await socket.close()

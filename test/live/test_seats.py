@@ -1,0 +1,179 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Seats in a running graph: taken from the script, from the planner, and given back."""
+
+from collections.abc import Callable, Iterator
+import json
+
+from live_peer import Peer
+from live_support import Launcher
+import numpy as np
+import pytest
+from rclpy.publisher import Publisher
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+from steady_game import THROTTLE, write_steady_game
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.ros.messages import from_time, to_joy
+
+TOPICS = ('/clock', '/scenario/game', '/seats', '/timing/cycle', '/vehicles/state',
+          '/diagnostics', ('/<v>/driver_command', 'hv0'), ('/<av>/plan_request', 'av0'))
+# float32 represents it exactly.
+BRAKE = DriverCommand(brake=0.25)
+
+
+@pytest.fixture(scope='module')
+def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
+    """Keep one graph; every test leaves the seats as it found them."""
+    folder = tmp_path_factory.mktemp('seats')
+    with Launcher([write_steady_game(folder)], folder / 'run') as launcher, \
+            Peer(launcher.domain, *TOPICS) as peer:
+        peer.wait_until(lambda: peer.n > 30, 'n = 30')
+        yield peer
+
+
+def _seats(peer: Peer) -> dict[str, dict[str, str]]:
+    """Give what /seats says now."""
+    return json.loads(peer.messages['/seats'][-1].data) if peer.messages['/seats'] else {}
+
+
+class Taker:
+    """A driver of its own that orders a seat and commands its vehicle at every step."""
+
+    def __init__(self, peer: Peer, seat: str) -> None:
+        self.peer = peer
+        self.seat = seat
+        self._orders: Publisher = peer.publisher('/seats/order')
+        self._commands: Publisher = peer.publisher('/<v>/driver_command', seat)
+
+    def order(self, source: str, then: str) -> None:
+        """Order a source and wait until /seats names what follows from it."""
+        self._orders.publish(String(data=json.dumps({'seat': self.seat, 'source': source})))
+        self.peer.wait_until(lambda: _seats(self.peer)[self.seat]['source'] == then,
+                             f'{self.seat} driven by {then}')
+
+    def hold(self, command: DriverCommand, until: Callable[[], object], what: str,
+             source: str = 'tester') -> None:
+        """Repeat a command until something holds."""
+        def send() -> object:
+            stamp_ns = self.peer.clock_ns[-1]
+            self._commands.publish(to_joy(command, stamp_ns, source))
+            return until()
+        self.peer.wait_until(send, what)
+
+    def consumed(self) -> np.ndarray:
+        """Give the commands (R, 4) that the vehicle obeyed since the last `forget`."""
+        return self.peer.cycles().commands(self.seat)
+
+
+def _last(taker: Taker, column: int, value: float) -> bool:
+    """Tell whether the last cycle consumed this."""
+    return bool(taker.peer.messages['/timing/cycle']) and taker.consumed()[-1, column] == value
+
+
+def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
+    """The vehicle obeys who has the seat, and nobody else; its own driver falls silent."""
+    taker = Taker(peer, 'hv0')
+    assert _seats(peer)['hv0'] == {'source': 'game', 'driver': _seats(peer)['hv0']['driver']}
+    # Before the order nobody listens to a stranger.
+    peer.forget()
+    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 20, 'twenty cycles')
+    assert np.all(taker.consumed()[:, :2] == (THROTTLE, 0.0))
+    taker.order('tester', 'tester')
+    taker.hold(BRAKE, lambda: _last(taker, 1, 0.25), 'the brake of the one who has the seat')
+    peer.forget()
+    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 50, 'fifty cycles')
+    assert np.all(taker.consumed()[5:, :2] == (0.0, 0.25))
+    spoken = [message.header.frame_id for message in peer.messages['/<v>/driver_command']]
+    assert 'game' not in spoken[10:]
+    taker.order('game', 'game')
+    peer.wait_until(lambda: _last(taker, 0, THROTTLE), 'the script in the seat again')
+
+
+def test_an_av_is_taken_over_and_given_back(peer: Peer) -> None:
+    """It obeys the person, its planner goes on being asked, and drives on afterwards."""
+    taker = Taker(peer, 'av0')
+    peer.wait_until(lambda: len(peer.messages['/timing/cycle']), 'a cycle')
+    assert np.isnan(taker.consumed()[-1]).all()
+    taker.order('tester', 'tester')
+    taker.hold(BRAKE, lambda: _last(taker, 1, 0.25), 'the brake of the one who took over')
+    peer.forget()
+    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 100, 'a second')
+    speeds = peer.states('av0')[:, 4]
+    # 0.25 of the pedal brake with clearly more than 0.5 m/s^2 for about a second.
+    assert speeds[-1] < speeds[0] - 0.5
+    assert np.all(np.diff(speeds) <= 1e-9)
+    assert len(peer.messages['/<av>/plan_request']) >= 8
+    taker.order('game', 'planner')
+    peer.forget()
+    peer.wait_until(lambda: len(peer.messages['/timing/cycle']) > 150, 'a second and a half')
+    assert np.isnan(taker.consumed()[5:]).all()
+    rows = peer.states('av0')
+    ways = np.hypot(np.diff(rows[:, 1]), np.diff(rows[:, 2]))
+    steps = np.diff(rows[:, 0]) * 1e-9
+    # No jump at the give-back: each way is that of the speeds around it, within 2 cm.
+    assert np.all(np.abs(ways - 0.5 * (rows[1:, 4] + rows[:-1, 4]) * steps) < 0.02)
+
+
+def test_a_taker_who_falls_silent_is_braked(peer: Peer) -> None:
+    """The watchdog of the seat holds for whoever sits in it: released, then 0.15 of the brake."""
+    taker = Taker(peer, 'hv0')
+    taker.order('tester', 'tester')
+    taker.hold(DriverCommand(throttle=0.5), lambda: _last(taker, 0, 0.5), 'half the throttle')
+    peer.forget()
+    peer.wait_until(lambda: _last(taker, 1, float(np.float32(0.15))), 'the gentle brake')
+    assert taker.consumed()[-1, 0] == 0.0
+    taker.order('game', 'game')
+    peer.wait_until(lambda: _last(taker, 0, THROTTLE), 'the script in the seat again')
+
+
+def test_orders_that_make_no_sense_change_nothing(peer: Peer) -> None:
+    """No such seat, no such source, no JSON: /seats stays, the run goes on."""
+    before = _seats(peer)
+    orders = peer.publisher('/seats/order')
+    for text in ('{', '[]', '{"seat": "hv9", "source": "x"}', '{"seat": "hv0", "source": 7}',
+                 '{"seat": "hv0", "source": ""}', '{"seat": "hv0", "source": "planner"}',
+                 json.dumps({'seat': 'hv0', 'source': 'x' * 41}), '[' * 100_000):
+        orders.publish(String(data=text))
+    n = peer.n
+    peer.wait_until(lambda: peer.n > n + 50, 'half a second')
+    assert _seats(peer) == before
+
+
+def test_seats_outlive_a_reset(peer: Peer) -> None:
+    """Who drives goes on driving in the next epoch."""
+    taker = Taker(peer, 'hv0')
+    taker.order('tester', 'tester')
+    epoch = peer.games[-1].epoch
+    assert peer.call('/sim/reset').success
+    peer.wait_until(lambda: peer.games[-1].epoch > epoch and peer.n > 5, 'a new epoch')
+    assert _seats(peer)['hv0']['source'] == 'tester'
+    taker.hold(BRAKE, lambda: _last(taker, 1, 0.25), 'the brake of the one who has the seat')
+    taker.order('game', 'game')
+
+
+def test_planner_stop_and_go(peer: Peer) -> None:
+    """A stopped planner gets no request; told to go, it plans again."""
+    client = peer.node.create_client(SetBool, '/av0/planner_run')
+    peer.wait_until(client.service_is_ready, 'the service')
+
+    def order(run: bool) -> None:
+        future = client.call_async(SetBool.Request(data=run))
+        peer.wait_until(future.done, 'its answer')
+        assert future.result().success
+
+    order(False)
+    n = peer.n
+    peer.wait_until(lambda: peer.n > n + 30, 'three ticks')
+    peer.forget()
+    peer.wait_until(lambda: peer.n > n + 100, 'seven ticks')
+    assert not peer.messages['/<av>/plan_request']
+    peer.wait_until(lambda: peer.statuses('sim_node: av0 plans')[-1:]
+                    and peer.statuses('sim_node: av0 plans')[-1][1]['running'] == 'False',
+                    'a report that the planner is stopped')
+    order(True)
+    peer.wait_until(lambda: len(peer.messages['/<av>/plan_request']) > 3, 'requests again')
+    stamps = [from_time(m.header.stamp) for m in peer.messages['/<av>/plan_request']]
+    assert stamps == sorted(stamps)
+    peer.node.destroy_client(client)

@@ -1,0 +1,108 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The planners of one AV: who is in office, on which roads, after which events."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import pytest
+
+from crgame_ros.errors import InputError, PlanningError
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.planner.crew import PlannerCrew
+from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.path_planner import initial_state
+from crgame_ros.scenario.events import EventSpec, PlannerSwap, SpeedLimit
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+
+TOWN = 50.0 / 3.6
+SLOW = EventSpec('slow', SpeedLimit(5.0))
+SWAP = EventSpec('swap', PlannerSwap('av0', f'{__file__}:Witness', {'name_tag': 'b'}))
+ELSEWHERE = EventSpec('elsewhere', PlannerSwap('av1', 'no-such-planner'))
+FAILING = EventSpec('failing', PlannerSwap('av0', f'{__file__}:Witness', {'name_tag': 'bad'}))
+
+
+class Witness(Planner):
+    """Remembers the limits of lanelet 11 that it was set up with; one tag fails."""
+
+    name: ClassVar[str] = 'witness'
+
+    def __init__(self, name_tag: str = 'a') -> None:
+        self.name_tag = name_tag
+        self.limits: list[float | None] = []
+
+    def setup(self, context: PlannerContext) -> None:
+        """Read the limit."""
+        if self.name_tag == 'bad':
+            raise PlanningError('no way')
+        self.limits.append(RoadNetwork(context.scenario.lanelet_network).speed_limit(11))
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Find nothing: not asked here."""
+        raise PlanningError('none')
+
+
+@pytest.fixture(scope='module')
+def context() -> PlannerContext:
+    """Give a planner the street of the crossing."""
+    loaded = load_scenario(scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml')
+    return PlannerContext('av0', loaded.scenario, loaded.planning_problems[0],
+                          load_vehicle_parameters('bmw_320i'), {}, 0.1)
+
+
+def crew_of(context: PlannerContext, *events: EventSpec) -> PlannerCrew:
+    """Begin with witness a."""
+    return PlannerCrew(context, f'{__file__}:Witness', {'name_tag': 'a'}, events)
+
+
+def present(crew: PlannerCrew) -> tuple[str, list[float | None]]:
+    """Tell who is in office, and which limits it was set up with."""
+    planner = crew.adapter.planner
+    return planner.name_tag, [round(limit, 3) for limit in planner.limits]
+
+
+def test_in_office_and_after_each_event(context: PlannerContext) -> None:
+    """Whatever comes first, the planner in office knows the limit that holds."""
+    town = round(TOWN, 3)
+    crew = crew_of(context, SLOW, SWAP, ELSEWHERE)
+    assert present(crew) == ('a', [town])
+    assert crew.apply(['slow']) == ['speed limit 5 m/s']
+    assert present(crew) == ('a', [town, 5.0])
+    assert crew.apply(['slow', 'elsewhere', 'swap']) == [f'planner {__file__}:Witness']
+    assert present(crew) == ('b', [town, 5.0])
+    assert crew.apply(['slow', 'elsewhere', 'swap']) == []
+    other = crew_of(context, SLOW, SWAP)
+    # Set up before the run, once: the swap itself costs nothing.
+    other.apply(['swap'])
+    assert present(other) == ('b', [town])
+    other.apply(['swap', 'slow'])
+    assert present(other) == ('b', [town, 5.0])
+    assert RoadNetwork(context.scenario.lanelet_network).speed_limit(11) \
+        == pytest.approx(TOWN, abs=1e-4)
+
+
+def test_answers_of_all_planners_are_counted_together(context: PlannerContext) -> None:
+    """A swap loses no count."""
+    crew = crew_of(context, SWAP)
+    request = PlanRequest(0, 0, 0.1, initial_state(context))
+    crew.plan(request)
+    crew.apply(['swap'])
+    crew.plan(replace(request, stamp_ns=100_000_000, k=1))
+    assert (crew.statistics.plans, crew.statistics.fallbacks) == (2, 2)
+    assert crew.last_reason == 'none'
+
+
+def test_failure_is_told(context: PlannerContext) -> None:
+    """A newcomer that cannot be set up answers by braking, and says why."""
+    crew = crew_of(context, FAILING)
+    assert crew.failure is None
+    assert crew.apply(['failing']) == [f'planner {__file__}:Witness: setup failed: no way']
+    assert crew.plan(PlanRequest(0, 0, 0.1, initial_state(context))).fallback
+
+
+def test_unknown_planner_is_refused_before_the_run(context: PlannerContext) -> None:
+    """Not in the middle of it."""
+    with pytest.raises(InputError, match='there is no planner "ghost"'):
+        crew_of(context, EventSpec('swap', PlannerSwap('av0', 'ghost')))

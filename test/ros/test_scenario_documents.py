@@ -1,0 +1,95 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Documents are given once they belong together, in whatever order they come."""
+
+from dataclasses import replace
+from itertools import permutations
+
+from live_support import SCENARIOS
+import pytest
+
+from crgame_ros.errors import InputError
+from crgame_ros.ros.scenario_documents import DocumentCollector, KINDS
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.documents import game_document, objects_document
+from crgame_ros.simulation.setup import build_setup
+
+
+def _texts(game: str, epoch: int = 0) -> dict[str, str]:
+    setup = build_setup(load_game(SCENARIOS / f'{game}.yaml'))
+    return {'xml': setup.loaded.xml_text, 'objects': objects_document(setup.descriptions),
+            'game': game_document(setup, epoch=epoch, clock_offset_ns=epoch * 10 ** 9,
+                                  real_time_factor=1.0)}
+
+
+@pytest.fixture(scope='module')
+def cut_in() -> dict[str, str]:
+    """Give the documents of a game of hv0 and av0."""
+    return _texts('cut_in')
+
+
+@pytest.fixture(scope='module')
+def two_avs() -> dict[str, str]:
+    """Give the documents of a game of hv0, av0 and av1 in another scenario."""
+    return _texts('two_avs')
+
+
+@pytest.mark.parametrize('order', permutations(KINDS), ids='-'.join)
+def test_a_set_is_given_once(order: tuple[str, ...], cut_in: dict[str, str]) -> None:
+    """With the third document, and not again when the same text comes again."""
+    collector = DocumentCollector()
+    for kind in order:
+        assert collector.complete() is None
+        collector.take(kind, cut_in[kind])
+    documents = collector.complete()
+    assert documents is not None
+    assert [item.id for item in documents.driven] == ['hv0', 'av0']
+    assert documents.others == ()
+    assert documents.loaded.sha256 == documents.game.scenario_sha256
+    assert documents.texts == cut_in
+    collector.take('game', cut_in['game'])
+    assert collector.complete() is None
+
+
+@pytest.mark.parametrize('order', permutations(KINDS), ids='-'.join)
+def test_a_new_game_never_mixes_with_the_old(
+        order: tuple[str, ...], cut_in: dict[str, str], two_avs: dict[str, str]) -> None:
+    """Text, objects and game of the new scenario count together only."""
+    collector = DocumentCollector()
+    for kind, text in cut_in.items():
+        collector.take(kind, text)
+    assert collector.complete() is not None
+    for kind in order[:2]:
+        collector.take(kind, two_avs[kind])
+        assert collector.complete() is None
+    collector.take(order[2], two_avs[order[2]])
+    documents = collector.complete()
+    assert documents is not None
+    assert [item.id for item in documents.driven] == ['hv0', 'av0', 'av1']
+
+
+def test_a_reset_does_not_read_the_same_scenario_again(cut_in: dict[str, str]) -> None:
+    """The game of the next epoch is a new set with the scenario that was read already."""
+    collector = DocumentCollector()
+    for kind, text in cut_in.items():
+        collector.take(kind, text)
+    first = collector.complete()
+    collector.take('game', _texts('cut_in', epoch=1)['game'])
+    second = collector.complete()
+    assert first is not None
+    assert second is not None
+    assert (first.game.epoch, second.game.epoch) == (0, 1)
+    assert second.loaded is first.loaded
+    assert replace(second, game=first.game, texts=first.texts) == first
+
+
+def test_what_cannot_be_read_is_said(cut_in: dict[str, str]) -> None:
+    """The error names the topic; the right text afterwards mends it."""
+    collector = DocumentCollector()
+    for kind, text in cut_in.items():
+        collector.take(kind, text)
+    collector.take('objects', '[{}]')
+    with pytest.raises(InputError, match='/scenario/objects'):
+        collector.complete()
+    collector.take('objects', cut_in['objects'])
+    assert collector.complete() is not None

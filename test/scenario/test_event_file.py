@@ -1,0 +1,164 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The list `events` of game files: every key, every refusal, written and read again."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from crgame_ros.errors import InputError
+from crgame_ros.scenario.event_file import (
+    document_entry,
+    MAX_EVENTS,
+    parse_document_entries,
+    parse_events,
+)
+from crgame_ros.scenario.events import (
+    ACTIONS,
+    AtStep,
+    AtTime,
+    Between,
+    Brake,
+    EventSpec,
+    Near,
+    PlanDisplay,
+    PlannerRun,
+    PlannerSwap,
+    PutObstacle,
+    Release,
+    SpeedLimit,
+)
+from crgame_ros.scenario.game_file import dump_game, load_game
+
+EVENTS = """\
+scenario: map/road.xml
+events:
+  - name: pedestrian
+    label: Release the pedestrian
+    release: {object: 42}
+    when: {time: 5}
+  - name: leader_brakes
+    brake: {object: 43}
+    when: {between: [hv0, o42], distance: 20.0}
+  - name: roadworks-2
+    obstacle: {x: 1.0, y: 2.0, yaw: 0.5, length: 3.0, width: 0.5, type: parkedVehicle}
+    when: {vehicle: hv0, x: 1.0, y: -2.0, radius: 30.0}
+  - name: slow
+    speed_limit: {speed: 8.3, lanelets: [3, 4]}
+  - name: slow-everywhere
+    speed_limit: {speed: 8.3}
+  - name: blank
+    plan_display: {av: av0, show: false}
+  - name: swap
+    planner: {av: av0, planner: own.py:Mine, options: {v0: 9.0}}
+  - name: silence
+    planner_run: {av: av0, run: false}
+    when: {step: 77}
+"""
+
+
+def event(text: str, folder: Path = Path()) -> EventSpec:
+    """Read one event from the flow form of its entry."""
+    (found,) = parse_events([yaml.safe_load(text)], 'game.yaml: events', folder)
+    return found
+
+
+def test_every_key(tmp_path: Path) -> None:
+    """Each value arrives where it belongs; a planner's file is relative to the game file."""
+    path = tmp_path / 'game.yaml'
+    path.write_text(EVENTS)
+    assert load_game(path).events == (
+        EventSpec('pedestrian', Release(42), 'Release the pedestrian', AtTime(5.0)),
+        EventSpec('leader_brakes', Brake(43, 4.0, 0.0), 'leader_brakes',
+                  Between(('hv0', 'o42'), 20.0)),
+        EventSpec('roadworks-2', PutObstacle(1.0, 2.0, 0.5, 3.0, 0.5, 'parkedVehicle'),
+                  'roadworks-2', Near('hv0', 1.0, -2.0, 30.0)),
+        EventSpec('slow', SpeedLimit(8.3, (3, 4)), 'slow'),
+        EventSpec('slow-everywhere', SpeedLimit(8.3), 'slow-everywhere'),
+        EventSpec('blank', PlanDisplay('av0', False), 'blank'),
+        EventSpec('swap', PlannerSwap('av0', f'{tmp_path}/own.py:Mine', {'v0': 9.0}), 'swap'),
+        EventSpec('silence', PlannerRun('av0', False), 'silence', AtStep(77)))
+
+
+def test_dumped_game_has_the_same_events(tmp_path: Path) -> None:
+    """What `game.yaml` of a run's folder gives from anywhere."""
+    path, again = tmp_path / 'game.yaml', tmp_path / 'elsewhere' / 'game.yaml'
+    path.write_text(EVENTS)
+    again.parent.mkdir()
+    again.write_text(dump_game(load_game(path)))
+    assert load_game(again).events == load_game(path).events
+
+
+def test_document_has_the_same_events(tmp_path: Path) -> None:
+    """`/scenario/game` lists them flat, with name, label and kind, as JSON."""
+    path = tmp_path / 'game.yaml'
+    path.write_text(EVENTS)
+    events = load_game(path).events
+    entries = json.loads(json.dumps([document_entry(item) for item in events]))
+    assert entries[0] == {'name': 'pedestrian', 'label': 'Release the pedestrian',
+                          'kind': 'release', 'when': {'time': 5.0}, 'object': 42}
+    assert entries[5] == {'name': 'blank', 'label': 'blank', 'kind': 'plan_display', 'when': None,
+                          'av': 'av0', 'show': False}
+    assert {entry['kind'] for entry in entries} == ACTIONS.keys()
+    assert parse_document_entries(entries, '/scenario/game') == events
+
+
+@pytest.mark.parametrize(('text', 'message'), [
+    ('7', 'is no mapping'),
+    ('{release: {object: 1}}', '"name" is None'),
+    ('{name: Big, release: {object: 1}}', "\"name\" is 'Big'; give 1 to 40"),
+    ('{name: a b, release: {object: 1}}', '"name" is'),
+    ('{name: ' + 'x' * 41 + ', release: {object: 1}}', '"name" is'),
+    ('{name: a, label: 7, release: {object: 1}}', '"label" is 7'),
+    ('{name: a}', 'has no action; give exactly one of release, brake, obstacle'),
+    ('{name: a, release: {object: 1}, brake: {object: 1}}', r'has 2 actions \(release, brake\)'),
+    ('{name: a, explode: {}}', '"explode" is unknown; known are name'),
+    ('{name: a, release: 1}', 'is no mapping'),
+    ('{name: a, release: {}}', '"object" is missing'),
+    ('{name: a, release: {object: one}}', "\"object\" is 'one'; give a number"),
+    ('{name: a, brake: {object: 1, deceleration: 0}}', '"deceleration" is 0; give a positive'),
+    ('{name: a, brake: {object: 1, speed: -1}}', '"speed" is -1; give 0 or more'),
+    ('{name: a, obstacle: {x: 0}}', '"y" is missing'),
+    ('{name: a, obstacle: {x: 0, y: 0, width: 0}}', '"width" is 0'),
+    ('{name: a, obstacle: {x: 0, y: .nan}}', '"y" is nan'),
+    ('{name: a, obstacle: {x: 0, y: 0, type: cow}}', "\"type\" is 'cow'; use one of"),
+    ('{name: a, speed_limit: {speed: 0}}', '"speed" is 0; give a positive'),
+    ('{name: a, speed_limit: {speed: 5, lanelets: 3}}', '"lanelets" is 3; give a list'),
+    ('{name: a, speed_limit: {speed: 5, lanelets: [a]}}', '"lanelets" is'),
+    ('{name: a, plan_display: {av: av0, show: 1}}', '"show" is 1; give a bool'),
+    ('{name: a, planner: {av: av0, planner: ""}}', '"planner" is empty'),
+    ('{name: a, planner_run: {av: av0}}', '"run" is missing'),
+    ('{name: a, release: {object: 1}, when: 5}', 'when: is no mapping'),
+    ('{name: a, release: {object: 1}, when: {}}', 'has no conditions; give {time:}'),
+    ('{name: a, release: {object: 1}, when: {time: 1, step: 2}}', 'has 2 conditions'),
+    ('{name: a, release: {object: 1}, when: {vehicle: hv0, x: 0, y: 0, radius: 0}}',
+     '"radius" is 0'),
+    ('{name: a, release: {object: 1}, when: {between: [hv0, hv0], distance: 1}}', 'name two ids'),
+    ('{name: a, release: {object: 1}, when: {between: [hv0], distance: 1}}', 'name two ids'),
+], ids=range(30))
+def test_refusals_name_the_entry(text: str, message: str) -> None:
+    """Each says what is wrong with which entry, and what would be right."""
+    with pytest.raises(InputError, match=message) as caught:
+        event(text)
+    assert str(caught.value).startswith('game.yaml: events[0]')
+
+
+def test_names_are_unique_and_lists_short() -> None:
+    """A trigger names one event; a list that never ends is refused before it is read."""
+    entry = {'name': 'a', 'release': {'object': 1}}
+    with pytest.raises(InputError, match=r'events\[1\]: "a" is there already'):
+        parse_events([entry, entry], 'events', Path())
+    with pytest.raises(InputError, match=f'give {MAX_EVENTS} at most'):
+        parse_events([entry] * (MAX_EVENTS + 1), 'events', Path())
+    with pytest.raises(InputError, match='events: is no list'):
+        parse_events(entry, 'events', Path())
+
+
+@pytest.mark.parametrize('entries', [7, [7], [{'name': 'a'}], [{'name': 'a', 'kind': 'x'}]],
+                         ids=range(4))
+def test_spoilt_document_is_refused(entries: object) -> None:
+    """Whatever another process writes into `/scenario/game`."""
+    with pytest.raises(InputError, match='/scenario/game'):
+        parse_document_entries(entries, '/scenario/game')
