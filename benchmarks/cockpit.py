@@ -23,6 +23,7 @@ from urllib.parse import urlsplit
 
 from live_graph import LiveGraph, RemoteControl
 import numpy as np
+from odometry_probe import OdometryProbe
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 import websocket
@@ -43,7 +44,6 @@ addEventListener('keydown', e => keyTimes.push(performance.timeOrigin + e.timeSt
 })();
 """
 KEYS = {1.0: ('KeyA', 'a', 65), -1.0: ('KeyD', 'd', 68)}
-LIMIT_S = 1.0
 
 
 class Browser:
@@ -88,54 +88,6 @@ class Browser:
     def close(self) -> None:
         """End the browser."""
         self.driver.quit()
-
-
-class OdometryProbe:
-    """Notes when the odometry of each step arrives and how its front wheels turn."""
-
-    def __init__(self) -> None:
-        from nav_msgs.msg import Odometry
-        import rclpy
-        from rclpy.executors import SingleThreadedExecutor
-        from sensor_msgs.msg import JointState
-        self._node = rclpy.create_node('odometry_probe')
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._arrived: dict[int, float] = {}
-        self._rates: dict[int, float] = {}
-        self._kept = [
-            self._node.create_subscription(Odometry, '/hv0/odom', self._on_odom, 10),
-            self._node.create_subscription(JointState, '/hv0/joint_states', self._on_joint, 10)]
-
-    def _on_odom(self, message: Any) -> None:
-        stamp = message.header.stamp
-        self._arrived[stamp.sec * 10**9 + stamp.nanosec] = time.time()
-
-    def _on_joint(self, message: Any) -> None:
-        stamp = message.header.stamp
-        self._rates[stamp.sec * 10**9 + stamp.nanosec] = message.velocity[0]
-
-    def listen(self, seconds: float) -> None:
-        """Take what comes for a while, and forget it."""
-        until_s = time.monotonic() + seconds
-        while time.monotonic() < until_s:
-            self._executor.spin_once(timeout_sec=0.02)
-        self._arrived.clear()
-        self._rates.clear()
-
-    def wait_for_turn(self, direction: float) -> tuple[int, float] | None:
-        """Give stamp [ns] and arrival [s since 1970] of the first step that turns so."""
-        until_s = time.monotonic() + LIMIT_S
-        while time.monotonic() < until_s:
-            self._executor.spin_once(timeout_sec=0.05)
-            for stamp in sorted(self._rates):
-                if self._rates[stamp] * direction > 0.0 and stamp in self._arrived:
-                    return stamp, self._arrived[stamp]
-        return None
-
-    def close(self) -> None:
-        """Leave the graph."""
-        self._node.destroy_node()
 
 
 def measure_keys(browser: Browser, probe: OdometryProbe, trials: int,

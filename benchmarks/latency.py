@@ -7,69 +7,34 @@ from pathlib import Path
 import random
 import tempfile
 import time
-from typing import Any
 
 from live_graph import LiveGraph, RemoteControl
 import numpy as np
+from odometry_probe import OdometryProbe
 
 from crgame_ros.paths import scenarios_directory
 
 PLANNERS = {'idm': 'p99 <= 5', 'constant-velocity': '', 'idm-package': '',
             'reactive': 'p99 <= 100'}
-LIMIT_S = 1.0
 
 
-class InputProbe:
+class InputProbe(OdometryProbe):
     """Turns a wheel left and right through an external joy device and waits for the car to."""
 
     def __init__(self) -> None:
-        from nav_msgs.msg import Odometry
-        import rclpy
-        from rclpy.executors import SingleThreadedExecutor
-        from sensor_msgs.msg import JointState, Joy
+        super().__init__()
+        from sensor_msgs.msg import Joy
         self._joy = Joy
-        self._node = rclpy.create_node('input_probe')
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._publisher = self._node.create_publisher(Joy, '/hv0/joy', 10)
-        self._received: dict[int, float] = {}
-        self._rates: dict[int, float] = {}
-        self._kept = [
-            self._node.create_subscription(Odometry, '/hv0/odom', self._on_odom, 10),
-            self._node.create_subscription(JointState, '/hv0/joint_states', self._on_joint, 10)]
-
-    def _on_odom(self, message: Any) -> None:
-        stamp = message.header.stamp
-        self._received[stamp.sec * 10**9 + stamp.nanosec] = time.monotonic()
-
-    def _on_joint(self, message: Any) -> None:
-        stamp = message.header.stamp
-        self._rates[stamp.sec * 10**9 + stamp.nanosec] = message.velocity[0]
+        self._publisher = self.node.create_publisher(Joy, '/hv0/joy', 10)
 
     def turn(self, direction: float) -> float | None:
         """Turn the wheel; give the time until the odometry of a step that turns with it [s]."""
-        self._received.clear()
-        self._rates.clear()
         # Axes of the generic gamepad: left stick first; triggers rest at 1.
         message = self._joy(axes=[direction, 0.0, 1.0, 0.0, 0.0, 1.0], buttons=[0] * 11)
-        sent = time.monotonic()
+        sent_s = time.time()
         self._publisher.publish(message)
-        while time.monotonic() < sent + LIMIT_S:
-            self._executor.spin_once(timeout_sec=0.05)
-            for stamp, rate in self._rates.items():
-                if rate * direction > 0.0 and stamp in self._received:
-                    return self._received[stamp] - sent
-        return None
-
-    def idle(self, duration_s: float) -> None:
-        """Let messages pass."""
-        until = time.monotonic() + duration_s
-        while time.monotonic() < until:
-            self._executor.spin_once(timeout_sec=0.002)
-
-    def close(self) -> None:
-        """Leave the graph."""
-        self._node.destroy_node()
+        found = self.wait_for_turn(direction)
+        return None if found is None else found[1] - sent_s
 
 
 def input_latency(folder: Path, turns: int) -> None:
@@ -80,12 +45,12 @@ def input_latency(folder: Path, turns: int) -> None:
         control.wait_until_running()
         control.deafen()
         probe = InputProbe()
-        probe.idle(2.0)
+        probe.listen(2.0)
         generator = random.Random(1)
         times, lost = [], 0
         for turn in range(turns):
             # Any phase of the cycle, and long enough for the wheels to turn back and forth.
-            probe.idle(0.1 + generator.random() * 0.05)
+            probe.listen(0.1 + generator.random() * 0.05)
             answer = probe.turn(0.5 if turn % 2 else -0.5)
             lost += answer is None
             times += [] if answer is None else [answer * 1e3]

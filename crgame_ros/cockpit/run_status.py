@@ -90,7 +90,8 @@ class RunStatus:
         elif node == 'planner_node':
             # An event may have changed the planner that the game names.
             self._planner(vehicle).update(
-                planner=values.get('planner', ''), plan_time_ms=_number(values.get('plan_time_ms')),
+                planner=values.get('planner', ''),
+                plan_time_ms=_number(values.get('plan_time_ms')),
                 fallbacks=_number(values.get('fallbacks')))
         elif node == 'sim_node' and rest == 'seat':
             self.seats_lost[vehicle] = level != OK

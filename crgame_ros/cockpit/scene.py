@@ -27,6 +27,8 @@ Points = NDArray[np.float64]
 # Bounds lose vertices that the eye would not miss [m]; neighbours share theirs, and keep so.
 _TOLERANCE = 0.01
 _DECIMALS = 3
+# A hole in the road that is narrower is a gap of the map [m].
+_GAP_WIDTH = 0.8
 # Shown around the vehicles where a scenario has no roads at all [m].
 _EMPTY_MARGIN = 50.0
 
@@ -48,7 +50,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'id': game.scenario_sha256[:16], 'benchmark_id': loaded.benchmark_id,
         'title': str(content.get('title') or loaded.benchmark_id),
         'bounds': _bounds(network, game),
-        'lanelets': _lanelets(network),
+        'lanelets': _lanelets(network), 'gaps': _gaps(network),
         'stop_lines': _stop_lines(network), 'lights': _lights(network),
         'signs': _signs(network),
         'vehicles': [*(_vehicle(entry, 'human') for entry in game.humans),
@@ -95,6 +97,22 @@ def _lanelet(lanelet: Lanelet, roads: RoadNetwork, crossing: set[int]) -> Docume
         'adj_left': lanelet.adj_left, 'adj_left_same': bool(lanelet.adj_left_same_direction),
         'adj_right': lanelet.adj_right, 'adj_right_same': bool(lanelet.adj_right_same_direction),
         'successors': [int(number) for number in lanelet.successor]}
+
+
+def _gaps(network: LaneletNetwork) -> list[list[float]]:
+    """
+    Give the slits between lanelets that are no ground to the eye, only cracks in the map.
+
+    They are for display alone: whether a vehicle is on the road is not decided with them.
+    """
+    surfaces = [shapely.make_valid(shapely.Polygon(np.concatenate(
+        (lanelet.left_vertices[:, :2], lanelet.right_vertices[::-1, :2]))))
+        for lanelet in network.lanelets]
+    road = shapely.union_all(surfaces)
+    holes = [shapely.Polygon(ring) for part in getattr(road, 'geoms', [road])
+             if part.geom_type == 'Polygon' for ring in part.interiors]
+    return [_flat(np.asarray(hole.exterior.coords)[:-1, :2]) for hole in holes
+            if hole.buffer(-0.5 * _GAP_WIDTH).is_empty]
 
 
 def _stop_lines(network: LaneletNetwork) -> list[Document]:

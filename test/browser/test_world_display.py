@@ -185,3 +185,21 @@ def test_connection_that_breaks_is_taken_up_again(
                  'the connection', arguments=(clients[0],))
     t = shown(browser)['t']
     browser.wait('crgame.world.shown.t > arguments[0] + 0.3', arguments=(t,))
+
+
+def test_simulation_that_began_anew_behind_a_new_connection_is_shown(
+        run: RecordedRun, browser: Browser) -> None:
+    with served(RunBackend(run)) as page:
+        browser.open(page.address)
+        browser.wait('window.crgame?.ready && crgame.world.shown')
+        page.backend.epoch, page.backend.n = 2, 150
+        page.call(page.backend.send_now)
+        browser.wait('crgame.world.shown.epoch === 2 && crgame.world.shown.n === 150')
+        # Late frames of an epoch that is over stay hidden, as long as the connection lives.
+        page.backend.epoch = 0
+        page.call(page.backend.send_now)
+        time.sleep(0.3)
+        assert shown(browser)['epoch'] == 2
+        page.backend.n = 0
+        browser.run('crgame.connection.interrupt()')
+        browser.wait('crgame.world.shown.epoch === 0 && crgame.world.shown.n === 0')

@@ -80,7 +80,7 @@ class RunBackend:
         hub.set_document('scene', self.run.scene)
         hub.set_document('seats', {'seats': {}})
         self._status()
-        self._send()
+        self.send_now()
         self._tasks.add(asyncio.create_task(self._pump()))
 
     async def stop(self) -> None:
@@ -103,13 +103,13 @@ class RunBackend:
                 self.n, self.epoch = 0, self.epoch + 1
                 time_entry = self.run.scene['time'] | {'epoch': self.epoch}
                 self.hub.set_document('scene', self.run.scene | {'time': time_entry})
-                self._send()
+                self.send_now()
         self._status()
         return 'done'
 
     def joined(self, client: Client) -> None:
         client.drives = True
-        self._send()
+        self.send_now()
 
     def left(self, client: Client) -> None:
         pass
@@ -141,7 +141,8 @@ class RunBackend:
             frames = self._frames()
             asyncio.get_running_loop().call_later(late_s, self._deliver, frames)
 
-    def _send(self) -> None:
+    def send_now(self) -> None:
+        """Send the state and the objects of this moment."""
         self._deliver(self._frames(everything=True))
 
     def _deliver(self, frames: dict[str, bytes]) -> None:

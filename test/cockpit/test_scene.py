@@ -116,6 +116,20 @@ def test_speed_limits_markings_and_neighbours() -> None:
                 line(entry['left']), line(other['left'])) < 2 * TOLERANCE_M
 
 
+def test_gaps_are_narrow_holes_between_lanelets_and_nothing_of_them() -> None:
+    setup = build_setup(load_game(scenarios_directory() / 'intersection.yaml'))
+    gaps = [shapely.Polygon(np.reshape(gap, (-1, 2))) for gap in document_of(setup)['gaps']]
+    surfaces = shapely.union_all([
+        shapely.Polygon(np.concatenate((x.left_vertices[:, :2], x.right_vertices[::-1, :2])))
+        for x in setup.loaded.scenario.lanelet_network.lanelets])
+    # Four left turns each leave slits beside the lanes that they cross.
+    assert len(gaps) >= 4
+    for gap in gaps:
+        assert gap.buffer(-0.4).is_empty
+        assert shapely.intersection(gap, surfaces).area < 0.01
+        assert shapely.Polygon(surfaces.exterior).covers(gap.centroid)
+
+
 def test_lights_and_stop_lines_lie_at_their_lanes(shared_scenarios: Path) -> None:
     setup = published(shared_scenarios, 'USA_Lanker-1_3_T-1')
     document = document_of(setup)

@@ -303,7 +303,7 @@ def test_the_next_port_is_taken_when_one_is_in_use(tmp_path: Path) -> None:
                        '--duration', '1'], tmp_path / 'run', headless=False) as launcher:
             page = launcher.page
             assert urlsplit(page).port != port
-            assert launcher.says(f'port {port} is taken')
+            launcher.wait_for(f'port {port} is taken')
             with PageClient(page) as client:
                 wait_until(lambda: client.documents.get('status', {}).get('run') == 'paused',
                            'the run to wait')

@@ -41,6 +41,8 @@ export class Store {
   steps = new SampleRing(RAW_STEPS);
   clock = new DisplayClock();
 
+  // After each hello, until the first state: it may be another simulation, which began anew.
+  #fresh = true;
   #listeners = new Map();
   #history = new SampleRing(HISTORY_S / HISTORY_SPACING_S, HISTORY_SPACING_S);
   #shown = {
@@ -75,10 +77,12 @@ export class Store {
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
         this.version = message.version;
+        this.#fresh = true;
         break;
       case 'scene':
         this.scene = message;
-        if ((message.time?.epoch ?? -1) > this.epoch) {
+        if ((message.time?.epoch ?? -1) > this.epoch
+            || (this.#fresh && message.time?.epoch < this.epoch)) {
           this.restart(message.time.epoch);
         }
         break;
@@ -103,12 +107,14 @@ export class Store {
    */
   receiveFrame(buffer, now_ms) {
     const frame = decodeFrame(buffer);
-    if (frame === null || frame.epoch < this.epoch) {
+    if (frame === null || (frame.epoch < this.epoch && !this.#fresh)) {
       return;
     }
-    if (frame.epoch > this.epoch) {
+    const wentBack = this.#fresh && frame.kind === KIND.STATE && frame.n < this.latest?.n;
+    if (frame.epoch !== this.epoch || wentBack) {
       this.restart(frame.epoch);
     }
+    this.#fresh &&= frame.kind !== KIND.STATE;
     this.#shownFor_ms = NaN;
     switch (frame.kind) {
       case KIND.STATE: this.#takeState(frame, now_ms); break;

@@ -13,6 +13,7 @@ const NO_STATUS = {
 };
 // The status of so long before a jump is told again, for the plots of it [s].
 const PAST_STATUS_S = 120;
+const PAST_SPACING_S = 0.9;
 
 /** Sets the store's documents as the time moves, forward and back. */
 export class ReplayDocuments {
@@ -61,8 +62,13 @@ export class ReplayDocuments {
    * @param {object} now as in `show`
    */
   tellPast(now) {
-    const times = (this.#info.documents.planners ?? this.#info.documents.timing ?? [])
-      .map(([t]) => t).filter((t) => t > now.t - PAST_STATUS_S && t < now.t);
+    const { planners, timing } = this.#info.documents;
+    const times = [];
+    for (const [t] of planners ?? timing ?? []) {
+      if (t > now.t - PAST_STATUS_S && t < now.t && !(t < times.at(-1) + PAST_SPACING_S)) {
+        times.push(t);
+      }
+    }
     const { dt_s, steps_per_tick, k0 } = this.#info;
     for (const t of times) {
       const n = Math.round(t / dt_s);

@@ -210,13 +210,13 @@ export class Camera {
       ratio * this.toX(x, y), ratio * this.toY(x, y));
   }
 
-  /** Let a context draw in metres in the frame of a pose, x forward, enlarged by a factor. */
-  enterPose(context, ratio, x, y, yaw, factor = 1) {
+  /** Let a context draw in metres at a pose, x forward; enlarged, and shifted down [px]. */
+  enterPose(context, ratio, x, y, yaw, factor = 1, down = 0) {
     const cos = ratio * factor * Math.cos(yaw);
     const sin = ratio * factor * Math.sin(yaw);
     context.setTransform(this.a * cos + this.c * sin, this.b * cos + this.d * sin,
       this.c * cos - this.a * sin, this.d * cos - this.b * sin,
-      ratio * this.toX(x, y), ratio * this.toY(x, y));
+      ratio * this.toX(x, y), ratio * (this.toY(x, y) + down));
   }
 
   #driverScale(speed = 0) {

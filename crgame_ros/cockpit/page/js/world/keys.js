@@ -2,20 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Keys of the world; those that drive (W A S D, arrows, space, R) are none of them. */
 
+import { isTyping } from '../driving/focus.js';
+
 const ZOOM_STEP = 1.25;
 const TURN_STEP = Math.PI / 12;
-
-/**
- * Tell whether a key event belongs to a field in which somebody writes.
- *
- * @param {KeyboardEvent} event any key event
- * @returns {boolean} true in text fields, selections and editable text
- */
-export function isTyping(event) {
-  const target = event.target;
-  return target instanceof HTMLElement && (
-    target.isContentEditable || ['INPUT', 'TEXTAREA', 'SELECT'].includes(target.tagName));
-}
 
 /**
  * Let keys move the camera.
@@ -37,7 +27,7 @@ export function attachKeys(actions) {
     l: () => actions.toggleLabels(),
   };
   const pressed = (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) {
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
       return;
     }
     const action = bindings[event.key.toLowerCase()];

@@ -23,6 +23,7 @@ const GOAL_DASH = [1.2, 0.8];
 export class MapLayer {
   #chunks = [];
   #visible = [];
+  #gaps = [];
   #stops = [];
   #goals = [];
 
@@ -35,6 +36,7 @@ export class MapLayer {
   load(scene) {
     this.#chunks = buildChunks(scene);
     this.#stops = scene.stop_lines.map(({ points }) => local(points, addLine));
+    this.#gaps = (scene.gaps ?? []).map((gap) => local(gap, addPolygon));
     this.#goals = scene.goals.flatMap(({ polygons }) =>
       polygons.map((polygon) => local(polygon, addPolygon)));
   }
@@ -93,6 +95,15 @@ export class MapLayer {
         context.stroke(chunk.casing);
       }
       context.globalAlpha = 1;
+    }
+    context.fillStyle = palette.junction;
+    context.strokeStyle = palette.junction;
+    for (const gap of this.#gaps) {
+      if (camera.seesBox(gap.box)) {
+        camera.enterMap(context, ratio, gap.x, gap.y);
+        context.fill(gap.path);
+        context.stroke(gap.path);
+      }
     }
     // Slits of a few centimetres between neighbours close under a thin stroke.
     context.lineWidth = Math.max(WIDTH.slit, (1 - kerbs) * ROAD_PX / camera.scale);

@@ -11,8 +11,8 @@ const BAR_COLOR = { red: '#ff4b3e', redYellow: '#ff8f2e', yellow: '#ffc933', gre
 const BAR_M = 0.35;
 const LONGEST_BAR_M = 15;
 const LAMP_M = 0.32;
-const LAMP_PX = [3, 9];
-const HIDDEN_BELOW = 0.8;
+const LAMP_REM = [0.17, 0.7];
+const HIDDEN_BELOW = 1.2;
 
 /** The lights of the scene and their states. */
 export class SignalLayer {
@@ -53,7 +53,8 @@ export class SignalLayer {
     if (camera.scale < HIDDEN_BELOW) {
       return;
     }
-    const radius = Math.min(Math.max(LAMP_M * camera.scale, LAMP_PX[0]), LAMP_PX[1]);
+    const radius = Math.min(Math.max(LAMP_M * camera.scale, LAMP_REM[0] * palette.rem_px),
+      LAMP_REM[1] * palette.rem_px);
     for (const light of this.#lights) {
       if (!camera.sees(light.x, light.y, 0)) {
         continue;

@@ -7,7 +7,7 @@ import { lookOf, TYRE } from './vehicle_shape.js';
 
 // Far out, things stay this long on the screen [px]: driven vehicles, people
 // on foot or bicycles, and all others.
-const LEAST_PX = { driven: 15, vulnerable: 10, other: 5 };
+const LEAST_PX = { driven: 15, vulnerable: 14, other: 6 };
 // Below this length on the screen a thing is its body only [px].
 const DETAIL_PX = 13;
 const BRAKE_PEDAL = 0.02;
@@ -146,18 +146,16 @@ function drawLook(context, { camera, palette, ratio }, thing, x, y, yaw, braking
   const { look } = thing;
   const factor = Math.max(1, leastPx / (look.extent * camera.scale));
   const detailed = look.extent * camera.scale > DETAIL_PX;
-  camera.enterPose(context, ratio, x, y, yaw, factor);
   if (detailed) {
-    const { a, b, c, d, e, f } = context.getTransform();
-    context.setTransform(a, b, c, d, e + ratio, f + SHADOW_PX * ratio);
+    camera.enterPose(context, ratio, x, y, yaw, factor, SHADOW_PX);
     context.fillStyle = palette.shadow;
     context.fill(look.body);
-    camera.enterPose(context, ratio, x, y, yaw, factor);
   }
+  camera.enterPose(context, ratio, x, y, yaw, factor);
   context.fillStyle = palette[thing.color];
   context.fill(look.body);
   context.strokeStyle = palette.outline;
-  context.lineWidth = 1 / (camera.scale * factor);
+  context.lineWidth = (detailed ? 1 : 0.6) / (camera.scale * factor);
   context.stroke(look.body);
   if (look.glass !== null && detailed) {
     context.fillStyle = palette.glass;
