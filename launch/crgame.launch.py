@@ -40,10 +40,12 @@ def nodes(context: LaunchContext) -> list:
         parameters=[{'game': value('game'), 'wait_for': waiting}])
     end = RegisterEventHandler(OnProcessExit(
         target_action=simulation, on_exit=[EmitEvent(event=Shutdown(reason='the game ended'))]))
-    # Nobody waits for it: it draws for people.
+    # Nobody waits for these: they draw for people.
     markers = Node(package='crgame_ros', executable='marker_node', respawn=True,
                    prefix='nice -n 10')
-    return [*companions, simulation, markers, end]
+    cockpit = Node(package='crgame_ros', executable='cockpit_node', output='screen', respawn=True,
+                   prefix='nice -n 5', parameters=[{'port': int(value('port'))}])
+    return [*companions, simulation, markers, cockpit, end]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -52,5 +54,6 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument('game', default_value='', description='game file'),
         DeclareLaunchArgument('humans', default_value='hv0', description='humans of the game'),
         DeclareLaunchArgument('avs', default_value='av0', description='AVs of the game'),
+        DeclareLaunchArgument('port', default_value='8080', description="of the cockpit's page"),
         DeclareLaunchArgument('bag', default_value='bag', description='folder of the recording'),
         OpaqueFunction(function=nodes)])

@@ -94,9 +94,9 @@ def encode_prediction(epoch: int, n: int, k: int, t: float, av: int, columns: Se
     count, length = futures.shape[:2]
     frame = np.empty(8 + count * (1 + length * PREDICTION_COLUMNS), _FLOAT)
     frame[:8] = (FrameKind.PREDICTION, epoch, n, k, t, av, length, count)
-    body = frame[8:].reshape(count, -1)
+    body = frame[8:].reshape(count, 1 + length * PREDICTION_COLUMNS)
     body[:, 0] = columns
-    body[:, 1:] = futures.reshape(count, -1)
+    body[:, 1:] = futures.reshape(count, length * PREDICTION_COLUMNS)
     return frame.tobytes()
 
 

@@ -242,6 +242,7 @@ class CockpitFeed:
                 self._hub.set_document(kind, content)
 
     def _poll_diagnostics(self) -> None:
+        before = self.status.run
         for slot in (self._diagnostics, *self._drivability.values()):
             while (message := slot.take()) is not None:
                 for status in message.status:
@@ -250,6 +251,9 @@ class CockpitFeed:
                                      status.message, values, self.t)
                     if status.name == 'sim_node: run':
                         self._run_heard_s = time.monotonic()
+        if self.status.run != before:
+            # The page holds its picture still in a pause: it must not learn of it late.
+            self._status_s = 0.0
 
     def _send_status(self, now_s: float) -> None:
         if self.scenario is None:

@@ -46,8 +46,8 @@ class HumanSpec:
     One human's vehicle.
 
     :param id: hv0, hv1, …
-    :param driver: where its command comes from: auto, idle, evdev[:NAME], keys:FILE, joy:FILE,
-        joy, replay:BAG.
+    :param driver: where its command comes from: auto, cockpit, idle, evdev[:NAME], keys:FILE,
+        joy:FILE, joy, replay:BAG.
     :param vehicle: name of the vehicle parameters.
     :param spawn: where it starts; None places it beside or behind the first AV.
     """

@@ -79,3 +79,9 @@ def _seconds(rows: np.ndarray) -> float:
     start = time.perf_counter()
     encode_state(1, 2, 3, 0.4, rows)
     return time.perf_counter() - start
+
+
+def test_a_prediction_of_nobody() -> None:
+    """An AV that is alone is told of nobody: eight numbers, and no more."""
+    frame = np.frombuffer(encode_prediction(0, 10, 1, 0.1, 1, (), np.empty((0, 31, 3))))
+    assert frame.tolist() == [4.0, 0.0, 10.0, 1.0, 0.1, 1.0, 31.0, 0.0]
