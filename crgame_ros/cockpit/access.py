@@ -3,9 +3,11 @@
 """Who may talk to the server: the token, the Host header and the Origin header."""
 
 from dataclasses import dataclass, replace
+import errno
 import hmac
 import ipaddress
 import secrets
+import socket
 from urllib.parse import urlsplit
 
 from crgame_ros.errors import InputError
@@ -103,6 +105,27 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def check_address(host: str, port: int) -> None:
+    """
+    Find out whether this machine can listen there, before anything is started.
+
+    :param port: it may be taken: the next free one will do.
+    :raises InputError: if the address is not this machine's or the port is not for everybody.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise InputError(f'cannot listen ({error.strerror})', f'{host}:{port}',
+                             'choose another address or port') from error
+    except ValueError as error:
+        raise InputError('is no address', host[:80], 'give one of this machine') from error
 
 
 def new_token() -> str:

@@ -82,7 +82,11 @@ class Library:
                  reader: ScenarioReader | None = None,
                  max_upload_bytes: int = guard.MAX_BYTES) -> None:
         self.max_upload_bytes = max_upload_bytes
-        self._folders = tuple((name, path.resolve()) for name, path in folders)
+        # A folder that is given twice is shown once, by its first name.
+        names: dict[Path, str] = {}
+        for name, path in folders:
+            names.setdefault(path.resolve(), name)
+        self._folders = tuple((name, path) for path, name in names.items())
         self._uploads = uploads.resolve()
         self._games = games.resolve()
         self._reader = reader if reader is not None else ScenarioReader()

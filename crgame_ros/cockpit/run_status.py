@@ -78,14 +78,14 @@ class RunStatus:
             if name == known:
                 rule(level, text, values, t)
                 return
-        if name.endswith('/drivability'):
-            self._take_drivability(name.partition('/')[0], values, t)
-            return
+        owner, _, about = name.partition('/')
         node, _, subject = name.partition(': ')
         vehicle, _, rest = subject.partition(' ')
-        if vehicle not in self._vehicles:
+        if owner in self._vehicles and about == 'drivability':
+            self._take_drivability(owner, values, t)
+        elif vehicle not in self._vehicles:
             return
-        if node == 'sim_node' and rest == 'plans':
+        elif node == 'sim_node' and rest == 'plans':
             self._take_plans(vehicle, level, text, values, t)
         elif node == 'planner_node':
             # An event may have changed the planner that the game names.

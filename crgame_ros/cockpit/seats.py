@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who in the browser holds which seat, and what their hands make of it."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
+import json
 from pathlib import PurePath
+import re
 from typing import Any
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
@@ -14,6 +16,7 @@ from crgame_ros.errors import InputError
 
 # A page repeats its input every 50 ms; silent for longer, it counts as gone [s].
 SILENCE_S = 0.2
+_VEHICLE = re.compile(r'(hv|av)[0-9]{1,3}')
 
 
 class HeldSeat:
@@ -31,8 +34,6 @@ class HeldSeat:
         self.id = seat_id
         self.holder = holder
         self.requests: list[str] = []
-        # Whether /seats has named the cockpit since the claim: what comes before says nothing.
-        self.granted = False
         self._cycles = KeyboardCycles()
         self._keys: KeyState | None = None
         self._axes: DriverCommand | None = None
@@ -84,6 +85,25 @@ class HeldSeat:
         return self._cycles.command(n, self._keys, dt_s)
 
 
+def parse_seats(text: str) -> dict[str, dict[str, str]]:
+    """
+    Read `/seats`.
+
+    :return: source and driver by vehicle.
+    :raises InputError: if it is not what the contract says.
+    """
+    try:
+        seats = {name: {'source': entry['source'], 'driver': entry['driver']}
+                 for name, entry in json.loads(text).items()}
+    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
+        raise InputError('is not what the contract says', '/seats') from error
+    for name, entry in seats.items():
+        if _VEHICLE.fullmatch(name) is None \
+                or not all(isinstance(value, str) for value in entry.values()):
+            raise InputError('is not what the contract says', '/seats')
+    return seats
+
+
 def _people(clients: Iterable[str], names: Mapping[str, str]) -> list[dict[str, str]]:
     return [{'client': item, 'name': names.get(item, '')} for item in clients]
 
@@ -106,14 +126,18 @@ class SeatTable:
     seats: dict[str, dict[str, str]] = field(default_factory=dict)
     held: dict[str, HeldSeat] = field(default_factory=dict)
 
-    def update(self, seats: Mapping[str, Mapping[str, str]]) -> list[HeldSeat]:
+    def update(self, seats: Mapping[str, Mapping[str, str]],
+               awaited: Container[str] = ()) -> list[HeldSeat]:
         """
         Take what `/seats` says.
 
+        :param awaited: seats about which an order is on its way: what is said of them is old.
         :return: the seats that somebody outside has taken away, which are no longer held.
         """
         self.seats = {name: dict(entry) for name, entry in seats.items()}
-        gone = [item for name, item in self.held.items() if name not in self.seats]
+        gone = [item for name, item in self.held.items()
+                if name not in self.seats or (
+                    name not in awaited and self.seats[name]['source'] != COCKPIT)]
         for item in gone:
             del self.held[item.id]
         return gone

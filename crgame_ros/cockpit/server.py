@@ -100,6 +100,8 @@ async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRun
                                      'choose another address or port') from error
             except OverflowError:
                 break
+            except UnicodeError as error:
+                raise InputError('is no address', host[:80], 'give one of this machine') from error
             else:
                 return runner, runner.addresses[0][1]
         raise InputError(f'the ports {port} to {port + PORTS_TRIED - 1} are taken', host,

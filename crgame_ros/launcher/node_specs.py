@@ -26,15 +26,18 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
                  nice=COMPANION_NICE, restart=True),
         NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
         NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True)]
-    waiting = ', '.join(f'"{spec.name}"' for spec in companions)
-    # With a driver in the browser the run begins when somebody has taken the seat.
+    viewers = _viewer_specs(plan)
+    # With a driver in the browser the run begins when somebody has taken the seat, and step 0
+    # must reach the page.
     paused = any(human.driver == COCKPIT for human in setup.humans)
+    drivers = [spec for spec in viewers if paused and spec.executable == 'cockpit_node']
+    waiting = ', '.join(f'"{spec.name}"' for spec in (*companions, *drivers))
     simulation = NodeSpec('sim_node', 'sim_node', {
         'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
         'realtime_priority': str(request.realtime_priority).lower(),
         'scenario_directories': f'["{plan.cockpit / "games"}"]', 'roster': f'"{plan.roster}"',
         'start_paused': str(paused).lower(), 'wait_for': f'[{waiting}]'})
-    return [simulation, *companions, *_viewer_specs(plan)]
+    return [simulation, *companions, *viewers]
 
 
 def vehicle_specs(drivers: Mapping[str, str], planners: Mapping[str, str]) -> list[NodeSpec]:
@@ -52,7 +55,7 @@ def vehicle_specs(drivers: Mapping[str, str], planners: Mapping[str, str]) -> li
 
 
 def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
-    """List the nodes that nobody waits for: they come and go as they like."""
+    """List the nodes that come and go as they like."""
     request = plan.request
     viewers = [NodeSpec('marker_node', 'marker_node', nice=VIEWER_NICE, restart=True)]
     if not request.headless:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
+from crgame_ros.cockpit.access import check_address
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
@@ -106,6 +107,8 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
     for av in setup.avs:
         _check_planner(av.spec)
     _check_swaps(setup)
+    if not request.headless:
+        check_address(request.listen or '127.0.0.1', request.port)
     folder = _make_folder(request.out, setup.loaded.benchmark_id, now())
     plan = RunPlan(request, setup, folder)
     plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')

@@ -111,7 +111,7 @@ class DriverNode(Node):
         try:
             seat = json.loads(message.data).get(self._vehicle_id, {})
             self._silent = seat.get('source', GAME) != GAME
-        except (ValueError, AttributeError):
+        except (AttributeError, RecursionError, ValueError):
             self.get_logger().warning('/seats is not what the contract says',
                                       throttle_duration_sec=1.0)
 

@@ -127,9 +127,10 @@ class RecorderNode(Node):
     def _begin_bag(self, game_data: bytes) -> None:
         """Open the bag of a new game, with every latched message that is already there."""
         self._game_text = game_data
-        self._close()
         try:
+            # Before the bag is closed: what is no game must not end its recording.
             game = parse_game_document(deserialize_message(game_data, String).data)
+            self._close()
             self._subscribe(tuple(entry['id'] for entry in game.humans),
                             tuple(entry['id'] for entry in game.avs))
             self._writer = BagWriter(self._next_folder(), now_ns=time.monotonic_ns)

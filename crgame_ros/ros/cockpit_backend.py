@@ -3,8 +3,7 @@
 """The cockpit of a live run: what pages ask for becomes messages to the graph."""
 
 import asyncio
-from collections.abc import Mapping
-import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
 import time
 from typing import Any, Literal
@@ -14,7 +13,8 @@ from rclpy.publisher import Publisher
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
-from crgame_ros.cockpit.seats import HeldSeat, SeatTable
+from crgame_ros.cockpit.seat_orders import SeatOrders
+from crgame_ros.cockpit.seats import HeldSeat, parse_seats, SeatTable
 from crgame_ros.driver.command import DriverCommand
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
@@ -26,7 +26,13 @@ from crgame_ros.ros.seats import GAME
 
 # Half a cycle at 100 Hz: a state is passed on, and answered with a command, well within it [s].
 PERIOD_S = 0.004
-SERVE_EVERY = 25
+# While people only watch, and while nobody does [s].
+WATCH_PERIOD_S = 0.01
+IDLE_PERIOD_S = 0.05
+# Between two looks at what may wait: services, names of people, orders without an answer [s].
+SERVE_PERIOD_S = 0.1
+# Of one line about messages that cannot be read: peers repeat them [s].
+COMPLAIN_S = 1.0
 
 
 class LiveBackend:
@@ -45,6 +51,10 @@ class LiveBackend:
         self._seat_slot = self._endpoints.polled('/seats')
         self._commands: dict[str, Publisher] = {}
         self._table = SeatTable()
+        self._awaited = SeatOrders()
+        self._driven_n = 0
+        self._served_s = 0.0
+        self._lost: dict[str, bool] = {}
         self._pump: asyncio.Task[None] | None = None
 
     async def start(self, hub: Hub) -> None:
@@ -63,27 +73,50 @@ class LiveBackend:
         self._orders.close()
 
     async def _run(self) -> None:
-        count = 0
+        """Pass the run on until stopped; no part ends it or keeps the others from their work."""
         while True:
-            n, lost = self._feed.n, dict(self._feed.status.seats_lost)
-            for problem in self._feed.poll():
-                self._node.get_logger().error(problem)
-            message = self._seat_slot.latest()
-            if message is not None:
-                self._take_seats(message.data)
-            if lost != self._feed.status.seats_lost:
-                self._show_seats()
-            self._drive(self._feed.n != n)
-            count += 1
-            if count % SERVE_EVERY == 0:
-                self._orders.serve()
-                # People come and change their names.
-                self._show_seats()
-            await asyncio.sleep(PERIOD_S)
+            self._attempt(self._pass_on)
+            self._attempt(self._drive)
+            if time.monotonic() - self._served_s >= SERVE_PERIOD_S:
+                self._served_s = time.monotonic()
+                self._attempt(self._serve)
+            await asyncio.sleep(self._period_s())
 
-    def _drive(self, new_cycle: bool) -> None:
+    def _period_s(self) -> float:
+        if self._table.held:
+            return PERIOD_S
+        return WATCH_PERIOD_S if self._hub.clients else IDLE_PERIOD_S
+
+    def _attempt(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as error:
+            # A pump that ended would leave every page dead and say nothing.
+            self._node.get_logger().error(f'{work.__name__}: {error!r}'[:500],
+                                          throttle_duration_sec=COMPLAIN_S)
+
+    def _pass_on(self) -> None:
+        for problem in self._feed.poll():
+            self._node.get_logger().error(problem[:500], throttle_duration_sec=COMPLAIN_S)
+        message = self._seat_slot.latest()
+        if message is not None:
+            self._take_seats(message.data)
+        if self._lost != self._feed.status.seats_lost:
+            self._lost = dict(self._feed.status.seats_lost)
+            self._show_seats()
+
+    def _serve(self) -> None:
+        self._orders.serve()
+        for seat, source in self._awaited.due(time.monotonic()):
+            self._orders.order_seat(seat, source)
+        self._table.update(self._table.seats, self._awaited)
+        # People come and change their names.
+        self._show_seats()
+
+    def _drive(self) -> None:
         """Send the command of each held seat for a new cycle; let go of silent ones."""
         now_s = time.monotonic()
+        new_cycle, self._driven_n = self._feed.n != self._driven_n, self._feed.n
         for seat in self._table.held.values():
             if seat.is_silent(now_s):
                 self._let_go(seat)
@@ -106,19 +139,17 @@ class LiveBackend:
 
     def _take_seats(self, text: str) -> None:
         try:
-            self._table.update(json.loads(text))
-        except (ValueError, TypeError, AttributeError):
-            self._node.get_logger().warning('/seats is not what the contract says')
-        for name in self._table.seats:
-            # Ahead of the first claim: a new publisher takes a while to be discovered.
-            if name not in self._commands:
-                self._commands[name] = self._endpoints.publisher('/<v>/driver_command', name)
-        for seat in list(self._table.held.values()):
-            # Somebody outside has given the seat to another driver.
-            if self._table.seats[seat.id]['source'] != COCKPIT and seat.granted:
-                del self._table.held[seat.id]
-            elif self._table.seats[seat.id]['source'] == COCKPIT:
-                seat.granted = True
+            seats = parse_seats(text)
+        except InputError as error:
+            self._node.get_logger().warning(str(error), throttle_duration_sec=COMPLAIN_S)
+            return
+        self._awaited.answered(seats)
+        self._table.update(seats, self._awaited)
+        # Ahead of the first claim: a new publisher takes a while to be discovered.
+        for name in seats.keys() - self._commands.keys():
+            self._commands[name] = self._endpoints.publisher('/<v>/driver_command', name)
+        for name in self._commands.keys() - seats.keys():
+            self._node.destroy_publisher(self._commands.pop(name))
         self._show_seats()
 
     def _show_seats(self) -> None:
@@ -187,10 +218,10 @@ class LiveBackend:
             other.id: other.name for other in self._hub.clients.values()}
         if kind == 'claim':
             before = self._table.seat_of(client.id)
+            self._table.claim(client.id, seat, names)
             if before is not None and before.id != seat:
                 self._release(client, before.id)
-            self._table.claim(client.id, seat, names)
-            self._orders.order_seat(seat, COCKPIT)
+            self._order(seat, COCKPIT)
             text = f'you drive {seat}'
         elif kind == 'release':
             self._release(client, seat)
@@ -216,15 +247,18 @@ class LiveBackend:
         if taken is not None and taken.id != seat:
             self._let_go(taken)
             self._table.held.pop(taken.id, None)
-            self._orders.order_seat(taken.id, GAME)
-        self._table.held[seat].granted = True
+            self._order(taken.id, GAME)
         return f'{names[to]} drives {seat}'
 
     def _release(self, client: Client, seat: str) -> None:
         held = self._table.release(client.id, seat)
         if held is not None:
-            held.let_go()
-        self._orders.order_seat(seat, GAME)
+            self._let_go(held)
+        self._order(seat, GAME)
+
+    def _order(self, seat: str, source: str) -> None:
+        self._orders.order_seat(seat, source)
+        self._awaited.note(seat, source, self._table.seats, time.monotonic())
 
     async def load_game(self, path: Path) -> str:
         """

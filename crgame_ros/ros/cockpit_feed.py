@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the cockpit shows of a live run: topics in, documents and frames for the page out."""
 
+from collections.abc import Callable
+from dataclasses import asdict
 import json
 import time
-from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
-from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
@@ -18,7 +19,6 @@ from crgame_ros.cockpit.frames import (
     encode_prediction,
     encode_state,
     OBJECT_COLUMNS,
-    PLAN_COLUMNS,
     STATE_COLUMNS,
 )
 from crgame_ros.cockpit.hub import Hub
@@ -29,9 +29,11 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.planner.joints import vehicles_from_joints
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.messages import from_time
+from crgame_ros.ros.plan_frames import plan_rows, predicted
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
-from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
-from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
+from crgame_ros.simulation.documents import MALFORMED, parse_events_document
+from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, TIMING_COLUMNS
+from crgame_ros.vehicle.state import STATE_WIDTH
 
 STATUS_PERIOD_S = 0.2
 # Of the state frames that a client gets: who drives gets each.
@@ -40,6 +42,9 @@ SKIPPING_PERIOD_S = 0.1
 # sim_node tells its state every second; after a longer silence it is gone [s].
 SILENCE_S = 3.0
 QUEUE = 100
+# What people do not notice the delay of is looked at less often than what moves [s].
+SLOW_PERIOD_S = 0.02
+UNREADABLE = (CrgameError, IndexError, *MALFORMED)
 
 
 class CockpitFeed:
@@ -55,20 +60,23 @@ class CockpitFeed:
         self._hub = hub
         self.status = RunStatus()
         self._documents = ScenarioDocuments(endpoints)
-        self._states = endpoints.polled('/vehicles/state')
-        self._objects = endpoints.polled('/traffic/objects')
-        self._cycles = endpoints.polled('/timing/cycle')
+        # Of what moves the newest is enough.
+        self._states = endpoints.polled('/vehicles/state', depth=1)
+        self._objects = endpoints.polled('/traffic/objects', depth=1)
+        self._cycles = endpoints.polled('/timing/cycle', depth=1)
         self._signals = endpoints.polled('/scenario/signals')
         self._fired = endpoints.polled('/scenario/events')
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._diagnostics = endpoints.polled('/diagnostics', depth=QUEUE)
-        self._drivability: dict[str, PolledSubscription] = {}
-        self._plans: dict[str, PolledSubscription] = {}
-        self._requests: dict[str, PolledSubscription] = {}
+        # By contract name and vehicle.
+        self._slots: dict[tuple[str, str], PolledSubscription] = {}
         self.scenario: ScenarioSet | None = None
         self.frames_skipped = False
+        self._vehicle_ids: list[str] = []
+        self._object_count = 0
         self.n = 0
         self._run_heard_s = 0.0
+        self._slow_s = 0.0
         self._status_s = 0.0
         self._pace: tuple[float, int] = (0.0, 0)
         self._measured_factor: float | None = None
@@ -84,22 +92,15 @@ class CockpitFeed:
 
         :return: what went wrong, one line each
         """
-        problems = []
-        try:
-            scenario = self._documents.poll()
-            if scenario is not None:
-                self._begin(scenario)
-        except CrgameError as error:
-            problems.append(str(error))
-        order = self._frame_skip.latest()
-        if order is not None:
-            self.frames_skipped = bool(order.data)
-        if self.scenario is not None:
-            self._poll_motion()
-            self._poll_plans()
-            self._poll_texts()
-        self._poll_diagnostics()
+        problems: list[str] = []
         now_s = time.monotonic()
+        if now_s - self._slow_s >= SLOW_PERIOD_S:
+            self._slow_s = now_s
+            for work in (self._poll_documents, self._poll_plans, self._poll_texts,
+                         self._poll_diagnostics):
+                _read(work, problems)
+        for work in (self._poll_commands, self._poll_states, self._poll_objects):
+            _read(work, problems)
         if now_s - self._status_s >= STATUS_PERIOD_S:
             self._status_s = now_s
             self._send_status(now_s)
@@ -110,54 +111,72 @@ class CockpitFeed:
         client.state_period_s = SKIPPING_PERIOD_S if self.frames_skipped else (
             0.0 if client.drives else WATCHER_PERIOD_S)
 
+    def _poll_documents(self) -> None:
+        scenario = self._documents.poll()
+        if scenario is not None:
+            self._begin(scenario)
+        order = self._frame_skip.latest()
+        if order is not None:
+            self.frames_skipped = bool(order.data)
+
     def _begin(self, scenario: ScenarioSet) -> None:
         """Show another scenario, game or epoch."""
-        self.scenario = scenario
         game = scenario.game
+        scene = scene_document(scenario.loaded, scenario.objects, game)
+        transforms = {entry['id']: RigidTransform(*entry['transform']) for entry in game.avs}
+        self.scenario = scenario
+        self._transforms = transforms
         self._vehicle_ids = [item.id for item in scenario.driven]
         self._object_count = len(scenario.others)
         self._columns = {item.id: index for index, item in enumerate(
             (*scenario.driven, *scenario.others))}
-        self._transforms = {entry['id']: RigidTransform(*entry['transform'])
-                            for entry in game.avs}
         self._rows = np.full((len(self._vehicle_ids), STATE_COLUMNS), np.nan)
         self.n = 0
+        self._run_heard_s = time.monotonic()
         self.status.begin(self._vehicle_ids)
-        for vehicle in self._vehicle_ids:
-            if vehicle not in self._drivability:
-                self._drivability[vehicle] = self._endpoints.polled('/<v>/drivability', vehicle)
-        for av in self._transforms:
-            if av not in self._plans:
-                self._plans[av] = self._endpoints.polled('/<av>/plan', av)
-                self._requests[av] = self._endpoints.polled('/<av>/plan_request', av)
-        self._hub.set_document('scene', scene_document(
-            scenario.loaded, scenario.objects, game))
+        wanted = [('/<v>/drivability', vehicle) for vehicle in self._vehicle_ids]
+        wanted += [(name, av) for name in ('/<av>/plan', '/<av>/plan_request')
+                   for av in transforms]
+        for key in self._slots.keys() - set(wanted):
+            self._endpoints.release(self._slots.pop(key))
+        for key in wanted:
+            if key not in self._slots:
+                self._slots[key] = self._endpoints.polled(*key)
+        self._hub.set_document('scene', scene)
         self._hub.set_document('events', {'fired': []})
 
-    def _poll_motion(self) -> None:
+    def _poll_commands(self) -> None:
         cycle: Float64MultiArray | None = self._cycles.latest()
-        if cycle is not None:
-            self._take_commands(cycle)
+        if cycle is not None and self.scenario is not None:
+            self._take_commands(cycle, self.scenario.game.epoch)
+
+    def _poll_states(self) -> None:
         state: JointTrajectory | None = self._states.latest()
         if state is not None:
             self._send_state(state)
+
+    def _poll_objects(self) -> None:
         objects: JointTrajectory | None = self._objects.latest()
         if objects is not None:
             self._send_objects(objects)
 
-    def _take_commands(self, cycle: Float64MultiArray) -> None:
+    def _take_commands(self, cycle: Float64MultiArray, epoch: int) -> None:
         """Keep what the vehicles obeyed in the last cycle."""
-        width = len(COMMAND_COLUMNS) * len(self._vehicle_ids)
-        if len(cycle.data) >= width and len(cycle.layout.dim) == 2:
-            self._rows[:, STATE_WIDTH:] = np.frombuffer(cycle.data)[-width:].reshape(
-                -1, len(COMMAND_COLUMNS))
+        commands = len(COMMAND_COLUMNS) * len(self._vehicle_ids)
+        width = len(TIMING_COLUMNS) + commands
+        if len(cycle.layout.dim) != 2 or cycle.layout.dim[1].size != width \
+                or len(cycle.data) < width or cycle.data[-width] != epoch:
+            # A cycle of the game before or after this one.
+            return
+        self._rows[:, STATE_WIDTH:] = np.frombuffer(cycle.data)[-commands:].reshape(
+            -1, len(COMMAND_COLUMNS))
 
     def _send_state(self, message: JointTrajectory) -> None:
-        place = self._place(message)
-        point = message.points[0]
-        if place is None or len(point.positions) != 4 * len(self._vehicle_ids):
+        place = self._place(message, 4 * len(self._vehicle_ids))
+        if place is None:
             # A state of the game before or after this one.
             return
+        point = message.points[0]
         joints = [np.frombuffer(values).reshape(-1, 4) for values in (
             point.positions, point.velocities, point.accelerations)]
         self._rows[:, :STATE_WIDTH] = vehicles_from_joints(*joints)
@@ -165,95 +184,92 @@ class CockpitFeed:
         self._hub.send_frame('state', encode_state(*place, self._rows))
 
     def _send_objects(self, message: JointTrajectory) -> None:
-        place = self._place(message)
-        rows = np.empty((self._object_count, OBJECT_COLUMNS))
-        if place is None or 2 * len(message.points[0].positions) != rows.size:
+        place = self._place(message, 3 * self._object_count)
+        if place is None:
             return
+        rows = np.empty((self._object_count, OBJECT_COLUMNS))
         point = message.points[0]
         rows[:, :3] = np.frombuffer(point.positions).reshape(-1, 3)
         rows[:, 3:] = np.frombuffer(point.velocities).reshape(-1, 3)
         self._hub.send_frame('objects', encode_objects(*place, rows))
 
-    def _place(self, message: JointTrajectory) -> tuple[int, int, int, float] | None:
-        """Give epoch, n, k and t of a message; None if it belongs to another run."""
-        assert self.scenario is not None
+    def _place(self, message: JointTrajectory,
+               joints: int | None = None) -> tuple[int, int, int, float] | None:
+        """
+        Give epoch, n, k and t of a message; None if it belongs to another run.
+
+        :param joints: how many its first point has to give; None for any number.
+        """
+        if self.scenario is None or not message.points:
+            return None
         game = self.scenario.game
-        stamp_ns = from_time(message.header.stamp)
-        n = game.scheduler.step_of_stamp(stamp_ns)
-        if n < 0 or not message.points:
+        n = game.scheduler.step_of_stamp(from_time(message.header.stamp))
+        if n < 0 or (joints is not None and len(message.points[0].positions) != joints):
             return None
         return game.epoch, n, game.scheduler.k(n), n * game.scheduler.dt_s
 
     def _poll_plans(self) -> None:
+        if self.scenario is None:
+            return
         anybody = any(client.wants_predictions for client in self._hub.clients.values())
         for av, transform in self._transforms.items():
-            index = self._columns[av]
-            plan = self._plans[av].latest()
+            plan = self._slots['/<av>/plan', av].latest()
             if plan is not None and not self.frames_skipped:
-                self._send_plan(plan, index, transform)
+                self._send_plan(plan, av, transform)
             if anybody and not self.frames_skipped:
-                request = self._requests[av].latest()
+                request = self._slots['/<av>/plan_request', av].latest()
                 if request is not None:
-                    self._send_prediction(request, index, transform)
+                    self._send_prediction(request, av, transform)
 
-    def _send_plan(self, message: JointTrajectory, index: int, transform: RigidTransform) -> None:
+    def _send_plan(self, message: JointTrajectory, av: str, transform: RigidTransform) -> None:
         place = self._place(message)
-        if place is None or any(len(point.positions) < 3 or len(point.velocities) < 2
-                                for point in message.points):
-            return
-        rows = np.empty((len(message.points), PLAN_COLUMNS))
-        for row, point in zip(rows, message.points, strict=True):
-            x, y, yaw = point.positions[:3]
-            vx, vy = point.velocities[:2]
-            time_from_start = point.time_from_start
-            row[:] = (x, y, yaw, vx * np.cos(yaw) + vy * np.sin(yaw),
-                      time_from_start.sec + 1e-9 * time_from_start.nanosec)
-        rows[:, :3] = transform.to_simulation(rows[:, :3])
-        self._hub.send_frame(f'plan:{index}', encode_plan(*place, index, rows))
+        if place is not None:
+            index = self._columns[av]
+            self._hub.send_frame(
+                f'plan:{index}', encode_plan(*place, index, plan_rows(message, transform)))
 
-    def _send_prediction(self, message: JointTrajectory, index: int,
+    def _send_prediction(self, message: JointTrajectory, av: str,
                          transform: RigidTransform) -> None:
         place = self._place(message)
-        if place is None:
-            return
-        joints = [name.rpartition('/') for name in message.joint_names]
-        starts = [(column, self._columns[name]) for column, (name, _, joint) in enumerate(joints)
-                  if joint == 'x' and name in self._columns and self._columns[name] != index]
-        positions: NDArray[np.float64] = np.array(
-            [np.frombuffer(point.positions) for point in message.points])
-        futures = np.stack([positions[:, start:start + 3] for start, _ in starts]) if starts \
-            else np.empty((0, len(positions), 3))
-        for row, (_, column) in enumerate(starts):
-            if column < len(self._vehicle_ids):
-                futures[row] = transform.to_simulation(futures[row])
-        present = np.isfinite(futures[:, 0, StateColumn.X])
-        columns = [column for (_, column), here in zip(starts, present, strict=True) if here]
-        self._hub.send_frame(
-            f'prediction:{index}', encode_prediction(*place, index, columns, futures[present]),
-            only_if=lambda client: client.wants_predictions)
+        if place is not None:
+            index = self._columns[av]
+            columns, futures = predicted(message, self._columns, av, len(self._vehicle_ids),
+                                         transform)
+            self._hub.send_frame(
+                f'prediction:{index}', encode_prediction(*place, index, columns, futures),
+                only_if=lambda client: client.wants_predictions)
 
     def _poll_texts(self) -> None:
-        assert self.scenario is not None
-        for slot, kind in ((self._signals, 'signals'), (self._fired, 'events')):
-            message = slot.latest()
-            content = None if message is None else _json_object(message.data)
-            if content is not None and content.pop('epoch', self.scenario.game.epoch) \
-                    == self.scenario.game.epoch:
-                self._hub.set_document(kind, content)
+        if self.scenario is None:
+            return
+        signals, fired = self._signals.latest(), self._fired.latest()
+        if fired is not None:
+            epoch, events = parse_events_document(fired.data)
+            if epoch == self.scenario.game.epoch:
+                self._hub.set_document('events', {'fired': [asdict(event) for event in events]})
+        if signals is not None:
+            content = json.loads(signals.data)
+            self._hub.set_document('signals', {
+                'k': int(content['k']), 'states': {str(light): str(state) for light, state
+                                                   in content['states'].items()}})
 
     def _poll_diagnostics(self) -> None:
-        before = self.status.run
-        for slot in (self._diagnostics, *self._drivability.values()):
-            while (message := slot.take()) is not None:
+        slots = [slot for (name, _), slot in self._slots.items() if name == '/<v>/drivability']
+        for slot in (self._diagnostics, *slots):
+            # A flood waits its turn.
+            for _ in range(QUEUE):
+                message = slot.take()
+                if message is None:
+                    break
                 for status in message.status:
-                    values = {item.key: item.value for item in status.values}
-                    self.status.take(status.name, int.from_bytes(status.level, 'little'),
-                                     status.message, values, self.t)
-                    if status.name == 'sim_node: run':
-                        self._run_heard_s = time.monotonic()
-        if self.status.run != before:
-            # The page holds its picture still in a pause: it must not learn of it late.
-            self._status_s = 0.0
+                    self._take_status(status)
+
+    def _take_status(self, status: DiagnosticStatus) -> None:
+        values = {item.key: item.value for item in status.values}
+        self.status.take(status.name, int.from_bytes(status.level, 'little'), status.message,
+                         values, self.t)
+        if status.name == 'sim_node: run':
+            self._run_heard_s = time.monotonic()
 
     def _send_status(self, now_s: float) -> None:
         if self.scenario is None:
@@ -276,9 +292,9 @@ class CockpitFeed:
         self._hub.set_document('alarms', self.status.alarms_document())
 
 
-def _json_object(text: str) -> dict[str, Any] | None:
+def _read(work: Callable[[], None], problems: list[str]) -> None:
+    """Take in one kind of message; one that cannot be read keeps nobody from the others."""
     try:
-        content = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return content if isinstance(content, dict) else None
+        work()
+    except UNREADABLE as error:
+        problems.append(f'{work.__name__[len("_poll_"):]}: {error}')

@@ -32,7 +32,7 @@ class CockpitOrders:
     def __init__(self, node: Node, endpoints: Endpoints) -> None:
         self._node = node
         self._endpoints = endpoints
-        self._executor = SingleThreadedExecutor()
+        self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._controls = {name: endpoints.client(f'/sim/{name}')
                           for name in ('start', 'pause', 'step', 'reset', 'stop')}

@@ -118,6 +118,10 @@ class Endpoints:
             callback_group=self._polled_group, raw=raw)
         return PolledSubscription(subscription, raw)
 
+    def release(self, slot: PolledSubscription) -> None:
+        """Give a subscription up."""
+        self._node.destroy_subscription(slot.subscription)
+
     def service(self, name: str, callback: Callable[[Any, Any], Any],
                 vehicle_id: str = '') -> Service:
         """Create a service."""

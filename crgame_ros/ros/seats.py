@@ -21,6 +21,8 @@ PLANNER = 'planner'
 MAX_SOURCE_LENGTH = 40
 # Two drivers may speak in the moment in which a seat changes hands.
 COMMAND_DEPTH = 10
+# Orders read in one cycle: a flood must not cost it.
+MAX_ORDERS = 10
 
 
 class Seat:
@@ -60,21 +62,30 @@ class Seat:
         return self._watchdog.lost and self.source != PLANNER
 
     def obey(self, source: str, now_ns: int) -> None:
-        """Take commands from another source; what was commanded last holds until it speaks."""
+        """
+        Take commands from another source; what was commanded last holds until it speaks.
+
+        Not so after a loss: the pedals that the lost driver held must not come back.
+        """
         if self.source == PLANNER:
-            self._last = RELEASED
             self._watchdog.reset()
+            self._last = RELEASED
+        elif self._watchdog.lost:
+            self._last = RELEASED
         self.source = source
         self._heard_ns = now_ns
 
     def forgive(self, now_ns: int) -> None:
-        """Count silence from now on: a pause is no loss."""
-        if self._heard_ns is not None:
+        """Count silence from now on: a pause is no loss; who was lost before it still is."""
+        if self._heard_ns is not None and not self._watchdog.lost:
             self._heard_ns = now_ns
 
     def listen(self, now_ns: int) -> bool:
         """Take the latest command that has come; tell whether there was any so far."""
-        while (message := self.commands.take()) is not None:
+        for _ in range(COMMAND_DEPTH):
+            message = self.commands.take()
+            if message is None:
+                break
             if (message.header.frame_id or GAME) != self.source:
                 continue
             if from_time(message.header.stamp) < self._clock_offset_ns:
@@ -149,13 +160,16 @@ class Seats:
 
     def take_orders(self, now_ns: int) -> tuple[bool, list[str]]:
         """
-        Obey the orders that have come.
+        Obey the orders that have come; a flood waits its turn.
 
         :param now_ns: steady clock [ns]
         :return: whether anything changed, and why orders were refused
         """
         changed, refusals = False, []
-        while (message := self._orders.take()) is not None:
+        for _ in range(MAX_ORDERS):
+            message = self._orders.take()
+            if message is None:
+                break
             try:
                 changed |= self._obey(message.data, now_ns)
             except InputError as error:
@@ -174,10 +188,14 @@ class Seats:
                              'it has ' + ', '.join(item.id for item in self.all))
         if not isinstance(source, str) or not 0 < len(source) <= MAX_SOURCE_LENGTH:
             raise InputError('the source is no name', '/seats/order', 'give game or a driver')
-        source = seat.home if source == GAME else source
         if source == PLANNER != seat.home:
             raise InputError(f'{seat.id} has no planner', '/seats/order', 'give game')
-        self._sources[seat.id] = source
+        if source in (GAME, PLANNER):
+            # Given back for good: in a game to come its own driver has the seat.
+            source = seat.home
+            self._sources.pop(seat.id, None)
+        else:
+            self._sources[seat.id] = source
         if source == seat.source:
             return False
         seat.obey(source, now_ns)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One headless Chromium, and what tests of the page ask of it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import importlib.util
 import os
@@ -101,10 +101,18 @@ class Browser:
                          if entry['level'] == 'SEVERE']
         return list(self._errors)
 
+    def forget_errors(self) -> None:
+        """Begin anew to collect what `console_errors` gives."""
+        self.console_errors()
+        self._errors.clear()
+
     def screenshot(self, path: Path) -> Path:
         """Save what is seen as PNG."""
         self.driver.save_screenshot(str(path))
         return path
+
+
+OpenBrowser = Callable[..., Browser]
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real browsers for the tests of the page; skipped, saying so, where there is none."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 import sys
@@ -11,25 +11,39 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from browser_support import Browser, missing_programs, open_browser  # noqa: E402
+from browser_support import (  # noqa: E402
+    Browser,
+    missing_programs,
+    open_browser,
+    OpenBrowser,
+)
 
-OpenBrowser = Callable[..., Browser]
 
-
-@pytest.fixture
-def new_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
-    """Give a function that opens a browser of its own: as many people as a test needs."""
+def _opener(factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
     missing = missing_programs()
     if missing:
         pytest.skip(f'no browser for this test: {", ".join(missing)} is missing')
     with ExitStack() as stack:
         def make(width: int = 1280, height: int = 720, **more: bool) -> Browser:
-            profile = tmp_path_factory.mktemp('profile')
+            profile = factory.mktemp('profile')
             return stack.enter_context(open_browser(profile, width, height, **more))
         yield make
+
+
+@pytest.fixture
+def new_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
+    """Give a function that opens a browser of its own: as many people as a test needs."""
+    yield from _opener(tmp_path_factory)
 
 
 @pytest.fixture
 def browser(new_browser: OpenBrowser) -> Browser:
     """Open one browser of 1280x720."""
     return new_browser()
+
+
+@pytest.fixture(scope='module')
+def module_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Open one browser of 1280x720 for all tests of a module."""
+    for open_another in _opener(tmp_path_factory):
+        yield open_another()

@@ -110,3 +110,13 @@ def test_others_are_ignored() -> None:
     for name in ('sim_node: av9 plans', 'my_node: hello', 'planner_node: av9', ''):
         status.take(name, 2, 'broken', {}, 0.0)
     assert status.document() == before and _kinds(status) == []
+
+
+def test_vehicles_that_take_no_part_leave_nothing() -> None:
+    """Nor do those of the game before: a peer that makes names up would fill the memory."""
+    status = _begun()
+    values = {'collision': 'true', 'road_compliance': 'false', 'hit': 'av0'}
+    for name in ('hv1/drivability', '/drivability', 'hv0/x/drivability',
+                 'x' * 500 + '/drivability'):
+        status.take(name, 2, 'collision', values, 0.0)
+    assert status.document()['drivability'] == {} and _kinds(status) == []

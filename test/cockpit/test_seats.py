@@ -4,7 +4,8 @@
 
 import pytest
 
-from crgame_ros.cockpit.seats import HeldSeat, SeatTable, SILENCE_S
+from crgame_ros.cockpit.seat_orders import AGAIN_S, GIVE_UP_S, SeatOrders
+from crgame_ros.cockpit.seats import HeldSeat, parse_seats, SeatTable, SILENCE_S
 from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.errors import InputError
@@ -143,3 +144,56 @@ def test_a_new_run_begins_at_cycle_0() -> None:
     for n in range(500, 550):
         seat.command(n, DT)
     assert seat.command(0, DT).throttle == pytest.approx(1.8 * DT)
+
+
+def _seats(source: str, driver: str = 'idle') -> dict[str, dict[str, str]]:
+    return {'hv0': {'source': source, 'driver': driver}}
+
+
+def test_what_was_said_before_an_order_arrived_takes_nothing_away(table: SeatTable) -> None:
+    """While the answer is awaited the seat stays held; with it, /seats has the last word."""
+    orders = SeatOrders()
+    table.claim('c1', 'hv0', NAMES)
+    orders.note('hv0', 'cockpit', table.seats, 0.0)
+    for source, awaited, held in (('game', True, True), ('cockpit', False, True),
+                                  ('game', False, False)):
+        orders.answered(_seats(source))
+        table.update(_seats(source), orders)
+        assert ('hv0' in orders, 'hv0' in table.held) == (awaited, held)
+
+
+def test_orders_are_repeated_and_given_up(table: SeatTable) -> None:
+    """Every half second for ten: a reset that loads a big map hears nothing for seconds."""
+    orders = SeatOrders()
+    orders.note('hv0', 'cockpit', table.seats, 100.0)
+    assert orders.due(100.0 + 0.9 * AGAIN_S) == []
+    assert orders.due(100.0 + AGAIN_S) == [('hv0', 'cockpit')]
+    assert orders.due(100.0 + 1.9 * AGAIN_S) == []
+    # The later order is the one that counts.
+    orders.note('hv0', 'game', table.seats, 101.0)
+    assert orders.due(101.0 + AGAIN_S) == [('hv0', 'game')]
+    assert orders.due(101.0 + GIVE_UP_S) == [] and 'hv0' not in orders
+
+
+@pytest.mark.parametrize(('ordered', 'source', 'driver'), [
+    ('cockpit', 'cockpit', 'idle'), ('game', 'game', 'idle'), ('game', 'other', 'idle'),
+    ('game', 'cockpit', 'cockpit')], ids=['taken', 'given back', 'to another', 'at home'])
+def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: str) -> None:
+    """For the simulation says nothing when nothing changes."""
+    orders = SeatOrders()
+    orders.note('hv0', ordered, _seats(source, driver), 0.0)
+    assert 'hv0' not in orders
+    orders.note('hv0', ordered, {}, 0.0)
+    assert 'hv0' in orders
+    orders.answered(_seats(source, driver))
+    assert 'hv0' not in orders
+
+
+@pytest.mark.parametrize('text', [
+    '', '[]', '7', '[' * 100_000, '{"hv0": 3}', '{"hv0": {"source": "game"}}',
+    '{"hv0": {"source": 1, "driver": "idle"}}', '{"a b": {"source": "game", "driver": "idle"}}',
+    '{"hv0000": {"source": "game", "driver": "idle"}}'])
+def test_seats_that_are_none_are_refused(text: str) -> None:
+    """A name would become a topic, and a missing source an error in the midst of driving."""
+    with pytest.raises(InputError, match='/seats: is not what the contract says'):
+        parse_seats(text)

@@ -4,6 +4,7 @@
 
 from datetime import datetime
 from pathlib import Path
+import socket
 
 import pytest
 
@@ -191,3 +192,21 @@ def test_planners_of_events_are_checked(tmp_path: Path) -> None:
         plan_run(RunRequest(CROSSING, planners=('external',)), noon)
     plan = plan_run(RunRequest(CROSSING), noon)
     assert load_game(plan.game_file).events == load_game(CROSSING).events
+
+
+@pytest.mark.parametrize('address', ['192.0.2.1', 'nobody.invalid', '"', 'a' * 70],
+                         ids=['of another machine', 'unknown', 'a quote', 'too long'])
+def test_the_page_has_to_be_at_an_address_of_this_machine(address: str, tmp_path: Path) -> None:
+    """Said before anything starts: a run that waits for the browser would wait for ever."""
+    with pytest.raises(InputError, match=r'cannot listen \(.+\); choose another|is no address'):
+        plan_run(RunRequest(listen=address, out=tmp_path / 'run'))
+    assert not (tmp_path / 'run').exists()
+    plan_run(RunRequest(listen=address, out=tmp_path / 'run', headless=True))
+
+
+def test_a_port_that_is_taken_is_no_reason_to_refuse(tmp_path: Path) -> None:
+    """The cockpit takes the next one."""
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        plan_run(RunRequest(port=taken.getsockname()[1], out=tmp_path / 'run'))

@@ -29,7 +29,7 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
     folder = tmp_path_factory.mktemp('seats')
     with Launcher([write_steady_game(folder)], folder / 'run') as launcher, \
             Peer(launcher.domain, *TOPICS) as peer:
-        peer.wait_until(lambda: peer.n > 30, 'n = 30')
+        peer.wait_until(lambda: peer.n > 30 and _seats(peer), 'n = 30 and the seats')
         yield peer
 
 
@@ -50,8 +50,9 @@ class Taker:
     def order(self, source: str, then: str) -> None:
         """Order a source and wait until /seats names what follows from it."""
         self._orders.publish(String(data=json.dumps({'seat': self.seat, 'source': source})))
-        self.peer.wait_until(lambda: _seats(self.peer)[self.seat]['source'] == then,
-                             f'{self.seat} driven by {then}')
+        self.peer.wait_until(
+            lambda: _seats(self.peer).get(self.seat, {}).get('source') == then,
+            f'{self.seat} driven by {then}')
 
     def hold(self, command: DriverCommand, until: Callable[[], object], what: str,
              source: str = 'tester') -> None:

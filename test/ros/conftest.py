@@ -6,3 +6,4 @@ from pathlib import Path
 import sys
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'live'))
+sys.path.insert(0, str(Path(__file__).resolve().parent))

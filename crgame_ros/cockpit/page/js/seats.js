@@ -73,7 +73,9 @@ class Seats {
     const role = scene?.vehicles.find((vehicle) => vehicle.id === id)?.role ?? 'human';
     return {
       id, role, connected, mine: connected && seat.holder === me.id && me.id !== '',
-      holder: seat.holder, left: seat.holder === null && seat.source === 'cockpit',
+      holder: seat.holder,
+      // A seat that the game itself leaves to a cockpit has nobody to be given back to.
+      left: seat.holder === null && seat.source === 'cockpit' && seat.driver !== 'cockpit',
       requests: seat.requests ?? [],
       others: seat.others ?? [],
       asked: (seat.requests ?? []).some(({ client }) => client === me.id),

@@ -185,10 +185,14 @@ export class Driving {
   }
 
   #driverOf(id) {
-    const { seats, scene, me, connected } = this.#store;
+    const { seats, scene, me, connected, mode } = this.#store;
     const { active } = this.gamepads;
     if (this.seat !== null) {
       return active && !this.keyboard.anyHeld ? shortName(active.id) : 'Keyboard';
+    }
+    if (mode === 'replay' && seats[id]?.source === 'cockpit') {
+      // Who held the seat is not recorded.
+      return 'Driven in a cockpit';
     }
     const role = scene?.vehicles[this.#store.vehicleIndex(id)]?.role;
     return connected && seats[id] ? describeSeat(seats[id], role, scene?.planners?.[id], me.id) : '';

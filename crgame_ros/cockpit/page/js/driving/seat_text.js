@@ -26,7 +26,8 @@ export function describeSeat(seat, role, planner, me) {
       : `Driven by ${seat.holder_name || seat.holder} in a cockpit`;
   }
   if (seat.source === 'cockpit') {
-    return 'Left by its driver in a cockpit';
+    return seat.driver === 'cockpit' ? 'Waits for somebody in a cockpit'
+      : 'Left by its driver in a cockpit';
   }
   if (seat.source !== 'game' && seat.source !== 'planner') {
     return `Driven by the source ${seat.source}`;

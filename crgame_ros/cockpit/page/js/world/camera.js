@@ -11,11 +11,11 @@ const FIT_SHARE = 0.92;
 // Time constant of camera moves that are not the hand's own [ms].
 const SETTLE_MS = 90;
 // Followed with its heading up, a vehicle stands this far down what is free, the road before it.
-const FOLLOW_DOWN = 0.76;
+const FOLLOW_DOWN = 0.8;
 const MIDDLE = 0.5;
 // The free height shows a followed vehicle so much road [m], and more the faster it is [s].
-const FOLLOW_HEIGHT = 65;
-const FOLLOW_TIME = 2;
+const FOLLOW_HEIGHT = 70;
+const FOLLOW_TIME = 2.8;
 
 /** Map frame (m, y up) <-> canvas (CSS pixels, y down). */
 export class Camera {

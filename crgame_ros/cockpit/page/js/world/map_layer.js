@@ -172,9 +172,9 @@ export class MapLayer {
     for (const goal of this.#goals) {
       if (camera.seesBox(goal.box)) {
         camera.enterMap(context, ratio, goal.x, goal.y);
-        context.globalAlpha = 0.16;
+        context.globalAlpha = 0.09;
         context.fill(goal.path);
-        context.globalAlpha = 0.75;
+        context.globalAlpha = 0.65;
         context.lineWidth = Math.max(0.15, 1.2 / camera.scale);
         context.setLineDash(GOAL_DASH);
         context.stroke(goal.path);

@@ -1,0 +1,268 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Make the pictures of the cockpit for the documentation: real runs, seen in a real browser.
+
+Needs what the tests of the page need: chromium, chromedriver and selenium.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from typing import NamedTuple
+
+from cockpit_person import Browser, open_browser, Person
+from PIL import Image, ImageOps
+
+from crgame_ros.paths import scenarios_directory, share_directory
+
+FOLDER = share_directory() / 'docs' / 'images'
+START_LIMIT_S, END_LIMIT_S = 60.0, 30.0
+ATTEMPTS = 4
+# Pictures from this width on would be large files with colours of 24 bits [px].
+WIDE_PX = 2000
+# Until the camera, the plots and the messages about what was clicked have come to rest [s].
+SETTLES_S = 1.0
+# A new alarm flashes so long [s].
+PULSES_S = 2.5
+HAS_BEGUN = 'window.crgame?.ready && crgame.world.shown && crgame.store.status'
+ALARMS = 'return crgame.alarms.kinds()'
+PAUSE = 'document.querySelector(\'[data-action="pause"]:enabled\')?.click()'
+
+
+class Unlucky(Exception):
+    """A run during which this machine was too slow, or which went another way."""
+
+
+class Session(NamedTuple):
+    """
+    A run, and the pictures that are taken of it.
+
+    :param names: of the pictures.
+    :param take: takes them; it gets a folder for its files.
+    """
+
+    names: tuple[str, ...]
+    take: Callable[[Path], None]
+
+
+@contextmanager
+def launched(folder: Path, *arguments: str) -> Iterator[str]:
+    """
+    Start the launcher in a ROS domain of its own, and end it with all its nodes.
+
+    :param folder: for its output.
+    :return: address of the page.
+    """
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        port = str(probe.getsockname()[1])
+    # Without a domain in its environment the launcher finds one that nobody uses.
+    environment = {key: value for key, value in os.environ.items() if key != 'ROS_DOMAIN_ID'}
+    log = folder / f'launcher{port}.log'
+    with log.open('wb') as stream:
+        process = subprocess.Popen(
+            [sys.executable, '-m', 'crgame_ros.launcher.main', '--port', port, *arguments],
+            stdout=stream, stderr=subprocess.STDOUT, env=environment, start_new_session=True)
+    try:
+        yield address(process, log)
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(END_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def address(process: 'subprocess.Popen[bytes]', log: Path) -> str:
+    """Wait until the launcher has told where the page is."""
+    until_s = time.monotonic() + START_LIMIT_S
+    while process.poll() is None and time.monotonic() < until_s:
+        if (found := re.search(r'http://127\S+', log.read_text(errors='replace'))) is not None:
+            return found[0]
+        time.sleep(0.1)
+    sys.exit(f'the cockpit did not start:\n{log.read_text(errors="replace")}')
+
+
+@contextmanager
+def page(folder: Path, theme: str, *arguments: str) -> Iterator[Person]:
+    """
+    Open the page of a run.
+
+    :param theme: dark or light.
+    :param arguments: of the launcher.
+    """
+    profile = Path(tempfile.mkdtemp(dir=folder))
+    with launched(folder, *arguments) as where, open_browser(profile) as browser:
+        browser.prefer(theme)
+        browser.open(where)
+        browser.wait(HAS_BEGUN, 'the page', START_LIMIT_S)
+        yield Person(browser)
+
+
+def game(name: str, *arguments: str) -> tuple[str, ...]:
+    """Give the launcher's arguments for a game of ours that does not end by itself."""
+    return (str(scenarios_directory() / f'{name}.yaml'), '--duration', '100000', *arguments)
+
+
+def waiting(folder: Path, name: str) -> tuple[str, ...]:
+    """Give the launcher's arguments for a game that waits for a person."""
+    return game(name, '--driver', 'cockpit', '--out', str(folder / 'run'))
+
+
+def shoot(browser: Browser, name: str, meant: tuple[str, ...] = ()) -> None:
+    """
+    Save what is seen.
+
+    :param meant: kinds of alarms that belong into the picture.
+    :raises Unlucky: if the page shows others, or lacks those.
+    """
+    path = FOLDER / f'cockpit_{name}.png'
+    seen = FOLDER / f'.{path.name}'
+    # Drawing for a browser makes a small machine late: in a pause that alarm goes away.
+    if 'late' in browser.run(ALARMS):
+        browser.run(PAUSE)
+        browser.wait("!crgame.alarms.kinds().includes('late')", 'the end of an alarm')
+        time.sleep(SETTLES_S)
+    try:
+        browser.screenshot(seen)
+        alarms = set(browser.run(ALARMS))
+        if alarms != set(meant):
+            raise Unlucky(f'{path.name}: alarms {sorted(alarms)}')
+        # Fewer colours would do away with those of the smallest things, such as pedestrians.
+        with Image.open(seen) as picture:
+            bits = 8 if picture.width < WIDE_PX else 6
+            ImageOps.posterize(picture.convert('RGB'), bits).save(path, optimize=True)
+    finally:
+        seen.unlink(missing_ok=True)
+    print(f'{path}: {path.stat().st_size / 1e3:.0f} kB', flush=True)
+
+
+def take_driving(folder: Path) -> None:
+    """Somebody overtakes in dense traffic and cuts in."""
+    with page(folder, 'dark', *waiting(folder, 'traffic')) as person:
+        person.take_seat('hv0')
+        person.click('[data-action="start"]')
+        person.drive((13, 23), 29.0, 2.4)
+        person.drive((12, 22), 29.0, 3.3)
+        shoot(person.browser, 'driving')
+
+
+def take_light(folder: Path) -> None:
+    """Somebody drives around in front of an AV."""
+    with page(folder, 'light', *waiting(folder, 'roundabout')) as person:
+        person.take_seat('hv0')
+        person.click('[data-action="start"]')
+        person.drive((43, 46, 15, 16, 25, 26), 6.0, 5.0)
+        shoot(person.browser, 'light')
+
+
+def take_4k(folder: Path) -> None:
+    """Somebody drives past parked cars and an AV follows; a large screen."""
+    with page(folder, 'dark', *waiting(folder, 'parked_cars')) as person:
+        person.take_seat('hv0')
+        person.click('[data-action="start"]')
+        person.drive((11, 21), 10.5, 4.5)
+        # Drawn without a graphics card, so large a picture would hold the run up.
+        person.click('[data-action="pause"]')
+        person.browser.resize(3840, 2160)
+        person.click('.followed')
+        time.sleep(2.0 * SETTLES_S)
+        shoot(person.browser, '4k')
+
+
+def take_figures(folder: Path) -> None:
+    """Watch two AVs behind a script: the plots, and table I."""
+    with page(folder, 'light', *game('two_avs', '--out', str(folder / 'run'))) as person:
+        person.click('#tab-history')
+        person.click('.chip[data-id="av0"]')
+        person.wait_until(16.0)
+        shoot(person.browser, 'history')
+        person.browser.run("crgame.settings.setTheme('dark')")
+        person.click('#tab-timing')
+        time.sleep(SETTLES_S)
+        shoot(person.browser, 'timing')
+
+
+def take_events(folder: Path) -> None:
+    """Let the pedestrian go in front of the AV; then look for another scenario."""
+    with page(folder, 'light', *game('crossing', '--out', str(folder / 'run'))) as person:
+        person.click('#tab-events')
+        person.browser.run("crgame.world.follow('av0', true)")
+        person.wait_until(9.0)
+        person.click('[aria-label="Trigger Let the pedestrian cross"]')
+        person.wait_until(12.0)
+        shoot(person.browser, 'events')
+        person.browser.run("crgame.settings.setTheme('dark')")
+        person.click('#tab-scenario')
+        person.click('.scenario[title^="intersection"]')
+        person.browser.wait("!document.querySelector('.preview-card').hidden", 'the preview')
+        time.sleep(SETTLES_S)
+        shoot(person.browser, 'scenario')
+
+
+def take_alarm(folder: Path) -> None:
+    """Run into a leader that brakes; then look at it again in the recording."""
+    with page(folder, 'dark', *waiting(folder, 'crossing')) as person:
+        person.take_seat('hv0')
+        person.click('[data-action="start"]')
+        person.drive((11, 21), 12.5, 2.0)
+        person.browser.run("crgame.connection.request({type: 'trigger', event: 'leader-brakes'})")
+        person.drive((11, 21), 12.0, 5.0)
+        person.browser.wait("crgame.alarms.kinds().includes('collision')", 'the collision')
+        person.click('[data-action="pause"]')
+        time.sleep(PULSES_S)
+        shoot(person.browser, 'alarm', ('collision',))
+    with page(folder, 'light', '--replay', str(folder / 'run' / 'bag')) as person:
+        person.browser.wait('crgame.replay?.info', 'the recording')
+        person.click('#tab-history')
+        person.browser.run('crgame.replay.seek(7.0)')
+        person.browser.wait('!crgame.replay.loading'
+                            ' && crgame.world.shown.t === crgame.replay.t', 'the chunk')
+        time.sleep(SETTLES_S)
+        shoot(person.browser, 'replay')
+
+
+SESSIONS = (
+    Session(('driving',), take_driving), Session(('light',), take_light),
+    Session(('4k',), take_4k), Session(('history', 'timing'), take_figures),
+    Session(('events', 'scenario'), take_events), Session(('alarm', 'replay'), take_alarm),
+)
+
+
+def main() -> None:
+    """Take the pictures."""
+    names = [name for session in SESSIONS for name in session.names]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--only', choices=names, help='the runs of this picture alone')
+    only = parser.parse_args().only
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for session in SESSIONS:
+        if only is None or only in session.names:
+            take(session)
+
+
+def take(session: Session) -> None:
+    """Take the pictures of a session, again if the run was unlucky."""
+    for attempt in range(1, ATTEMPTS + 1):
+        print(f'{", ".join(session.names)}: run {attempt} …', flush=True)
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                session.take(Path(folder))
+                return
+            except Unlucky as error:
+                print(error, flush=True)
+    sys.exit(f'{", ".join(session.names)}: {ATTEMPTS} runs in vain')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,221 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A running graph, the pages that people have open on it, and what their hands do there."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+import signal
+import sys
+import time
+from typing import Any, NamedTuple
+
+from browser_support import Browser
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+import pytest
+from selenium.common.exceptions import WebDriverException
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'live'))
+
+from live_peer import Peer  # noqa: E402 - importable from here on
+from live_support import is_node, Launcher, SCENARIOS, wait_until  # noqa: E402
+
+__all__ = ['Graph', 'live_graph', 'LivePage', 'PATIENCE_S', 'SCENARIOS']
+
+# How long to wait for what will come [s]: many times what an idle machine takes.
+PATIENCE_S = 45.0
+_POLL_S = 0.05
+THROTTLE, BRAKE, STEERING = 0, 1, 2
+_TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state')
+
+
+class Graph(NamedTuple):
+    """A graph with a cockpit, a peer that listens to it, and the address of its page."""
+
+    launcher: Launcher
+    peer: Peer
+    address: str
+
+    def commands(self, vehicle: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Give n (R) and the commands (R, 4) that a vehicle obeyed since the last `forget`."""
+        self.peer.listen()
+        table = self.peer.cycles()
+        return table.column('n'), table.commands(vehicle)
+
+    def wait_for_command(self, vehicle: str, column: int, low: float, high: float) -> None:
+        """Wait for a cycle after this call whose command lies between two values."""
+        self.peer.forget()
+
+        def obeyed() -> bool:
+            if not self.peer.messages['/timing/cycle']:
+                return False
+            value = self.commands(vehicle)[1][-1, column]
+            return bool(low <= value <= high)
+        self.peer.wait_until(
+            obeyed, f'{vehicle} to obey {low:g} to {high:g} in column {column}', PATIENCE_S)
+
+    def wait_for_steps(self, steps: int) -> None:
+        """Wait until the simulation has gone so many steps on."""
+        last = self.peer.n + steps
+        self.peer.wait_until(lambda: self.peer.n >= last, f'n = {last}', PATIENCE_S)
+
+
+@contextmanager
+def live_graph(game: Path, out: Path) -> Iterator[Graph]:
+    """
+    Start the graph of a game with its cockpit, and end it.
+
+    :param game: game file.
+    :param out: folder of the run.
+    """
+    with Launcher([game], out, headless=False) as launcher, \
+            Peer(launcher.domain, *_TOPICS) as peer:
+        address = launcher.page
+        peer.wait_until(lambda: peer.games, 'the game')
+        try:
+            yield Graph(launcher, peer, address)
+        finally:
+            # Killed nodes would leave their shared memory behind. Nobody needs what the launcher
+            # makes of the recordings after their end.
+            launcher.signal(signal.SIGINT)
+            wait_until(lambda: not any(is_node(pid) for _, pid in launcher.started),
+                       'the end of the nodes', PATIENCE_S)
+
+
+class LivePage:
+    """
+    The page of a running graph in a browser, and a person before it.
+
+    :param graph: whose page it is.
+    :param browser: of the person.
+    """
+
+    def __init__(self, graph: Graph, browser: Browser) -> None:
+        self.graph = graph
+        self.browser = browser
+        self.driver = browser.driver
+        self.open()
+
+    def open(self) -> None:
+        """Load the page, and wait until all its parts are there and it shows the scene."""
+        self.browser.open(self.graph.address)
+        self.wait('window.crgame?.ready && crgame.world.shown && crgame.store.status'
+                  ' && crgame.store.me.id && Object.keys(crgame.store.seats).length > 0',
+                  'the page with all its parts')
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Run a function body in the page."""
+        return self.browser.run(script, *arguments)
+
+    def run_async(self, script: str, *arguments: Any) -> Any:
+        """Run the body of an async function in the page, and wait for what it returns."""
+        return self.browser.run_async(script, *arguments)
+
+    def wait(self, condition: str, what: str = '', *arguments: Any) -> Any:
+        """Wait until an expression of the page is true, and give its value."""
+        return self.browser.wait(condition, what, PATIENCE_S, arguments)
+
+    def text(self, selector: str) -> str:
+        """Give the text of an element, as the page holds it; empty where there is none."""
+        return str(self.run(
+            'return document.querySelector(arguments[0])?.textContent ?? ""', selector))
+
+    def wait_for_text(self, selector: str, part: str) -> None:
+        """Wait until an element says something."""
+        self.wait('document.querySelector(arguments[0])?.textContent.includes(arguments[1])',
+                  f'{selector} to say {part!r}', selector, part)
+
+    def click(self, selector: str) -> None:
+        """Click an element with the mouse once it is there and can be clicked."""
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                element = self.driver.find_element(By.CSS_SELECTOR, selector)
+                if element.is_enabled():
+                    element.click()
+                    return
+                problem = 'disabled'
+            except WebDriverException as error:
+                # Lists are rebuilt when something changes: it is looked up anew.
+                problem = str(error).splitlines()[0]
+            if time.monotonic() > end:
+                pytest.fail(f'{selector} cannot be clicked: {problem}')
+            time.sleep(_POLL_S)
+
+    def tab(self, name: str) -> None:
+        """Open a panel by its tab."""
+        self.click(f'#tab-{name}')
+        self.wait('!document.querySelector(`#panel-${arguments[0]}`).hidden', '', name)
+
+    def hold(self, key: str) -> None:
+        """Press a key and keep it down."""
+        ActionChains(self.driver).key_down(key).perform()
+
+    def release(self, key: str) -> None:
+        """Let a key go."""
+        ActionChains(self.driver).key_up(key).perform()
+
+    def seat(self, seat: str) -> dict[str, Any]:
+        """Give a seat as the page knows it."""
+        return dict(self.run('return crgame.store.seats[arguments[0]]', seat))
+
+    def seat_button(self, seat: str, action: str) -> str:
+        """Give the selector of a button in a seat's row."""
+        return f'li[data-seat="{seat}"] [data-action="{action}"]'
+
+    def claim(self, seat: str) -> None:
+        """Take a seat by its button, and wait until the hands are on its controls."""
+        self.tab('drive')
+        self.click(self.seat_button(seat, 'claim'))
+        self.wait('crgame.driving.seat === arguments[0] && crgame.driving.away === null'
+                  ' && crgame.store.seats[arguments[0]].source === "cockpit"',
+                  f'the seat {seat}', seat)
+
+    def give_back(self, seat: str) -> None:
+        """Give a seat back by its button."""
+        self.tab('drive')
+        self.click(self.seat_button(seat, 'release'))
+        self.wait('crgame.driving.seat === null'
+                  ' && crgame.store.seats[arguments[0]].holder === null',
+                  f'{seat} to be given back', seat)
+
+    def order(self, action: str) -> None:
+        """Press a button of the run control, and agree if asked."""
+        self.click(f'#run-control [data-action="{action}"]')
+        if action in ('reset', 'stop'):
+            self.click('dialog.confirm[open] .danger')
+
+    def wait_for_run(self, state: str) -> None:
+        """Wait until the run is waiting, running, paused or ended."""
+        self.wait('crgame.store.status.run === arguments[0]', f'a run that is {state}', state)
+
+    def reset(self) -> None:
+        """Begin anew by the button, and wait until the new run is shown and goes on."""
+        epoch = self.run('return crgame.store.status.epoch')
+        self.order('reset')
+        self.wait('crgame.store.status.epoch > arguments[0] && crgame.store.status.n > 0'
+                  ' && crgame.world.shown?.epoch === crgame.store.status.epoch'
+                  ' && crgame.store.status.run === "running"', 'a new run', epoch)
+
+    def vehicle(self, index: int) -> NDArray[np.float64]:
+        """Give the 12 numbers of a vehicle as it was drawn last."""
+        row = self.run('const at = 12 * arguments[0];'
+                       'return [...crgame.world.shown.vehicles.subarray(at, at + 12)];', index)
+        return np.array([np.nan if value is None else value for value in row], dtype=float)
+
+    def picture(self, vehicle: int, half_px: int = 150) -> NDArray[np.int64]:
+        """Take a screenshot of what lies before a vehicle that drives up, (rows, columns, 3)."""
+        x, y = self.run("""
+            const { camera, shown } = crgame.world;
+            const at = 12 * arguments[0];
+            const box = document.querySelector('#world').getBoundingClientRect();
+            const [x, y] = shown.vehicles.subarray(at, at + 2);
+            return [box.left + camera.toX(x, y), box.top + camera.toY(x, y)];""", vehicle)
+        with Image.open(BytesIO(self.driver.get_screenshot_as_png())) as image:
+            box = [round(value) for value in (x - half_px, y - half_px, x + half_px, y)]
+            return np.asarray(image.convert('RGB').crop(box), dtype=np.int64)

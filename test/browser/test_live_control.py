@@ -1,0 +1,234 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Several people and an experimenter at their pages: seats, run control, planners and events."""
+
+from collections.abc import Iterator
+import time
+
+from browser_support import Browser, OpenBrowser
+from live_browser_support import BRAKE, Graph, live_graph, LivePage, SCENARIOS, THROTTLE
+import numpy as np
+import pytest
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.select import Select
+import yaml
+
+PEDESTRIAN = "crgame.store.scene.objects.findIndex(({ id }) => id === 'o201')"
+# Between a colour's blue and its red: the road is grey, the AV's plan is blue.
+GREY, BLUE = 25, 60
+
+
+@pytest.fixture(scope='module')
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+    """Keep one graph of the crossing, in which nobody drives the human's car at first."""
+    folder = tmp_path_factory.mktemp('control')
+    game = yaml.safe_load((SCENARIOS / 'crossing.yaml').read_text())
+    game |= {'scenario': str(SCENARIOS / game['scenario']), 'duration': 3600}
+    game['humans'][0]['driver'] = 'idle'
+    (folder / 'game.yaml').write_text(yaml.safe_dump(game))
+    with live_graph(folder / 'game.yaml', folder / 'run') as running:
+        yield running
+
+
+@pytest.fixture(scope='module')
+def only_page(graph: Graph, module_browser: Browser) -> LivePage:
+    """Open the page once."""
+    return LivePage(graph, module_browser)
+
+
+@pytest.fixture
+def page(only_page: LivePage) -> Iterator[LivePage]:
+    """Give the page of a run that goes on."""
+    only_page.wait_for_run('running')
+    yield only_page
+    assert only_page.browser.console_errors() == []
+
+
+@pytest.fixture
+def new_run(page: LivePage) -> LivePage:
+    """Give the page of a run that has just begun."""
+    page.reset()
+    return page
+
+
+def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
+        page: LivePage, new_browser: OpenBrowser) -> None:
+    """By the buttons alone: asked for, handed over, given back; one drives at a time."""
+    graph = page.graph
+    other = LivePage(graph, new_browser(1000, 640))
+    name = other.driver.find_element(By.ID, 'my-name')
+    name.send_keys(Keys.CONTROL, 'a')
+    name.send_keys('Bob', Keys.ENTER)
+    page.claim('hv0')
+    other.wait_for_text('li[data-seat="hv0"]', 'Driven by Guest')
+    other.click(other.seat_button('hv0', 'ask'))
+    page.wait_for_text('.drive-news', 'Bob asks for hv0')
+    page.wait_for_text(page.seat_button('hv0', 'hand_over'), 'Hand over to Bob')
+    page.hold('w')
+    graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
+    page.click(page.seat_button('hv0', 'hand_over'))
+    other.wait("crgame.driving.seat === 'hv0'", 'the seat that was handed over')
+    # The key of the one who had it is still down.
+    graph.wait_for_command('hv0', THROTTLE, 0.0, 0.0)
+    other.hold('s')
+    graph.wait_for_command('hv0', BRAKE, 1.0, 1.0)
+    graph.wait_for_steps(20)
+    assert np.all(graph.commands('hv0')[1][:, THROTTLE] == 0.0)
+    page.wait_for_text('li[data-seat="hv0"]', 'Driven by Bob')
+    page.release('w')
+    other.release('s')
+    other.give_back('hv0')
+    page.wait("crgame.store.seats.hv0.source === 'game'", 'the seat of the game')
+    graph.wait_for_command('hv0', BRAKE, 0.0, 0.0)
+    assert other.browser.console_errors() == []
+
+
+def test_an_av_is_taken_over_and_given_back(new_run: LivePage) -> None:
+    """It brakes by the key, and its planner drives it on from where it was left."""
+    page, graph = new_run, new_run.graph
+    page.wait('crgame.world.shown.vehicles[12 + 3] > 5', 'the AV to drive')
+    page.claim('av0')
+    page.wait_for_text('.hud-who', 'You drive av0')
+    page.hold('s')
+    graph.wait_for_command('av0', BRAKE, 1.0, 1.0)
+    speed = page.vehicle(1)[3]
+    page.wait('crgame.world.shown.vehicles[12 + 3] < arguments[0] - 3', 'the braking', speed)
+    page.release('s')
+    page.give_back('av0')
+    graph.peer.forget()
+    graph.peer.wait_until(lambda: len(graph.peer.messages['/timing/cycle']) > 2, 'cycles')
+    assert np.isnan(graph.commands('av0')[1][-1]).all()
+    page.wait_for_text('li[data-seat="av0"]', 'Driven by the planner idm')
+    left = page.vehicle(1)[3]
+    # The road before it is free for 30 m: the IDM speeds up again.
+    page.wait('crgame.world.shown.vehicles[12 + 3] > arguments[0] + 1', 'the planner', left)
+
+
+def test_pause_and_step(page: LivePage) -> None:
+    """While it pauses not one pixel changes; a step is one of the scenario's, N simulated ones."""
+    graph = page.graph
+    page.order('pause')
+    page.wait_for_run('paused')
+    page.wait('crgame.store.status.n === crgame.world.shown.n && !crgame.world.camera.moves')
+    graph.peer.listen_for(0.2)
+    n, before = graph.peer.n, page.picture(0)
+    graph.peer.listen_for(0.3)
+    assert graph.peer.n == n == page.run('return crgame.world.shown.n')
+    np.testing.assert_array_equal(page.picture(0), before)
+    # A tick's whole N steps, from wherever the pause caught it.
+    page.order('step')
+    graph.peer.wait_until(lambda: graph.peer.n == n + 10, 'ten steps')
+    page.wait('crgame.world.shown.n === arguments[0]', 'the step in the picture', n + 10)
+    assert np.any(page.picture(0) != before)
+    page.order('start')
+    graph.wait_for_steps(20)
+
+
+def test_the_real_time_factor(page: LivePage) -> None:
+    """At a fifth of the pace a second of simulated time takes five of the clock."""
+    graph = page.graph
+    factor = Select(page.driver.find_element(By.CSS_SELECTOR, '#run-control select'))
+    factor.select_by_value('0.2')
+    page.wait('crgame.store.status.real_time_factor === 0.2', 'the slow pace')
+    graph.peer.listen()
+    n, begin_s = graph.peer.n, time.monotonic()
+    graph.wait_for_steps(20)
+    passed_s = time.monotonic() - begin_s
+    assert passed_s >= 0.8 * (graph.peer.n - n) * 0.01 / 0.2
+    factor.select_by_value('1')
+    page.wait('crgame.store.status.real_time_factor === 1', 'the usual pace')
+
+
+def test_reset_begins_anew(page: LivePage) -> None:
+    """Everything is back at step 0 of another epoch, in the picture too."""
+    graph = page.graph
+    graph.wait_for_steps(50)
+    begin = graph.peer.games[-1].epoch
+    x = page.vehicle(0)[0]
+    page.reset()
+    graph.peer.listen()
+    assert graph.peer.games[-1].epoch == begin + 1 == page.run('return crgame.world.shown.epoch')
+    assert page.vehicle(0)[0] < x
+    # Asked and not agreed to, nothing happens.
+    page.click('#run-control [data-action="reset"]')
+    page.click('dialog[open] button:not(.danger)')
+    graph.wait_for_steps(20)
+    assert graph.peer.games[-1].epoch == begin + 1
+
+
+def test_a_planner_is_stopped_and_goes_on(page: LivePage) -> None:
+    """By the switch beside its numbers."""
+    page.tab('timing')
+    page.wait_for_text('tbody[data-av="av0"] .tag', 'running')
+    page.click('.planner-switch')
+    page.wait_for_text('tbody[data-av="av0"] .tag', 'stopped')
+    page.wait('crgame.store.status.planners.av0.running === false')
+    page.wait_for_text('.planner-switch', 'Go')
+    page.click('.planner-switch')
+    page.wait_for_text('tbody[data-av="av0"] .tag', 'running')
+    assert page.run('return crgame.store.status.planners.av0.running')
+
+
+def trigger(page: LivePage, label: str) -> None:
+    """Press the button of an event."""
+    page.tab('events')
+    page.click(f'button[aria-label="Trigger {label}"]')
+
+
+def test_a_trigger_lets_the_pedestrian_go(new_run: LivePage) -> None:
+    """He stands as drawn until the button is pressed, and walks across the road then."""
+    page = new_run
+    at = f'crgame.world.shown.objects[6 * {PEDESTRIAN} + 1]'
+    page.wait(f'Number.isFinite({at})', 'the pedestrian')
+    stands = page.run(f'return {at}')
+    page.graph.wait_for_steps(50)
+    assert page.run(f'return {at}') == stands
+    trigger(page, 'Let the pedestrian cross')
+    page.wait('crgame.store.fired.length === 1', 'the event')
+    assert page.run('return [crgame.store.fired[0].name, crgame.store.fired[0].by]') \
+        == ['pedestrian', 'trigger']
+    page.wait(f'{at} > arguments[0] + 1', 'the pedestrian on the road', stands)
+    assert 'Let the pedestrian cross' in page.text('.event-log')
+    assert page.run('return document.querySelector(arguments[0]).disabled',
+                    'button[aria-label="Trigger Let the pedestrian cross"]')
+
+
+def plan_color(page: LivePage) -> int:
+    """Give how blue the picture is where the AV's plan leads in a second's time."""
+    page.wait('crgame.store.plans.size > 0 && crgame.store.status.n === crgame.world.shown.n'
+              ' && !crgame.world.camera.moves', 'a plan')
+    red, _, blue = page.run("""
+        const { camera, shown } = crgame.world;
+        const { t, points } = crgame.store.plans.get(1);
+        let i = 0;
+        while (t + points[i + 4] < shown.t + 1) {
+          i += 5;
+        }
+        const canvas = document.querySelector('#world');
+        const ratio = canvas.width / canvas.clientWidth;
+        const at = [camera.toX(points[i], points[i + 1]), camera.toY(points[i], points[i + 1])];
+        return [...canvas.getContext('2d').getImageData(
+          Math.round(at[0] * ratio), Math.round(at[1] * ratio), 1, 1).data].slice(0, 3);""")
+    return int(blue) - int(red)
+
+
+def test_an_event_blanks_the_plan_in_the_picture(new_run: LivePage) -> None:
+    """And another shows it again; both act at the next scenario step."""
+    page = new_run
+    page.run("crgame.world.follow('av0');")
+    page.wait('crgame.store.plans.get(1)?.n > 30', 'plans')
+    page.order('pause')
+    page.wait_for_run('paused')
+    assert plan_color(page) > BLUE
+    for count, (label, shown) in enumerate((('Hide the plan', False),
+                                            ('Show the plan again', True)), start=1):
+        trigger(page, label)
+        page.wait_for_text('.event-list', 'Sent')
+        page.order('step')
+        page.wait('crgame.store.fired.length === arguments[0]', label, count)
+        page.graph.peer.listen_for(0.1)
+        assert (plan_color(page) > BLUE) == shown
+        assert shown or plan_color(page) < GREY
+    page.order('start')
+    page.wait_for_run('running')

@@ -1,0 +1,150 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded take-over again, offline: the human to the last bit, the AV by the same hands."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+import json
+from pathlib import Path
+import subprocess
+import sys
+from typing import NamedTuple
+
+from live_support import CUT_IN, Launcher, ROOT, wait_until
+import numpy as np
+from numpy.typing import NDArray
+from page_client import PageClient
+import pytest
+
+from crgame_ros.planner.joints import vehicle_to_joints
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_log import read_cycles
+from crgame_ros.ros.messages import from_time
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.replay import recorded_inputs
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.vehicle.state import StateColumn, VehicleState
+
+STEP_NS = 10_000_000
+
+
+class Recorded(NamedTuple):
+    """A run whose hv0 changed hands for a while and whose av0 was taken over."""
+
+    folder: Path
+    commands: NDArray[np.float64]
+
+    @property
+    def duration_s(self) -> float:
+        """How long it was [s]."""
+        return len(self.commands) * STEP_NS * 1e-9
+
+    @property
+    def driven(self) -> NDArray[np.intp]:
+        """Cycles in which somebody drove av0."""
+        return np.flatnonzero(np.isfinite(self.commands[:, 0]))
+
+
+@pytest.fixture(scope='module')
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recorded]:
+    """Drive in the browser: the human's car a little, then the AV for a while, then nothing."""
+    folder = tmp_path_factory.mktemp('take_over') / 'run'
+    with Launcher([CUT_IN, '--duration', 300], folder, headless=False) as launcher:
+        with PageClient(launcher.page) as page:
+            _drive(page, 'hv0', [0, 0, 1, 0], 60)
+            _drive(page, 'av0', [0, 1, 0, 0], 120)
+            n = page.documents['status']['n']
+            wait_until(lambda: page.documents['status']['n'] > n + 100, 'another second')
+            assert page.request('control', action='stop')['ok']
+        assert launcher.wait() == 0, launcher.text
+    yield Recorded(folder, read_cycles(folder / 'bag').commands('av0'))
+
+
+def _drive(page: PageClient, seat: str, keys: list[int], steps: int) -> None:
+    """Take a seat, hold keys for so many steps and give it back, with the pedals let go."""
+    wait_until(lambda: page.documents.get('status', {}).get('run') == 'running', 'the run')
+    page.hold_keys(seat, keys)
+    assert page.request('claim', seat=seat)['ok']
+    wait_until(lambda: page.seat(seat)['source'] == 'cockpit', 'the seat')
+    n = page.documents['status']['n']
+    wait_until(lambda: page.documents['status']['n'] > n + steps, f'{steps} steps')
+    page.let_go()
+    assert page.request('release', seat=seat)['ok']
+    wait_until(lambda: page.seat(seat)['source'] != 'cockpit', 'the seat given back')
+
+
+def _published(bag: Path, vehicle: str) -> NDArray[np.float64]:
+    """Read the (n + 1, 2, 4) joint positions and velocities of a vehicle, step by step."""
+    found = {}
+    with BagReader(bag) as reader:
+        for item in reader.decoded(['/vehicles/state']):
+            first = list(item.message.joint_names).index(f'{vehicle}/x')
+            point = item.message.points[0]
+            found[from_time(item.message.header.stamp)] = (
+                point.positions[first:first + 4], point.velocities[first:first + 4])
+    stamps = sorted(found)
+    assert np.all(np.diff(stamps) == STEP_NS)
+    return np.array([found[stamp_ns] for stamp_ns in stamps])
+
+
+def _replayed(recorded: Recorded) -> OfflineResult:
+    game = load_game(recorded.folder / 'game.yaml')
+    human = replace(game.humans[0], driver=f'replay:{recorded.folder / "bag"}')
+    setup = build_setup(replace(game, humans=(human,)))
+    drivers, intervals_s = recorded_inputs(setup)
+    assert sorted(drivers) == ['av0', 'hv0']
+    return run_offline(setup, duration_s=recorded.duration_s, drivers=drivers,
+                       intervals_s=intervals_s)
+
+
+def _joints(result: OfflineResult, vehicle: str) -> NDArray[np.float64]:
+    return np.array([vehicle_to_joints(VehicleState(*row))[:2]
+                     for row in result.states_of(vehicle).tolist()])
+
+
+def test_the_human_is_reproduced_to_the_last_bit(recorded: Recorded) -> None:
+    """Whoever sat in the seat: script, browser, script again; every published state."""
+    live, again = _published(recorded.folder / 'bag', 'hv0'), _joints(_replayed(recorded), 'hv0')
+    assert len(live) == len(recorded.commands) + 1 and np.array_equal(live, again)
+    # What the browser did is in it: the script alone goes elsewhere.
+    script = run_offline(build_setup(load_game(recorded.folder / 'game.yaml')),
+                         duration_s=recorded.duration_s)
+    assert np.hypot(*(_joints(script, 'hv0')[-1, 0, :2] - live[-1, 0, :2])) > 1.0
+
+
+def test_the_take_over_is_repeated(recorded: Recorded) -> None:
+    """
+    In the same cycles, by the same commands; before and after, its planner has the AV.
+
+    Live, plans arrive some steps late, so that the AV enters the take-over elsewhere than in
+    lockstep: from there on what its driver does to its speed is the same.
+    """
+    driven = recorded.driven
+    assert len(driven) > 100 and np.all(np.diff(driven) == 1)
+    assert recorded.commands[driven, 1].max() == 1.0
+    result = _replayed(recorded)
+    live, again = _published(recorded.folder / 'bag', 'av0'), result.states_of('av0')
+    speeds = np.hypot(live[:, 1, 0], live[:, 1, 1])
+    first, last = driven[0], driven[-1] + 1
+    assert speeds[first] - speeds[last] > 3.0
+    assert again[last, StateColumn.SPEED] - again[first, StateColumn.SPEED] == pytest.approx(
+        speeds[last] - speeds[first], abs=0.3)
+    # Full braking, at the end of the take-over, in the same steps as live.
+    assert again[last - 5:last, StateColumn.ACCELERATION].max() < -3.0
+    alone = run_offline(result.setup, duration_s=recorded.duration_s, drivers={
+        'hv0': recorded_inputs(result.setup)[0]['hv0']})
+    assert alone.states_of('av0')[last, StateColumn.SPEED] > speeds[last] + 3.0
+
+
+def test_the_command_line_does_the_same_twice(recorded: Recorded) -> None:
+    """`crgame offline GAME --driver replay:BAG`: one state hash, that of the runner."""
+    hashes = set()
+    for _ in range(2):
+        process = subprocess.run(
+            [sys.executable, '-m', 'crgame_ros.cli', 'offline', recorded.folder / 'game.yaml',
+             '--driver', f'replay:{recorded.folder / "bag"}',
+             '--duration', str(recorded.duration_s)],
+            cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
+        hashes.add(json.loads(process.stdout)['state_hash'])
+    assert hashes == {_replayed(recorded).state_hash}

@@ -1,0 +1,147 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The cockpit's live backend between pages and a graph whose messages the test chooses."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+import json
+from typing import Any
+
+from live_peer import Peer
+import numpy as np
+import rclpy
+from rclpy.context import Context
+from std_msgs.msg import String
+
+from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.messages import parse_message
+from crgame_ros.planner.joints import vehicle_joint_names, vehicle_to_joints
+from crgame_ros.ros.cockpit_backend import LiveBackend
+from crgame_ros.ros.environment import free_domain_id
+from crgame_ros.ros.messages import StateMessage
+from crgame_ros.simulation.documents import game_document, objects_document
+from crgame_ros.simulation.setup import Setup
+
+OFFSET_NS = 1_000_000_000
+PATIENCE_S = 20.0
+SCRIPT = 'keys:cut_in.keys.yaml'
+
+
+class Graph:
+    """A backend with pages, and the peer that plays the simulation for it."""
+
+    def __init__(self, peer: Peer, hub: Hub, backend: LiveBackend, node: Any) -> None:
+        self.peer = peer
+        self.hub = hub
+        self.backend = backend
+        self.node = node
+        self._publishers: dict[tuple[str, str], Any] = {}
+
+    def page(self) -> Client:
+        """Open a page."""
+        client = self.hub.add(lambda: None, lambda: 0)
+        self.backend.joined(client)
+        return client
+
+    async def ask(self, client: Client, kind: str, **fields: Any) -> str:
+        """Let a page ask for something."""
+        return await self.backend.command(
+            client, parse_message(json.dumps({'type': kind, 'id': 1, **fields})))
+
+    async def say(self, name: str, message: Any, vehicle: str = '') -> None:
+        """Publish a message of the simulation or a planner, once the cockpit hears it."""
+        publisher = self._publishers.get((name, vehicle))
+        if publisher is None:
+            publisher = self._publishers[name, vehicle] = \
+                self.peer._endpoints.publisher(name, vehicle)
+            await self.until(publisher.get_subscription_count, f'a listener of {name}')
+            await asyncio.sleep(0.2)
+        publisher.publish(message)
+
+    async def begin(self, setup: Setup, epoch: int = 0) -> None:
+        """Publish the documents of a game, and wait for its scene."""
+        texts = {'xml': setup.loaded.xml_text, 'objects': objects_document(setup.descriptions),
+                 'game': game_document(setup, epoch=epoch, clock_offset_ns=OFFSET_NS,
+                                       real_time_factor=1.0)}
+        for name, text in texts.items():
+            await self.say(f'/scenario/{name}', String(data=text))
+        await self.until(lambda: self.scene.get('time', {}).get('epoch') == epoch, 'the scene')
+
+    async def seats(self, source: str, driver: str = SCRIPT) -> None:
+        """Say who drives hv0."""
+        await self.say('/seats', String(data=json.dumps({
+            'hv0': {'source': source, 'driver': driver},
+            'av0': {'source': 'planner', 'driver': 'idm'}})))
+        await self.until(lambda: self.seat().get('source') == source, f'/seats: {source}')
+
+    async def state(self, setup: Setup, n: int) -> None:
+        """Publish the first states of a game as those of step n."""
+        message = StateMessage([name for vehicle in setup.vehicle_ids
+                                for name in vehicle_joint_names(vehicle)])
+        rows = [vehicle_to_joints(vehicle.state) for vehicle in setup.vehicles]
+        for index, values in enumerate(
+                (message.positions, message.velocities, message.accelerations)):
+            values[:] = np.concatenate([row[index] for row in rows])
+        await self.say('/vehicles/state', message.stamp(OFFSET_NS + n * 10_000_000))
+
+    def document(self, kind: str) -> dict[str, Any]:
+        """Give a document as pages have it."""
+        return dict(json.loads(self.hub._documents.get(kind, b'{}')))
+
+    @property
+    def scene(self) -> dict[str, Any]:
+        """The scene."""
+        return self.document('scene')
+
+    def seat(self, name: str = 'hv0') -> dict[str, Any]:
+        """Give a seat as pages have it."""
+        return dict(self.document('seats').get('seats', {}).get(name, {}))
+
+    def orders(self) -> list[str]:
+        """Give the sources that were ordered."""
+        return [json.loads(item.data)['source'] for item in self.peer.messages['/seats/order']]
+
+    def throttles(self) -> list[float]:
+        """Give the throttle of each command that came from the cockpit."""
+        return [item.axes[0] for item in self.peer.messages['/<v>/driver_command']]
+
+    async def until(self, condition: Callable[[], object], what: str) -> None:
+        """Let everybody work until a condition holds."""
+        loop = asyncio.get_running_loop()
+        until_s = loop.time() + PATIENCE_S
+        while not condition():
+            assert loop.time() < until_s, f'waited in vain for {what}'
+            self.peer.listen()
+            await asyncio.sleep(0.005)
+
+    async def pause(self, seconds: float) -> None:
+        """Let everybody work for a time."""
+        until_s = asyncio.get_running_loop().time() + seconds
+        while asyncio.get_running_loop().time() < until_s:
+            self.peer.listen()
+            await asyncio.sleep(0.005)
+
+
+Check = Callable[[Graph], Coroutine[Any, Any, None]]
+
+
+async def _run(check: Check) -> None:
+    domain, context = free_domain_id(), Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node('cockpit_node', context=context)
+    hub, backend = Hub('live'), LiveBackend(node)
+    try:
+        with Peer(domain, '/seats/order', ('/<v>/driver_command', 'hv0')) as peer:
+            await backend.start(hub)
+            await check(Graph(peer, hub, backend, node))
+            assert backend._pump is not None and not backend._pump.done()
+            await backend.stop()
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def lived(check: Check) -> None:
+    """Run a test in an event loop, with a graph of its own."""
+    asyncio.run(_run(check))

@@ -1,0 +1,205 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the cockpit makes of messages good and bad, and of seats that change."""
+
+from array import array
+from dataclasses import replace
+import json
+from typing import Any
+
+from cockpit_graph import Graph, lived, OFFSET_NS
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from live_support import CUT_IN, SCENARIOS
+import numpy as np
+import pytest
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from crgame_ros.errors import InputError
+from crgame_ros.ros.messages import to_time
+from crgame_ros.scenario.events import FiredEvent
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.documents import events_document
+from crgame_ros.simulation.setup import build_setup, Setup
+
+FULL = {'keys': [1, 0, 0, 0], 'reverse': 0}
+
+
+@pytest.fixture(scope='module')
+def setup() -> Setup:
+    """Load the cut-in game."""
+    return build_setup(load_game(CUT_IN))
+
+
+def _trajectory(*points: int, names: tuple[str, ...] = ()) -> JointTrajectory:
+    """Make a trajectory whose points give so many positions, and nothing else."""
+    message = JointTrajectory(joint_names=list(names))
+    message.header.stamp = to_time(OFFSET_NS)
+    message.points = [JointTrajectoryPoint(positions=array('d', [float('nan')] * count))
+                      for count in points]
+    return message
+
+
+def _cycle(columns: int, numbers: int) -> Float64MultiArray:
+    message = Float64MultiArray(data=array('d', [0.0] * numbers))
+    message.layout.dim = [MultiArrayDimension(), MultiArrayDimension(size=columns)]
+    return message
+
+
+MALFORMED = [
+    ('/vehicles/state', '', [_trajectory(), _trajectory(8), _trajectory(3), _trajectory(8, 8)]),
+    ('/traffic/objects', '', [_trajectory(), _trajectory(0), _trajectory(1), _trajectory(3)]),
+    ('/<av>/plan', 'av0', [_trajectory(), _trajectory(4), _trajectory(*[4] * 2000)]),
+    ('/<av>/plan_request', 'av0', [
+        _trajectory(), _trajectory(4, 3, names=('hv0/x',)), _trajectory(0, names=('hv0/x',)),
+        _trajectory(1, names=('hv0/x',)), _trajectory(*[1] * 2000, names=('hv0/x',))]),
+    ('/timing/cycle', '', [Float64MultiArray(), _cycle(20, 0), _cycle(20, 19), _cycle(7, 700)]),
+    *((name, '', [String(data=text) for text in (
+        '', '{', '[]', '{}', '[' * 100_000, '{"hv0": 3}', '{"hv0": {}}', '{"k": "x"}',
+        '{"a b": {"source": "game", "driver": "idle"}}', '{"epoch": 1e400}', 'x' * 100_000,
+        '{"hv0": {"source": ["cockpit"], "driver": "idle"}}', '{"fired": [{"name": 3}]}',
+        '{"hv0": {"source": "cockpit", "driver": null}}', '{"states": 7, "k": NaN}')])
+      for name in ('/seats', '/scenario/events', '/scenario/signals', '/scenario/game',
+                   '/scenario/objects')),
+    ('/diagnostics', '', [DiagnosticArray(status=[
+        DiagnosticStatus(name=name) for name in ('', ': ', '/drivability', 'hv9/drivability',
+                                                 'sim_node: run', 'sim_node: hv0 plans')])]),
+]
+
+
+@pytest.mark.parametrize(('name', 'vehicle', 'messages'), MALFORMED,
+                         ids=[case[0].replace('/', '_') for case in MALFORMED])
+def test_no_message_stops_the_pump(setup: Setup, name: str, vehicle: str,
+                                   messages: list[Any]) -> None:
+    """Whatever peers send: the next good state is shown, and a driver drives."""
+    async def check(graph: Graph) -> None:
+        page = graph.page()
+        page.wants_predictions = True
+        await graph.begin(setup)
+        await graph.seats('cockpit')
+        for message in messages:
+            await graph.say(name, message, vehicle)
+            await graph.pause(0.06)
+        await graph.seats('cockpit')
+        await graph.ask(page, 'claim', seat='hv0')
+        before = graph.hub._frames.get('state')
+        await graph.ask(page, 'input', seat='hv0', **FULL)
+        await graph.state(setup, 10)
+        await graph.until(lambda: graph.hub._frames.get('state') is not before, 'the state')
+        frame = np.frombuffer(graph.hub._frames['state'].data)
+        assert frame[2] == 10 and frame[6:9].tolist() == [*setup.humans[0].state[:3]]
+        await graph.until(lambda: any(graph.throttles()), 'the throttle')
+        assert 'hv9' not in graph.document('status').get('drivability', {})
+    lived(check)
+
+
+def test_a_refused_claim_takes_nothing_away(setup: Setup) -> None:
+    """Who asks for a seat that somebody has keeps the one that is theirs."""
+    async def check(graph: Graph) -> None:
+        first, second = graph.page(), graph.page()
+        await graph.begin(setup)
+        await graph.seats('game')
+        await graph.ask(first, 'claim', seat='hv0')
+        await graph.ask(second, 'claim', seat='av0')
+        with pytest.raises(InputError, match='ask for it'):
+            await graph.ask(second, 'claim', seat='hv0')
+        await graph.until(lambda: len(graph.orders()) >= 2, 'two orders')
+        assert graph.seat('av0')['holder'] == second.id
+        assert graph.seat('hv0')['holder'] == first.id
+        assert 'game' not in graph.orders()
+    lived(check)
+
+
+def test_giving_back_lets_go_of_the_pedals(setup: Setup) -> None:
+    """Released is the last word: nothing of a held pedal is left for who comes next."""
+    async def check(graph: Graph) -> None:
+        page = graph.page()
+        await graph.begin(setup)
+        await graph.seats('cockpit')
+        await graph.ask(page, 'claim', seat='hv0')
+        # During a pause: no cycle comes, the page repeats its keys.
+        await graph.until(lambda: graph.peer.node.count_publishers('/hv0/driver_command'),
+                          'the cockpit as a driver')
+        for _ in range(5):
+            await graph.ask(page, 'input', seat='hv0', **FULL)
+            await graph.pause(0.05)
+        assert graph.throttles()[-1] > 0.0
+        await graph.ask(page, 'release', seat='hv0')
+        await graph.pause(0.3)
+        assert graph.throttles()[-1] == 0.0
+    lived(check)
+
+
+def test_an_order_is_repeated_until_it_is_answered(setup: Setup) -> None:
+    """While the simulation loads a game it hears nothing; a seat is not lost by that."""
+    async def check(graph: Graph) -> None:
+        page = graph.page()
+        await graph.begin(setup)
+        await graph.seats('game')
+        await graph.ask(page, 'claim', seat='hv0')
+        await graph.until(lambda: graph.orders() == ['cockpit'] * 3, 'the order three times')
+        # What was said before the order arrived takes nothing away; what follows from it ends it.
+        await graph.seats('other')
+        assert graph.seat()['holder'] == page.id
+        await graph.seats('cockpit')
+        await graph.pause(1.2)
+        assert len(graph.orders()) <= 4
+        assert graph.seat()['holder'] == page.id
+        # Now somebody outside takes the seat.
+        await graph.seats('other')
+        await graph.until(lambda: graph.seat()['holder'] is None, 'the seat taken away')
+    lived(check)
+
+
+def test_a_seat_that_was_the_cockpits_before_can_be_taken_away(setup: Setup) -> None:
+    """After a restart of the cockpit a claim changes nothing on /seats: it holds at once."""
+    async def check(graph: Graph) -> None:
+        page = graph.page()
+        await graph.begin(setup)
+        await graph.seats('cockpit')
+        await graph.ask(page, 'claim', seat='hv0')
+        await graph.seats('other')
+        await graph.until(lambda: graph.seat()['holder'] is None, 'the seat taken away')
+        with pytest.raises(InputError, match='you do not have the seat'):
+            await graph.ask(page, 'input', seat='hv0', **FULL)
+    lived(check)
+
+
+def test_another_game_leaves_nothing_behind(setup: Setup) -> None:
+    """Publishers and subscriptions of vehicles that take no part any more are given up."""
+    async def check(graph: Graph) -> None:
+        await graph.begin(build_setup(load_game(SCENARIOS / 'two_avs.yaml')))
+        await graph.say('/seats', String(data=json.dumps(
+            {name: {'source': 'game', 'driver': 'idle'} for name in ('hv0', 'av0', 'av1')})))
+        topics = ('/av1/plan', '/av1/plan_request', '/av1/drivability')
+        await graph.until(lambda: graph.seat('av1'), 'the seat of av1')
+        assert graph.node.count_publishers('/av1/driver_command') == 1
+        assert [graph.node.count_subscribers(topic) for topic in topics] == [1, 1, 1]
+        await graph.begin(setup, epoch=1)
+        await graph.seats('game')
+        await graph.until(
+            lambda: not any(graph.node.count_subscribers(topic) for topic in topics)
+            and not graph.node.count_publishers('/av1/driver_command'), 'the end of av1')
+    lived(check)
+
+
+def test_events_and_signals_are_passed_on(setup: Setup) -> None:
+    """Events of this epoch only; nothing that a peer adds can pose as another document."""
+    async def check(graph: Graph) -> None:
+        await graph.begin(setup)
+        before = graph.scene
+        fired = FiredEvent('box', 30, 3, 'trigger')
+        await graph.say('/scenario/events', String(data=events_document(7, [fired])))
+        await graph.pause(0.3)
+        assert graph.document('events')['fired'] == []
+        await graph.say('/scenario/events', String(data=events_document(
+            0, [replace(fired, name='rain')])))
+        await graph.until(lambda: graph.document('events')['fired'], 'the event')
+        assert graph.document('events')['fired'] == [
+            {'name': 'rain', 'n': 30, 'k': 3, 'by': 'trigger'}]
+        await graph.say('/scenario/signals', String(data=json.dumps(
+            {'type': 'scene', 'k': 4, 'states': {'7': 'red'}})))
+        await graph.until(lambda: graph.document('signals'), 'the signals')
+        assert graph.document('signals') == {'type': 'signals', 'k': 4, 'states': {'7': 'red'}}
+        assert graph.scene == before
+    lived(check)

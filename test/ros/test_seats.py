@@ -1,0 +1,189 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Seats of a run over DDS: losses, pauses, changes of hands and floods, step by step."""
+
+from collections.abc import Iterator
+import json
+from typing import NamedTuple
+
+from live_peer import Peer
+from live_support import CUT_IN, wait_until
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from std_msgs.msg import String
+
+from crgame_ros.driver.command import DriverCommand, RELEASED
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.environment import free_domain_id
+from crgame_ros.ros.messages import to_joy
+from crgame_ros.ros.seats import COMMAND_DEPTH, GAME, MAX_ORDERS, Seat, Seats
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.setup import build_setup
+
+MS = 1_000_000
+OFFSET_NS = 1_000_000_000
+FULL = DriverCommand(throttle=1.0)
+
+
+class Table(NamedTuple):
+    """The seats, and a stranger who commands and orders."""
+
+    seats: Seats
+    sources: dict[str, str]
+    node: Node
+    peer: Peer
+    commands: Publisher
+    orders: Publisher
+
+    @property
+    def human(self) -> Seat:
+        """The seat of hv0."""
+        return self.seats.humans[0]
+
+    def say(self, command: DriverCommand, source: str = GAME) -> None:
+        """Command hv0, and wait until it has come."""
+        self.commands.publish(to_joy(command, OFFSET_NS, source))
+        self.commands.wait_for_all_acked()
+
+    def order(self, source: str, now_ns: int = 0) -> None:
+        """Order a source for hv0, and have it obeyed."""
+        self.orders.publish(String(data=json.dumps({'seat': 'hv0', 'source': source})))
+        wait_until(lambda: self.seats.take_orders(now_ns)[0], f'the order {source}')
+
+    def drive(self, first_ms: int, last_ms: int) -> DriverCommand | None:
+        """Drive hv0 at 20 m/s, one cycle each 10 ms of the steady clock; give the last command."""
+        command = None
+        for now_ms in range(first_ms, last_ms, 10):
+            command = self.human.command(now_ms * MS, 0.01, 20.0)
+        return command
+
+
+@pytest.fixture
+def table() -> Iterator[Table]:
+    """Seats of the cut-in game and a peer, who have met."""
+    domain, context = free_domain_id(), Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node('seats', context=context)
+    sources: dict[str, str] = {}
+    seats = Seats(Endpoints(node), build_setup(load_game(CUT_IN)), OFFSET_NS, sources)
+    with Peer(domain) as peer:
+        yield Table(seats, sources, node, peer, peer.publisher('/<v>/driver_command', 'hv0'),
+                    peer.publisher('/seats/order'))
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
+
+
+def _heard(table: Table, command: DriverCommand, source: str = GAME) -> None:
+    """Let the seat hear a command at 0 ms of the steady clock."""
+    def obeyed() -> bool:
+        table.say(command, source)
+        return table.human.command(0, 0.01, 20.0) == command
+    wait_until(obeyed, 'the command')
+
+
+def test_a_pause_is_no_loss(table: Table) -> None:
+    """A pedal that is held goes on being held for as long after the pause as without one."""
+    _heard(table, FULL)
+    table.human.forgive(5_000 * MS)
+    assert table.drive(5_000, 5_190) == FULL
+    assert table.human.losses == 0
+
+
+def test_a_pause_gives_a_lost_driver_no_pedals_back(table: Table) -> None:
+    """A driver died with the pedal down; pausing and stepping must not press it again."""
+    _heard(table, FULL)
+    lost = table.drive(10, 1_500)
+    assert lost is not None and lost.throttle == 0.0 and lost.brake > 0.0 and table.human.lost
+    # Ten single steps of ten cycles, each after a pause.
+    for step in range(10):
+        start_ms = 10_000 + 1_000 * step
+        table.human.forgive(start_ms * MS)
+        for now_ms in range(start_ms, start_ms + 100, 10):
+            command = table.human.command(now_ms * MS, 0.01, 20.0)
+            assert command is not None and command.throttle == 0.0 and command.brake > 0.0
+    assert table.human.losses == 1
+
+
+def test_who_takes_the_seat_of_a_lost_driver_gets_it_released(table: Table) -> None:
+    """The claim of the seat is no word of the driver who died with the pedal down."""
+    _heard(table, FULL)
+    table.drive(10, 1_500)
+    table.order('cockpit', 1_500 * MS)
+    for now_ms in range(1_500, 1_700, 10):
+        command = table.human.command(now_ms * MS, 0.01, 20.0)
+        assert command is not None and command.throttle == 0.0
+    table.say(FULL, 'cockpit')
+    wait_until(lambda: table.human.listen(1_700 * MS) and not table.human.lost
+               and (table.drive(1_700, 1_710) or RELEASED).throttle > 0.0, 'the new driver')
+
+
+def test_a_change_of_hands_keeps_the_command_until_the_new_one_speaks(table: Table) -> None:
+    """No dip of the pedals, but no longer than the watchdog waits for anybody."""
+    _heard(table, FULL)
+    table.order('cockpit')
+    assert table.drive(0, 200) == FULL
+    command = table.drive(200, 400)
+    assert command is not None and command.throttle < 1.0 and table.human.lost
+
+
+@pytest.mark.parametrize('ordered', [['cockpit', 'game'], ['game', 'cockpit', 'game']], ids=len)
+def test_given_back_is_forgotten(table: Table, ordered: list[str]) -> None:
+    """In the next game, that one's driver has the seat: nothing of this game's driver is kept."""
+    for source in ordered:
+        table.orders.publish(String(data=json.dumps({'seat': 'hv0', 'source': source})))
+    wait_until(lambda: table.seats.take_orders(0) and table.human.source == 'game'
+               and 'hv0' not in table.sources, 'the seat given back')
+
+
+def test_released_in_a_cockpit_game_it_is_the_next_games_drivers(table: Table) -> None:
+    """Its home is the cockpit there; the scripted game after it is driven by its script."""
+    table.human.home = 'cockpit'
+    table.order('cockpit')
+    assert table.sources == {'hv0': 'cockpit'}
+    table.orders.publish(String(data='{"seat": "hv0", "source": "game"}'))
+    wait_until(lambda: table.seats.take_orders(0) is not None and not table.sources, 'the order')
+    seats = Seats(Endpoints(table.node), build_setup(load_game(CUT_IN)), OFFSET_NS, table.sources)
+    assert seats.humans[0].source == GAME
+
+
+def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
+    """Of a hundred waiting orders a cycle takes ten, of commands what fits into the queue."""
+    for _ in range(3 * MAX_ORDERS):
+        table.orders.publish(String(data='nonsense'))
+    table.orders.wait_for_all_acked()
+    taken = []
+    wait_until(lambda: taken.append(len(table.seats.take_orders(0)[1]))
+               or sum(taken) == 3 * MAX_ORDERS, 'all refusals')
+    assert max(taken) <= MAX_ORDERS
+    asked = 0
+
+    class Flood:
+        """A slot that is never empty."""
+
+        def take(self) -> object:
+            """Give another command."""
+            nonlocal asked
+            asked += 1
+            return to_joy(FULL, OFFSET_NS, GAME)
+    table.human.commands = Flood()  # type: ignore[assignment]
+    assert table.human.listen(0)
+    assert asked == COMMAND_DEPTH
+
+
+def test_what_makes_no_command_is_counted(table: Table) -> None:
+    """Of a run before, of nobody's source, without axes, or not finite: nothing of it drives."""
+    _heard(table, RELEASED)
+    old, empty, stranger = (to_joy(FULL, stamp_ns, source) for stamp_ns, source in (
+        (OFFSET_NS - 1, GAME), (OFFSET_NS, GAME), (OFFSET_NS, 'stranger')))
+    empty.axes = []
+    for message in (old, empty, stranger, to_joy(
+            DriverCommand(float('nan'), float('inf'), float('-inf')), OFFSET_NS, GAME)):
+        table.commands.publish(message)
+    found = []
+    wait_until(lambda: found.append(table.human.command(0, 0.01, 20.0))
+               or found[-1] != RELEASED, 'the last of them')
+    assert found[-1] == DriverCommand(0.0, 1.0, -1.0)
+    assert (table.human.outdated, table.human.malformed) == (1, 1)
