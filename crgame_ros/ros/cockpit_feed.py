@@ -78,6 +78,7 @@ class CockpitFeed:
         self._run_heard_s = 0.0
         self._slow_s = 0.0
         self._status_s = 0.0
+        self._told_run = ''
         self._pace: tuple[float, int] = (0.0, 0)
         self._measured_factor: float | None = None
 
@@ -101,8 +102,10 @@ class CockpitFeed:
                 _read(work, problems)
         for work in (self._poll_commands, self._poll_states, self._poll_objects):
             _read(work, problems)
-        if now_s - self._status_s >= STATUS_PERIOD_S:
+        # The page holds its picture still in a pause: it must not learn of it late.
+        if now_s - self._status_s >= STATUS_PERIOD_S or self.status.run != self._told_run:
             self._status_s = now_s
+            self._told_run = self.status.run
             self._send_status(now_s)
         return problems
 

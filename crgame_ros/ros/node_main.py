@@ -75,7 +75,9 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     from rclpy.signals import SignalHandlerOptions
 
     from crgame_ros.errors import CrgameError
+    from crgame_ros.ros.shared_memory import remove_half_made_ports
 
+    remove_half_made_ports()
     stop = StopFlag()
     stop.listen()
     code = 0

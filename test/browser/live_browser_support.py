@@ -61,6 +61,7 @@ class Graph(NamedTuple):
 
     def wait_for_steps(self, steps: int) -> None:
         """Wait until the simulation has gone so many steps on."""
+        self.peer.listen()
         last = self.peer.n + steps
         self.peer.wait_until(lambda: self.peer.n >= last, f'n = {last}', PATIENCE_S)
 
@@ -208,14 +209,17 @@ class LivePage:
                        'return [...crgame.world.shown.vehicles.subarray(at, at + 12)];', index)
         return np.array([np.nan if value is None else value for value in row], dtype=float)
 
-    def picture(self, vehicle: int, half_px: int = 150) -> NDArray[np.int64]:
-        """Take a screenshot of what lies before a vehicle that drives up, (rows, columns, 3)."""
+    def follow(self, vehicle_id: str) -> None:
+        """Keep the camera on a vehicle, and wait until it has arrived."""
+        self.run('crgame.world.follow(arguments[0], true);', vehicle_id)
+        self.wait('!crgame.world.camera.moves', 'the camera to arrive')
+
+    def picture(self, half_px: int = 150) -> NDArray[np.int64]:
+        """Take a screenshot of what lies before the followed vehicle, (rows, columns, 3)."""
         x, y = self.run("""
-            const { camera, shown } = crgame.world;
-            const at = 12 * arguments[0];
+            const { camera } = crgame.world;
             const box = document.querySelector('#world').getBoundingClientRect();
-            const [x, y] = shown.vehicles.subarray(at, at + 2);
-            return [box.left + camera.toX(x, y), box.top + camera.toY(x, y)];""", vehicle)
+            return [box.left + camera.anchorX, box.top + camera.anchorY];""")
         with Image.open(BytesIO(self.driver.get_screenshot_as_png())) as image:
             box = [round(value) for value in (x - half_px, y - half_px, x + half_px, y)]
             return np.asarray(image.convert('RGB').crop(box), dtype=np.int64)

@@ -93,17 +93,17 @@ def test_the_run_waits_for_a_person_and_shows_what_will_be_driven(only_page: Liv
 
 def test_holding_w_moves_the_car_and_the_picture(page: LivePage) -> None:
     """Before that nothing moves, not one pixel; let go, the throttle closes."""
-    page.wait('crgame.world.followed === "hv0" && !crgame.world.camera.moves'
-              ' && Math.abs(crgame.world.shown.vehicles[3]) < 1e-9', 'the standing car')
-    before, x = page.picture(0), page.vehicle(0)[0]
-    np.testing.assert_array_equal(page.picture(0), before)
+    page.follow('hv0')
+    page.wait('Math.abs(crgame.world.shown.vehicles[3]) < 1e-9', 'the standing car')
+    before, x = page.picture(), page.vehicle(0)[0]
+    np.testing.assert_array_equal(page.picture(), before)
     page.hold('w')
     page.wait('crgame.driving.keyboard.isHeld("KeyW")'
               ' && document.querySelector(".cap-KeyW[data-on]")', 'the key in the picture')
     page.graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
     page.wait('crgame.world.shown.vehicles[0] < arguments[0] - 4', 'a way of 4 m', x)
     # The lines repeat every few metres, so that in one picture they may stand where they were.
-    moved = max(_share_changed(before, page.picture(0)) for _ in range(3))
+    moved = max(_share_changed(before, page.picture()) for _ in range(3))
     assert moved > 0.002
     page.release('w')
     page.graph.wait_for_command('hv0', THROTTLE, 0.0, 0.0)
@@ -230,6 +230,7 @@ def test_a_closed_tab_lets_go_at_once(page: LivePage) -> None:
     page.hold('w')
     graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
     page.driver.close()
+    graph.peer.listen()
     closed = graph.peer.n
     graph.peer.wait_until(lambda: graph.commands('hv0')[1][-1, THROTTLE] == 0.0,
                           'the throttle released')
@@ -276,15 +277,15 @@ def test_poses_as_drawn_are_those_of_the_bag(only_page: LivePage) -> None:
     page.run('window.collecting = false;')
     frames = page.run('return window.drawn;')
     page.order('stop')
-    assert page.graph.launcher.wait() == 0
-    recorded = read_recorded(page.graph.launcher.out / 'bag', frames[0]['epoch'])
+    epoch = int(frames[0]['epoch'])
+    page.graph.launcher.wait_for(f'messages in .*bag_{epoch}')
+    recorded = read_recorded(page.graph.launcher.out / f'bag_{epoch}', epoch)
     # The others ran ahead of what had come: on a busy machine some do.
     between = [frame for frame in frames if frame['before'] >= 0 and frame['after'] >= 0
                and frame['step'] == recorded.k0 + int(frame['t'] / DT_C_S + 1e-9)]
     assert len(between) > max(10, 0.2 * len(frames))
     for frame in between:
-        assert frame['before'] * DT_S <= frame['t'] + 1e-9
-        assert frame['t'] < frame['after'] * DT_S <= frame['t'] + DT_C_S + DT_S
+        assert frame['before'] * DT_S <= frame['t'] + 1e-9 < frame['after'] * DT_S + 2e-9
         vehicles = np.array(frame['vehicles'], dtype=float).reshape(-1, 12)[:, :3]
         expected = recorded.vehicles_at(frame['t'], frame['before'], frame['after'])
         np.testing.assert_allclose(vehicles, expected, rtol=0.0, atol=1e-6)
