@@ -90,6 +90,11 @@ def drive(planner: Planner, start: VehicleState, ticks: int,
     return plans
 
 
+def file_id(path: object) -> str:
+    """Name a test after its file; pytest asks even where there is no file to test."""
+    return str(getattr(path, 'stem', 'none'))
+
+
 def shared_scenarios() -> list[Path]:
     """List the real scenarios, where they are present."""
     return sorted(SCENARIOS.glob('*.xml'))
