@@ -215,6 +215,8 @@ def timing_block(folder: Path, seconds: float, watched: bool) -> dict[str, Any]:
             closers += [Listener(page, reads).close for reads in (True, False)]
         control = RemoteControl()
         control.wait_until_running()
+        # What was measured while everything started is left to the bag before the reset.
+        time.sleep(2.0)
         control.call('reset')
         control.deafen()
         time.sleep(seconds + 2.0)

@@ -3,7 +3,6 @@
 """A planner in a process of its own: external_planner.py --ros-args -p vehicle:=av0."""
 
 import cmath
-from contextlib import suppress
 from itertools import pairwise
 import math
 from xml.etree import ElementTree
@@ -11,7 +10,6 @@ from xml.etree import ElementTree
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -73,7 +71,9 @@ class ExternalPlanner(Node):
 
 
 if __name__ == '__main__':
-    rclpy.init(signal_handler_options=SignalHandlerOptions.SIGINT)
-    with suppress(KeyboardInterrupt):
+    rclpy.init(signal_handler_options=rclpy.signals.SignalHandlerOptions.SIGINT)
+    try:
         rclpy.spin(ExternalPlanner())
-    rclpy.try_shutdown()
+    except BaseException:
+        if rclpy.ok():  # else it was Ctrl-C, whatever it interrupted
+            raise

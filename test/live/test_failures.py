@@ -122,11 +122,14 @@ def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
         file = part / 'bag_part2_0.mcap'
         wait_until(lambda: file.stat().st_size > 20_000, 'a part of the recording')
         limit = file.stat().st_size + 1000
+        healthy = peer.statuses('recorder_node: recording')[-1]
+        assert healthy[0].level == healthy[0].OK and int(healthy[1]['bytes']) > 0
         resource.prlimit(launcher.node('recorder_node'), resource.RLIMIT_FSIZE, (limit, limit))
-        peer.wait_until(lambda: peer.statuses('recorder_node: recording'), 'word of the disk')
-        status, _ = peer.statuses('recorder_node: recording')[0]
-        assert status.level == status.ERROR
-        assert 'recording stopped: File too large' in status.message
+        def failures() -> list[str]:
+            return [status.message for status, _ in peer.statuses('recorder_node: recording')
+                    if status.level == status.ERROR]
+        peer.wait_until(failures, 'word of the disk')
+        assert 'recording stopped: File too large' in failures()[0]
         run.wait_for_steps(50)
         assert peer.call('/sim/stop').success
         assert launcher.wait() == 0, launcher.text
