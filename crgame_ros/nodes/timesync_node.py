@@ -60,6 +60,8 @@ class TimesyncNode(Node):
             self._game = parse_game_document(text)
             self._metrics = TimingMetrics(self._game.scheduler.dt_s)
             self._skipping = FrameSkipping(TimingSpec(**self._game.content['timing']))
+            # An order of the run before, or of a supervisor that was killed, ends with it.
+            self._orders.publish(Bool(data=False))
         except (CrgameError, TypeError) as error:
             self.get_logger().error(str(error))
 
