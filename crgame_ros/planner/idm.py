@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.planner.interface import Plan, PlanRequest
 from crgame_ros.planner.obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_following import Longitudinal, PathPosition
@@ -17,9 +18,7 @@ from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, d
 from crgame_ros.planner.stop_lines import StopLines
 from crgame_ros.vehicle.parameters import VehicleParameters
 
-EXPONENT = 4
 LINE_GAP = 0.5
-CLOSEST = 0.1
 STANDING = 0.1
 # A standing vehicle starts when the model wants at least this share of a; it stops below it.
 START_SHARE = 0.2
@@ -27,24 +26,6 @@ START_SHARE = 0.2
 ANTICIPATION_LIMIT = 3.0
 PASSING_MARGIN_S = 0.5
 PASSING_MARGIN = 2.0
-
-
-class IdmParameters(NamedTuple):
-    """
-    Parameters of the model, in the notation of CRG reference 10.
-
-    :param time_headway: T [s]
-    :param s0: gap at standstill [m]
-    :param a: maximum acceleration [m/s^2]
-    :param b: comfortable deceleration [m/s^2]
-    :param b_max: hardest deceleration [m/s^2]
-    """
-
-    time_headway: float
-    s0: float
-    a: float
-    b: float
-    b_max: float
 
 
 class Leader(NamedTuple):
@@ -63,24 +44,6 @@ class Leader(NamedTuple):
     speed: Sequence[float]
     blocking: Sequence[bool]
     coming: Sequence[bool]
-
-
-def free_acceleration(speed: float, desired: float, model: IdmParameters) -> float:
-    """Accelerate on a free road, a (1 - (v / v0)^4); not below -b where v exceeds v0 [m/s^2]."""
-    return max(model.a * (1.0 - (speed / desired) ** EXPONENT), -model.b)
-
-
-def interaction(speed: float, gap: float, leader_speed: float, model: IdmParameters) -> float:
-    """
-    Give the interaction term -a (s* / s)^2 of the IDM (CRG reference 10) [m/s^2].
-
-    The desired gap is s* = s0 + max(0, v T + v dv / (2 sqrt(a b))) with dv = v - v_leader.
-
-    :param gap: s, bumper to bumper [m]
-    """
-    closing = speed * (speed - leader_speed) / (2.0 * math.sqrt(model.a * model.b))
-    wanted = model.s0 + max(0.0, speed * model.time_headway + closing)
-    return -model.a * (wanted / max(gap, CLOSEST)) ** 2
 
 
 class IdmPlanner(PathPlanner):

@@ -3,6 +3,7 @@
 """Finding planners and checking their options; the example of the documentation runs."""
 
 from importlib.metadata import EntryPoint
+import inspect
 from pathlib import Path
 import re
 
@@ -40,8 +41,8 @@ def test_every_built_in_planner_can_be_made(name: str) -> None:
 
 def test_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint('steady', 'crgame_ros.planner.constant_velocity:ConstantVelocityPlanner',
-                       registry.ENTRY_POINTS)
-    monkeypatch.setattr(registry, 'entry_points', lambda group: [point])
+                       registry.PLANNERS.entry_point_group)
+    monkeypatch.setattr('crgame_ros.registry.entry_points', lambda group: [point])
     assert 'steady' in registry.planner_names()
     assert isinstance(registry.create_planner('steady'), ConstantVelocityPlanner)
 
@@ -106,5 +107,5 @@ def test_the_document_lists_every_planner_and_option() -> None:
     for name in registry.BUILT_IN:
         row = next(line for line in text.splitlines() if line.startswith(f'| `{name}`'))
         kind = registry.planner_class(name)
-        for option in registry.inspect.signature(kind).parameters:
+        for option in inspect.signature(kind).parameters:
             assert f'`{option}`' in row

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from crgame_ros.driver.command import DriverCommand
+from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
+from crgame_ros.vehicle.models import KinematicSingleTrack
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
 
@@ -203,3 +205,70 @@ def test_limits_hold_under_any_command(seed: int) -> None:
                 state.speed * math.tan(state.steering_angle) / VEHICLE.wheelbase, abs=1e-12)
             moved = math.hypot(state.x - before.x, state.y - before.y)
             assert moved <= max(abs(before.speed), abs(state.speed)) * dt + 1e-9
+
+
+# A drive of 16 s recorded with the model of the paper built into the vehicle, before there was
+# another one: throttle, a turn, a stop, reverse.
+RECORDED = (
+    (DriverCommand(0.6, 0.0, 0.2),
+     (71.16189173677351, 57.34910564924894, 0.816549336462861, 31.330158304366456,
+      0.004593216617870214, 3.18562601094422, 0.05580150511475296, -0.0007469203820323865), 1),
+    (DriverCommand(0.0, 0.0, -0.5),
+     (176.01067340301393, 120.50670457058048, 0.2520284995107501, 30.046150734275628,
+      -0.012611021893988375, -0.4285266072614553, -0.14693507790287907,
+      -0.0003020292695402049), 1),
+    (DriverCommand(0.0, 1.0, 0.1, True),
+     (222.69058813864538, 134.4271362826756, 0.41073671789084226, 0.0, 0.05064516206933854, 0.0,
+      0.0, 0.0), -1),
+    (DriverCommand(0.4, 0.0, -0.9, True),
+     (224.5973571347342, 98.39341935277528, 2.4765882997772746, -13.9, -0.10046928061492343, 0.0,
+      0.5433455992040656, 0.0), -1))
+
+
+@pytest.mark.parametrize('named', [False, True], ids=['no model', 'ks with the powertrain lag'])
+def test_without_a_model_the_car_is_that_of_the_paper(named: bool) -> None:
+    """A recorded drive comes out again, to the rounding of another machine's tangent."""
+    model = KinematicSingleTrack(VEHICLE, powertrain_lag=True) if named else None
+    car = HumanVehicle(VEHICLE, VehicleState(1.0, -2.0, 0.5, 12.0), model)
+    for command, state, gear in RECORDED:
+        for n in range(400):
+            car.step(command.rounded(), (0.01, 0.013, 0.0071)[n % 3])
+        assert tuple(car.state) == pytest.approx(state, rel=1e-11, abs=1e-13)
+        assert car.gear == gear
+
+
+def test_dynamic_bicycle_answers_with_its_lags() -> None:
+    """Steering and throttle held at 10 m/s: 63.2 % after T_delta = 0.2 s and T_a = 0.5 s."""
+    model = DynamicBicycle(VEHICLE, slip=0.9, steering_lag=0.2, acceleration_lag=0.5)
+    car = HumanVehicle(VEHICLE, at_speed(10.0), model)
+    # 0.05 * 7.85 rad at the wheel over the ratio of 36 at 10 m/s.
+    command = DriverCommand(throttle=0.02, steering=0.05)
+    angle = 0.05 * 7.85 / 36.0
+    for n in range(1, 41):
+        state = car.step(command, 0.01)
+        # The ratio grows a little with the speed.
+        assert state.steering_angle == pytest.approx(
+            angle * (1.0 - math.exp(-n / 20.0)), rel=0.03)
+        assert state.yaw_rate == pytest.approx(
+            0.9 * state.speed / VEHICLE.wheelbase * math.tan(state.steering_angle), rel=1e-12)
+    force = (1.0 - math.exp(-0.08)) * 1.0489 * VEHICLE.mass * 9.81
+    commanded = (force - ROLLING_FORCE - DRAG * 100.0) / VEHICLE.mass
+    fresh = HumanVehicle(VEHICLE, at_speed(10.0), DynamicBicycle(VEHICLE, acceleration_lag=0.5))
+    for _ in range(50):
+        state = fresh.step(command, 0.01)
+    assert state.acceleration == pytest.approx(0.632 * commanded, rel=0.02)
+
+
+def test_dynamic_bicycle_stops_and_reverses_like_the_other() -> None:
+    """The gear waits for the stop, brakes hold, and throttle drives backwards."""
+    car = HumanVehicle(VEHICLE, at_speed(5.0), DynamicBicycle(VEHICLE))
+    while car.state.speed > 0.0:
+        assert car.gear == 1
+        car.step(DriverCommand(brake=1.0, reverse=True), 0.01)
+    place = car.state.x
+    for _ in range(100):
+        car.step(DriverCommand(brake=1.0, reverse=True), 0.01)
+    assert (car.state.x, car.state.speed, car.gear) == (place, 0.0, -1)
+    for _ in range(200):
+        car.step(BACK, 0.01)
+    assert car.state.speed < -3.0

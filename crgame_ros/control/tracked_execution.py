@@ -1,0 +1,126 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""An AV that tracks its plan with a controller and a vehicle instead of being on it (FS II-C)."""
+
+from math import copysign, cos, sin, sqrt
+from typing import NamedTuple
+
+from crgame_ros.control.tracker import Control, Reference, Tracker
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.vehicle.models import VehicleModel
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+
+# Braking where there is no plan [m/s^2]: firm, well within a dry road's friction.
+EXHAUSTED_DECELERATION = 4.0
+
+
+class TrackingErrors(NamedTuple):
+    """
+    The true state against the planned one of the same time.
+
+    :param lateral: positive to the left of the plan [m]
+    :param along: positive ahead of the plan, along its heading [m]
+    :param heading: [rad]
+    :param speed: signed along the heading [m/s]
+    """
+
+    lateral: float
+    along: float
+    heading: float
+    speed: float
+
+
+class TrackedExecution:
+    """
+    One AV's tracking controller and vehicle.
+
+    :param vehicle: parameters of the vehicle
+    :param tracker: the controller, which belongs to this vehicle alone
+    :param model: the vehicle's motion, which belongs to it alone too
+    :param dt_s: simulation step [s]
+    """
+
+    def __init__(self, vehicle: VehicleParameters, tracker: Tracker, model: VehicleModel,
+                 dt_s: float) -> None:
+        self.vehicle = vehicle
+        self.tracker = tracker
+        self.model = model
+        self.dt_s = dt_s
+        self._errors: TrackingErrors | None = None
+        self._forget()
+
+    def reset(self, state: VehicleState) -> None:
+        """
+        Begin anew: a new run, or a vehicle that comes back from somebody who drove it.
+
+        :param state: where the vehicle is, rear axle
+        """
+        self.tracker.reset()
+        self.model.gear = -1 if state.speed < 0.0 else 1
+        self._forget()
+
+    def step(self, state: VehicleState, reference: Reference | None,
+             pose: VehicleState | None = None) -> VehicleState:
+        """
+        Move by one step.
+
+        Without a plan, or at the end of one, the vehicle brakes to a stop at its steering angle.
+
+        :param state: the true state, rear axle
+        :param reference: the plan, its `since_s` the time of `state`
+        :param pose: the state that the tracker believes; the true one where None
+        :return: the true state a step later
+        """
+        if reference is None or reference.used_up:
+            self._errors = None
+            return self._moved(state, self._braking(state))
+        if state.speed == 0.0:
+            self.model.gear = int(reference.track.direction(reference.since_s))
+        moved = self._moved(
+            state, self.tracker.control(state if pose is None else pose, reference))
+        self._measure(moved, reference)
+        return moved
+
+    @property
+    def errors(self) -> TrackingErrors | None:
+        """Errors at the end of the last step; None if it followed no plan."""
+        return self._errors
+
+    @property
+    def worst(self) -> TrackingErrors:
+        """Largest absolute errors since the last reset."""
+        return TrackingErrors(*self._worst)
+
+    @property
+    def rms(self) -> TrackingErrors:
+        """Root of the mean squared errors since the last reset."""
+        count = max(1, self._count)
+        return TrackingErrors(*(sqrt(total / count) for total in self._squares))
+
+    def _forget(self) -> None:
+        self._errors = None
+        self._worst = [0.0, 0.0, 0.0, 0.0]
+        self._squares = [0.0, 0.0, 0.0, 0.0]
+        self._count = 0
+
+    def _braking(self, state: VehicleState) -> Control:
+        # What the tracker expected of the vehicle ends here.
+        self.tracker.reset()
+        deceleration = copysign(EXHAUSTED_DECELERATION, state.speed) if state.speed else 0.0
+        return Control(state.steering_angle, -deceleration)
+
+    def _moved(self, state: VehicleState, control: Control) -> VehicleState:
+        return self.model.step(state, control.steering_angle, control.acceleration, self.dt_s)
+
+    def _measure(self, state: VehicleState, reference: Reference) -> None:
+        planned = reference.track.at(reference.since_s + self.dt_s)
+        c, s = cos(planned.yaw), sin(planned.yaw)
+        dx, dy = state.x - planned.x, state.y - planned.y
+        errors = TrackingErrors(dy * c - dx * s, dx * c + dy * s,
+                                wrap_pi(state.yaw - planned.yaw), state.speed - planned.speed)
+        self._errors = errors
+        self._count += 1
+        for i, error in enumerate(errors):
+            self._worst[i] = max(self._worst[i], abs(error))
+            self._squares[i] += error * error

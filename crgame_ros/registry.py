@@ -1,0 +1,198 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Finding exchangeable classes by name, entry point, module or file; checking their options."""
+
+from collections.abc import Mapping
+import importlib
+from importlib.metadata import entry_points
+import importlib.util
+import inspect
+import math
+from pathlib import Path
+import sys
+import types
+from typing import Any, get_args, get_origin, get_type_hints, Literal, Union
+
+from crgame_ros.errors import InputError
+
+
+class ModelRegistry:
+    """
+    The classes of one kind that a game may name.
+
+    A name is a built-in one, one of the entry-point group `crgame_ros.<group>`, `module:Class` or
+    `path/to/file.py:Class`. Built-in classes are imported when asked for: the packages behind
+    some of them cost seconds.
+
+    :param group: last part of the entry-point group, e.g. `planners`
+    :param kind: what one of them is called in messages, e.g. `planner`
+    :param built_in: `module:Class` by name
+    :param base: the class that all of them derive from
+    :param document: the page of the documentation that tells how to write one
+    """
+
+    def __init__(self, group: str, kind: str, built_in: Mapping[str, str], base: type,
+                 document: str | None = None) -> None:
+        self.entry_point_group = f'crgame_ros.{group}'
+        self.kind = kind
+        self.built_in = dict(built_in)
+        self._base = base
+        self._remedy = f'see {document}' if document else 'define it'
+
+    def names(self) -> tuple[str, ...]:
+        """List the registered names: built-in ones first, then those of entry points."""
+        others = {point.name for point in entry_points(group=self.entry_point_group)}
+        return (*self.built_in, *sorted(others - self.built_in.keys()))
+
+    def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
+               **given: Any) -> Any:
+        """
+        Make one.
+
+        :param name: a registered name, `module:Class` or `path/to/file.py:Class`
+        :param options: keyword arguments of its constructor, as the user gave them
+        :param where: the file and key that named it, for messages
+        :param given: keyword arguments that the program supplies; no options of the user
+        :raises InputError: if there is none of that name, or an option is unknown, missing or of
+            the wrong type.
+        """
+        found = self.find(name, where)
+        label = self.label(name, where)
+        options_label = f'options of {self.kind} {name}'
+        checked = _checked_options(
+            found, options or {}, given,
+            f'{where}: {options_label}' if where else options_label, label)
+        try:
+            return found(**given, **checked)
+        except InputError as error:
+            if not where:
+                raise
+            raise InputError(error.what, f'{where}: {error.where}' if error.where else where,
+                             error.remedy) from error
+        except Exception as error:
+            raise InputError(f'cannot be made ({type(error).__name__}: {error})', label,
+                             'check its options') from error
+
+    def find(self, name: str, where: str = '') -> type[Any]:
+        """
+        Find a class.
+
+        :param where: the file and key that named it, for messages
+        :raises InputError: if there is none of that name, or it is not of this kind.
+        """
+        label = self.label(name, where)
+        if name in self.built_in:
+            found = _from_module(self.built_in[name], label)
+        elif ':' in name:
+            source, _, attribute = name.rpartition(':')
+            found = (self._from_file(Path(source), attribute, label) if source.endswith('.py')
+                     else _from_module(name, label))
+        else:
+            points = [point for point in entry_points(group=self.entry_point_group)
+                      if point.name == name]
+            if not points:
+                raise InputError(f'there is no {self.kind} "{name}"', where or self.kind,
+                                 f'known are {", ".join(self.names())}, or give module:Class or '
+                                 'file.py:Class')
+            found = _from_module(points[0].value, label)
+        if not (inspect.isclass(found) and issubclass(found, self._base)):
+            raise InputError(f'is no {self.kind}', label, 'derive the class from '
+                             f'{self._base.__module__}.{self._base.__qualname__}')
+        if inspect.isabstract(found):
+            missing = ', '.join(sorted(getattr(found, '__abstractmethods__', ())))
+            raise InputError(f'does not define {missing}', label, self._remedy)
+        return found
+
+    def label(self, name: str, where: str = '') -> str:
+        """Say which one a message is about, and where it was named."""
+        return f'{where}: {self.kind} {name}' if where else f'{self.kind} {name}'
+
+    def _from_file(self, path: Path, attribute: str, label: str) -> Any:
+        if not path.is_file():
+            raise InputError(f'there is no file {path}', label, 'check the path')
+        module_name = f'crgame_ros_user_{self.kind.replace(" ", "_")}_{path.stem}'
+        spec = importlib.util.spec_from_file_location(module_name, path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        # Dataclasses and pickling look their module up by name.
+        sys.modules[module_name] = module
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            del sys.modules[module_name]
+            raise InputError(f'cannot be read ({type(error).__name__}: {error})', label,
+                             'mend the file') from error
+        return _attribute(module, attribute, label)
+
+
+def _from_module(target: str, label: str) -> Any:
+    module_name, _, attribute = target.partition(':')
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:
+        if isinstance(error, ImportError) and error.name == 'Polygon':
+            # The packages behind two planners import it; it has no wheels.
+            raise InputError('needs the package polygon3, which did not compile', label,
+                             'apt install gcc python3-dev, then delete .venv') from error
+        raise InputError(f'cannot import {module_name} ({type(error).__name__}: {error})',
+                         label, 'check the name and what it imports') from error
+    return _attribute(module, attribute, label)
+
+
+def _attribute(module: types.ModuleType, attribute: str, label: str) -> Any:
+    found = getattr(module, attribute, None) if attribute else None
+    if found is None:
+        raise InputError(f'{module.__name__} has no class "{attribute}"', label,
+                         'name the class behind the colon')
+    return found
+
+
+def _checked_options(found: type[Any], options: Mapping[str, Any], given: Mapping[str, Any],
+                     where: str, label: str) -> dict[str, Any]:
+    signature = inspect.signature(found).parameters
+    named = {key: parameter for key, parameter in signature.items()
+             if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)}
+    if not any(parameter.kind is parameter.VAR_KEYWORD for parameter in signature.values()):
+        for key in given:
+            if key not in named:
+                raise InputError(f'its constructor does not take "{key}"', label,
+                                 'take ' + ', '.join(given) + ' beside its options')
+    parameters = {key: parameter for key, parameter in named.items() if key not in given}
+    allowed = ', '.join(parameters) or 'none'
+    hints = get_type_hints(found.__init__)
+    checked = {}
+    for key, value in options.items():
+        if key not in parameters:
+            raise InputError(f'"{key}" is unknown', where, f'allowed are: {allowed}')
+        checked[key] = _checked(value, hints.get(key, Any), key, where, allowed)
+    for key, parameter in parameters.items():
+        if parameter.default is parameter.empty and key not in checked:
+            raise InputError(f'"{key}" is missing', where, f'allowed are: {allowed}')
+    return checked
+
+
+def _checked(value: Any, hint: Any, key: str, where: str, allowed: str) -> Any:
+    choices = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+    for choice in choices:
+        if choice is Any or (choice is types.NoneType and value is None):
+            return value
+        if get_origin(choice) is Literal:
+            if value in get_args(choice):
+                return value
+            continue
+        plain = get_origin(choice) or choice
+        if isinstance(value, bool) and plain is not bool:
+            continue
+        if plain is float and isinstance(value, int | float) and not math.isnan(value):
+            return float(value)
+        if isinstance(plain, type) and plain is not types.NoneType and isinstance(value, plain):
+            return value
+    wanted = ' or '.join(_name(choice) for choice in choices)
+    raise InputError(f'"{key}" is {value!r}', where,
+                     f'give {wanted}; allowed options are: {allowed}')
+
+
+def _name(hint: Any) -> str:
+    if get_origin(hint) is Literal:
+        return ' or '.join(repr(value) for value in get_args(hint))
+    return 'None' if hint is types.NoneType else getattr(hint, '__name__', str(hint))

@@ -1,0 +1,120 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How a vehicle answers commands of steering angle and acceleration."""
+
+from abc import ABC, abstractmethod
+from math import copysign, tan
+
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.registry import ModelRegistry
+from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.powertrain import Powertrain
+from crgame_ros.vehicle.state import VehicleState
+
+
+class VehicleModel(ABC):
+    """
+    The motion of one vehicle under commanded steering angle and acceleration.
+
+    Commands beyond the vehicle's limits are cut to them. Reverse is a gear: the speed never
+    changes its sign within a step, a command against the direction of motion brakes, and at rest
+    only a command in the gear's direction starts a motion.
+
+    :param vehicle: parameters of the vehicle
+    """
+
+    def __init__(self, vehicle: VehicleParameters) -> None:
+        self.vehicle = vehicle
+        # 1 forward, -1 reverse; it counts at rest only.
+        self.gear = 1
+
+    @abstractmethod
+    def step(self, state: VehicleState, steering_angle_command: float,
+             acceleration_command: float, dt_s: float) -> VehicleState:
+        """
+        Advance by one step.
+
+        :param state: rear axle
+        :param steering_angle_command: front wheels, positive to the left [rad]
+        :param acceleration_command: signed along the heading [m/s^2]
+        :param dt_s: greater than 0 [s]
+        :return: the new state, rear axle
+        """
+
+    def direction(self, speed: float) -> float:
+        """Give the direction of travel, 1 or -1: that of the motion, at rest that of the gear."""
+        return copysign(1.0, speed) if speed != 0.0 else float(self.gear)
+
+    def speed_limit(self, direction: float) -> float:
+        """Give the largest absolute speed in a direction of travel [m/s]."""
+        return self.vehicle.max_speed if direction > 0.0 else self.vehicle.max_reverse_speed
+
+
+class KinematicSingleTrack(VehicleModel):
+    """
+    The kinematic single-track model of CRG equations 2-4.
+
+    The commanded steering angle is reached at once as far as the vehicle's steering rate allows,
+    and so is the acceleration.
+
+    :param vehicle: parameters of the vehicle
+    :param powertrain_lag: let the acceleration lag as in CRG 25 instead, by the vehicle's
+        `longitudinal_lag`
+    """
+
+    def __init__(self, vehicle: VehicleParameters, powertrain_lag: bool = False) -> None:
+        super().__init__(vehicle)
+        self._powertrain = Powertrain(vehicle) if powertrain_lag else None
+
+    def step(self, state: VehicleState, steering_angle_command: float,
+             acceleration_command: float, dt_s: float) -> VehicleState:
+        """Advance by one Runge-Kutta step; a stop within it is found in closed form."""
+        vehicle, speed = self.vehicle, state.speed
+        direction = self.direction(speed)
+        commanded = clipped(acceleration_command, vehicle.max_acceleration)
+        if speed == 0.0 and direction * commanded <= 0.0:
+            acceleration = 0.0
+        elif self._powertrain is None:
+            acceleration = commanded
+        else:
+            acceleration = self._powertrain.lag(state.acceleration, commanded, dt_s)
+        target = clipped(steering_angle_command, vehicle.max_steering_angle)
+        rate = clipped((target - state.steering_angle) / dt_s, vehicle.max_steering_rate)
+        driven_s, acceleration = self._within_speed_limits(speed, acceleration, direction, dt_s)
+        x, y, yaw, new_speed, angle = integrate(
+            state.x, state.y, state.yaw, speed, state.steering_angle,
+            acceleration, rate, vehicle.wheelbase, driven_s)
+        # A stop at the very end of the step may leave a rounding error behind zero.
+        if driven_s < dt_s or direction * new_speed < 0.0:
+            new_speed, acceleration = 0.0, 0.0
+            angle += rate * (dt_s - driven_s)
+        return VehicleState(
+            x, y, wrap_pi(yaw), new_speed, angle, acceleration,
+            new_speed * tan(angle) / vehicle.wheelbase, rate)
+
+    def _within_speed_limits(
+        self, speed: float, acceleration: float, direction: float, dt_s: float,
+    ) -> tuple[float, float]:
+        """Return for how long the car moves within the step [s], and its acceleration."""
+        along = direction * speed
+        along_acceleration = direction * acceleration
+        end = along + along_acceleration * dt_s
+        if end <= 0.0 and along_acceleration < 0.0:
+            return min(dt_s, along / -along_acceleration), acceleration
+        limit = self.speed_limit(direction)
+        if end > limit:
+            return dt_s, direction * (limit - along) / dt_s
+        return dt_s, acceleration
+
+
+def clipped(value: float, limit: float) -> float:
+    """Cut a value to [-limit, limit]."""
+    return min(limit, max(-limit, value))
+
+
+VEHICLE_MODELS = ModelRegistry(
+    'vehicle_models', 'vehicle model',
+    {'ks': 'crgame_ros.vehicle.models:KinematicSingleTrack',
+     'dynamic-bicycle': 'crgame_ros.vehicle.dynamic_bicycle:DynamicBicycle'},
+    VehicleModel, 'docs/control.md')

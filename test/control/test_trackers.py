@@ -1,0 +1,49 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The registry of trackers, and what the documentation says about it."""
+
+import inspect
+from pathlib import Path
+import re
+
+import control_support as support
+from control_support import VEHICLE
+import numpy as np
+import pytest
+
+from crgame_ros.control.trackers import TRACKERS
+from crgame_ros.vehicle.models import VEHICLE_MODELS
+
+# Of both trackers, listed once.
+SPEED = {'speed_gain', 'integral_gain', 'position_gain', 'acceleration_lag'}
+
+
+@pytest.fixture
+def document(project_root: Path) -> str:
+    return (project_root / 'docs' / 'control.md').read_text(encoding='utf-8')
+
+
+def test_the_names() -> None:
+    assert TRACKERS.names()[:2] == ('lqr', 'pure-pursuit')
+
+
+def test_the_document_lists_every_name_and_option(document: str) -> None:
+    for registry, supplied in ((TRACKERS, {'vehicle', 'dt_s'}), (VEHICLE_MODELS, {'vehicle'})):
+        for name in registry.built_in:
+            row = next(line for line in document.splitlines() if line.startswith(f'| `{name}`'))
+            options = inspect.signature(registry.find(name)).parameters.keys() - supplied
+            assert all(f'`{option}`' in row for option in options - SPEED)
+    assert all(f'`{option}`' in document for option in SPEED)
+
+
+def test_the_documented_example_tracks(document: str, tmp_path: Path) -> None:
+    """Made as a game does, it takes half a metre back and follows an S-curve within 15 cm."""
+    code = re.search(r'```python\n(.*?)```', document, re.DOTALL)
+    assert code is not None
+    file = tmp_path / 'follow.py'
+    file.write_text(code[1], encoding='utf-8')
+    made = TRACKERS.create(f'{file}:Follow', {'gain': 1.5}, vehicle=VEHICLE, dt_s=support.DT)
+    start = support.VehicleState(0.0, 0.5, 0.0, 10.0)
+    _, errors, _ = support.track(support.plan(10.0, 12.0, support.s_curve(10.0)), made,
+                                 start=start)
+    assert np.abs(errors[500:, 0]).max() < 0.15
