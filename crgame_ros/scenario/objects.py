@@ -19,6 +19,7 @@ class Role(Enum):
     RECORDED = 'recorded'
     STATIC = 'static'
     TRAFFIC = 'traffic'
+    SCRIPTED = 'scripted'
 
     @property
     def is_ego(self) -> bool:
@@ -31,7 +32,8 @@ class ObjectDescription:
     """
     One object that may appear; a row of `/scenario/objects`.
 
-    :param id: name used in joint names: hv0, av0, o<obstacle id> for scenario obstacles.
+    :param id: name used in joint names: hv0, av0, o<obstacle id> for scenario obstacles, t0 for
+        agents of traffic, and the game's own names for its objects (scripted, or static).
     :param type: CommonRoad obstacle type in its XML spelling (car, pedestrian, parkedVehicle…).
     :param role: who moves it.
     :param shape: footprint around its centre.

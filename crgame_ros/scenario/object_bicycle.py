@@ -1,0 +1,149 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The kinematic bicycle that follows a path (FS II-A3)."""
+
+from collections.abc import Sequence
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.scenario.object_motion import ABSENT, Motion, ROUNDING
+from crgame_ros.scenario.object_path import ObjectPath, SpeedProfile
+from crgame_ros.scenario.object_spec import MoverType, ObjectSpec
+from crgame_ros.scenario.object_surroundings import Surroundings
+from crgame_ros.traffic.car_following import IntelligentDriver
+
+FloatArray = NDArray[np.float64]
+
+SUB_STEP_S = 0.01
+# Distance to the side below which something is in the way, besides both half widths [m].
+SIDE_MARGIN = 0.3
+# A reactive object looks as far as it takes to stop comfortably, and this much farther [m].
+_LOOK = 30.0
+_ARRIVED = 0.01
+
+
+class BicycleMotion(Motion):
+    """
+    Moves the rear axle along a path: x' = v cos psi, y' = v sin psi, psi' = v tan(delta) / L.
+
+    The heading is the path's at the rear axle and delta = atan(L kappa), so that nothing slips;
+    the centre is as far ahead of the axle as the type has it, on the path where that is straight.
+    The speed tends to the wanted one within acceleration a and deceleration b, slow enough for
+    bends (sqrt(a_lat / kappa)) and speed limits, and for the end where it stays. A reactive one
+    follows what is ahead on its path by the IDM; others to the side, and crossing ones before
+    they are in the way, it does not mind.
+
+    :param spec: of the object.
+    :param path: of the rear axle.
+    :param start: arc length of the centre at the beginning [m]
+    :param wanted: (n,) wanted speed at each arc length of the path [m/s]
+    """
+
+    def __init__(self, spec: ObjectSpec, path: ObjectPath, start: float,
+                 wanted: FloatArray) -> None:
+        self._spec, self._path, self._type = spec, path, spec.mover
+        self._s = start
+        # The bend that counts is that at the rear axle, behind the centre.
+        curvature = np.interp(path.s - self._type.rear_to_center, path.s, np.abs(path.curvature))
+        bend = np.sqrt(self._type.lateral / np.maximum(curvature, 1e-9))
+        limit = np.minimum(np.minimum(wanted, bend), path.speed_limit)
+        if spec.end == 'stay':
+            limit[-1] = 0.0
+        self._profile = SpeedProfile(path.s, limit, self._type.deceleration)
+        self._driver = IntelligentDriver(
+            self._type.headway, self._type.distance, self._type.acceleration,
+            self._type.deceleration, self._type.hardest)
+        self._speed = self._profile.at(start) if spec.start == 0.0 else 0.0
+        # Until the first decision nothing is in the way.
+        self._following = math.inf
+        self._gone = False
+
+    def decide(self, time_s: float, others: Surroundings) -> None:
+        """Find what is ahead on the path, and the acceleration behind it."""
+        if self._gone:
+            return
+        gap, speed = self._leader(others)
+        if math.isinf(gap):
+            self._following = math.inf
+            return
+        wanted = max(self._profile.at(self._s), 0.1)
+        self._following = float(self._driver.acceleration(
+            np.array([self._speed]), np.array([wanted]), np.array([gap]), np.array([speed]))[0])
+
+    def _leader(self, others: Surroundings) -> tuple[float, float]:
+        """Give gap and speed along the path of the nearest one ahead; infinite without one."""
+        shape = self._type.shape
+        front = self._s + 0.5 * shape.length
+        look = self._speed**2 / (2.0 * self._type.deceleration) + _LOOK
+        if not len(others.poses):
+            return math.inf, 0.0
+        seen = self._path.meet(others.poses[:, :2], self._s, front + look)
+        turn = others.poses[:, 2] - seen.yaw
+        cos, sin = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+        long = 0.5 * (others.lengths * cos + others.widths * sin)
+        wide = 0.5 * (others.lengths * sin + others.widths * cos)
+        gaps = seen.s - long - front
+        ahead = (seen.s > self._s) & (gaps < look) \
+            & (np.abs(seen.d) < wide + 0.5 * shape.width + SIDE_MARGIN)
+        if not ahead.any():
+            return math.inf, 0.0
+        first = int(np.argmin(np.where(ahead, gaps, np.inf)))
+        vx, vy, _ = others.velocities[first].tolist()
+        yaw = float(seen.yaw[first])
+        return max(float(gaps[first]), 0.0), vx * math.cos(yaw) + vy * math.sin(yaw)
+
+    def move(self, time_s: float, duration_s: float) -> None:
+        """Integrate speed and arc length in steps of 10 ms or a little less."""
+        steps = max(1, math.ceil(duration_s / SUB_STEP_S - ROUNDING))
+        step = duration_s / steps
+        for index in range(steps):
+            if self._gone or time_s + index * step < self._spec.start - ROUNDING:
+                continue
+            self._advance(step)
+
+    def _advance(self, step: float) -> None:
+        allowed = self._profile.at(self._s + self._speed * step)
+        acceleration = (allowed - self._speed) / step
+        acceleration = min(max(acceleration, -self._type.hardest), self._type.acceleration)
+        acceleration = min(acceleration, self._following)
+        speed = max(self._speed + acceleration * step, 0.0)
+        self._s += 0.5 * (self._speed + speed) * step
+        self._speed = speed
+        end = self._path.length
+        if self._spec.end == 'vanish':
+            self._gone = self._s >= end
+        elif self._s > end - _ARRIVED:
+            self._s, self._speed = min(self._s, end), 0.0
+
+    def state(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Give the centre, ahead of the rear axle."""
+        if self._gone:
+            return ABSENT, ABSENT
+        ahead = self._type.rear_to_center
+        x, y, yaw, curvature = self._path.pose(self._s - ahead)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        turning = self._speed * curvature
+        return ((x + ahead * cos, y + ahead * sin, wrap_pi(yaw)),
+                (self._speed * cos - turning * ahead * sin,
+                 self._speed * sin + turning * ahead * cos, turning))
+
+
+def check_bends(path: ObjectPath, mover: MoverType, name: str, where: str) -> None:
+    """
+    Refuse a path that a vehicle cannot steer along.
+
+    :param name: type of the vehicle.
+    :raises InputError: naming the place and the radius.
+    """
+    sharpest = int(np.argmax(np.abs(path.curvature)))
+    curvature = abs(float(path.curvature[sharpest]))
+    if curvature > mover.sharpest:
+        x, y = path.points[sharpest].tolist()
+        raise InputError(
+            f'the path turns with a radius of {1.0 / curvature:.2g} m at ({x:.1f}, {y:.1f})',
+            where, f'a {name} needs {1.0 / mover.sharpest:.2g} m: make the bend wider, or round '
+                   'it with more way-points')

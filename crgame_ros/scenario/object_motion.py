@@ -1,0 +1,105 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How objects move: what every movement model can do, and the trivial and the given ones."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
+from crgame_ros.scenario.object_spec import TrajectoryRow
+from crgame_ros.scenario.object_surroundings import Surroundings
+
+FloatArray = NDArray[np.float64]
+
+ABSENT = (np.nan, np.nan, np.nan)
+# A time step is a decimal fraction; ten of them are not exactly a second [s].
+ROUNDING = 1e-9
+
+
+class Motion(ABC):
+    """The movement of one object; time is measured from the start of the run [s]."""
+
+    @abstractmethod
+    def decide(self, time_s: float, others: Surroundings) -> None:
+        """Look at the others before a scenario time step; asked of reactive objects only."""
+
+    @abstractmethod
+    def move(self, time_s: float, duration_s: float) -> None:
+        """Move from a time on, for a duration."""
+
+    @abstractmethod
+    def state(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Give the centre's pose (3) and its derivatives (3); NaN while absent."""
+
+
+class Standstill(Motion):
+    """
+    The model without movement.
+
+    :param pose: x [m], y [m], yaw [rad]
+    """
+
+    def __init__(self, pose: tuple[float, float, float]) -> None:
+        self._pose = (pose[0], pose[1], wrap_pi(pose[2]))
+
+    def decide(self, time_s: float, others: Surroundings) -> None:
+        """Mind nobody."""
+
+    def move(self, time_s: float, duration_s: float) -> None:
+        """Stay."""
+
+    def state(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Give the pose."""
+        return self._pose, (0.0, 0.0, 0.0)
+
+
+class Predetermined(Motion):
+    """
+    Follows a given trajectory, linear between its rows.
+
+    Before its first row it is absent; after the last it stays or is absent. A velocity leads to
+    the pose one time step later; at the last step it is the one before.
+
+    :param rows: t [s], x [m], y [m], yaw [rad], t increasing.
+    :param start: time of t = 0 [s]
+    :param stays: at the end.
+    :param time_step_s: Delta t_c [s]
+    """
+
+    def __init__(self, rows: Sequence[TrajectoryRow], start: float, stays: bool,
+                 time_step_s: float) -> None:
+        table = np.array(rows)
+        self._times: FloatArray = table[:, 0] + start
+        self._columns: FloatArray = table[:, 1:].T.copy()
+        self._columns[2] = np.unwrap(self._columns[2])
+        self._stays, self._time_step_s = stays, time_step_s
+        self._time_s = 0.0
+
+    def decide(self, time_s: float, others: Surroundings) -> None:
+        """Mind nobody."""
+
+    def move(self, time_s: float, duration_s: float) -> None:
+        """Go on."""
+        self._time_s = time_s + duration_s
+
+    def state(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Give the state of the present time."""
+        now, first, last = self._time_s, float(self._times[0]), float(self._times[-1])
+        if now < first - ROUNDING or now > last + ROUNDING and not self._stays:
+            return ABSENT, ABSENT
+        here, then = self._at(now), self._at(now + self._time_step_s)
+        if not self._stays and now + self._time_step_s > last + ROUNDING:
+            # The present step is the last: there is no next pose to lead to.
+            here, then = self._at(now - self._time_step_s), here
+            velocity = (then - here) / self._time_step_s
+            here = then
+        else:
+            velocity = (then - here) / self._time_step_s
+        pose = (*here[:2].tolist(), float(wrap_pi_array(here[2:])[0]))
+        return pose, velocity.tolist()
+
+    def _at(self, time_s: float) -> FloatArray:
+        return np.array([np.interp(time_s, self._times, column) for column in self._columns])
