@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The `crgame` command: run, offline, convert, recover, info, doctor."""
+"""The `crgame` command: run, offline, convert, recover, info, rasterize, doctor."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -19,6 +19,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame convert   turn a recording into a CommonRoad scenario
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
+  crgame rasterize draw curbs and obstacles of a scenario as an occupancy map
   crgame doctor    what is missing on this machine, and the remedy
 
 `crgame COMMAND --help` tells more."""
@@ -69,9 +70,15 @@ def _build_parser() -> argparse.ArgumentParser:
     info = commands.add_parser('info', help='what is in a recording')
     info.add_argument('bag', type=Path, help='folder or file of the recording')
     info.set_defaults(command=_info)
+    _add_rasterize(commands.add_parser('rasterize', help='scenario to occupancy map'))
     doctor = commands.add_parser('doctor', help='what is missing on this machine')
     doctor.set_defaults(command=_doctor)
     return parser
+
+
+def _add_rasterize(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.scenario.occupancy_command import add_arguments
+    add_arguments(parser)
 
 
 def _add_offline(parser: argparse.ArgumentParser) -> None:

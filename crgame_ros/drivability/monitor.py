@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.drivability.collision import CollisionDetector
+from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.drivability.road_boundary import RoadBoundary
 from crgame_ros.errors import InputError
 from crgame_ros.scenario.game import DrivabilitySpec
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.scenario.occupancy import OccupancyMap
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
 
 
@@ -31,7 +33,7 @@ class VehicleDrivability:
     :param vehicle_id: hv0, av0, …
     :param collision: True while its footprint touches another object's.
     :param off_road: True while a part of its footprint is off the road.
-    :param hit: sorted ids of what it touches.
+    :param hit: sorted ids of what it touches, and last `PERMANENT_OBSTACLE` for any curb or fence.
     :param n: simulation step of the states that were checked.
     :param stop_requested: True if this is a human's violation and violations end the run.
     """
@@ -51,16 +53,18 @@ class VehicleDrivability:
 
 class DrivabilityMonitor:
     """
-    Checks humans and AVs against each other, all other objects and the road.
+    Checks humans and AVs against each other, all other objects, permanent obstacles and the road.
 
     :param driven: (V) the driven vehicles, in the order of their states.
     :param others: (M) everything else that can appear, in the order of its states.
     :param lanelet_network: the road; None leaves the road unchecked.
     :param spec: which checks run, and whether a human's violation asks for a stop.
+    :param occupancy: the map of permanent obstacles, if there is one; to touch one is a collision.
     """
 
     def __init__(self, driven: Sequence[ObjectDescription], others: Sequence[ObjectDescription],
-                 lanelet_network: LaneletNetwork | None, spec: DrivabilitySpec) -> None:
+                 lanelet_network: LaneletNetwork | None, spec: DrivabilitySpec,
+                 occupancy: OccupancyMap | None = None) -> None:
         self._ids = [vehicle.id for vehicle in driven]
         self._other_ids = [other.id for other in others]
         self._rear_to_center = [vehicle.rear_to_center for vehicle in driven]
@@ -68,6 +72,8 @@ class DrivabilityMonitor:
         self._stops = [spec.stop and vehicle.role is Role.HUMAN for vehicle in driven]
         self._detector = CollisionDetector(
             self._shapes, [other.shape for other in others]) if spec.collision else None
+        self._permanent = PermanentObstacles(occupancy, self._shapes) \
+            if spec.collision and occupancy is not None else None
         self._road = RoadBoundary(lanelet_network) \
             if spec.road and lanelet_network is not None else None
         self._objects_n: int | None = None
@@ -79,12 +85,16 @@ class DrivabilityMonitor:
 
     def prepare(self, vehicle_states: NDArray[np.float64]) -> None:
         """
-        Build the road boundary around the vehicles; call it at setup, never in a cycle.
+        Make road boundary and map ready around the vehicles; call it at setup, never in a cycle.
 
         :param vehicle_states: (V, 8) rear-axle states, columns as in `StateColumn`.
         """
+        centers = self._centers(vehicle_states)
         if self._road is not None:
-            self._road.prepare((x, y) for x, y, _ in self._centers(vehicle_states))
+            self._road.prepare((x, y) for x, y, _ in centers)
+        if self._permanent is not None:
+            for index, center in enumerate(centers):
+                self._permanent.is_hit(index, center)
 
     def set_objects(self, n: int, states: ObjectStates) -> None:
         """
@@ -143,10 +153,15 @@ class DrivabilityMonitor:
             return [()] * len(centers)
         self._detector.move(seconds_since_tick)
         among, with_others = self._detector.hits(centers)
-        return [tuple(sorted([self._ids[i] for i in vehicles]
+        hits = [tuple(sorted([self._ids[i] for i in vehicles]
                              + [self._other_ids[i] for i in objects]))
                 if vehicles or objects else ()
                 for vehicles, objects in zip(among, with_others, strict=True)]
+        if self._permanent is not None:
+            for index, center in enumerate(centers):
+                if self._permanent.is_hit(index, center):
+                    hits[index] = (*hits[index], PERMANENT_OBSTACLE)
+        return hits
 
     def _is_off_road(self, index: int, center: tuple[float, float, float]) -> bool:
         if self._road is None or center[0] != center[0]:

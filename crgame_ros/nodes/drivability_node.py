@@ -4,6 +4,7 @@
 
 from collections import deque
 from collections.abc import Sequence
+from pathlib import Path
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -21,6 +22,7 @@ from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.scenario.objects import ObjectStates
+from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.simulation.documents import GameDocument
 
 PERIOD_S = 0.005
@@ -58,25 +60,24 @@ class DrivabilityNode(Node):
             velocities = np.array(message.points[0].velocities).reshape(-1, 3)
             self._waiting_objects.append(
                 (from_time(message.header.stamp), ObjectStates(poses, velocities)))
-        self._prepare()
-        if self._monitor is not None:
-            for message in states:
-                self._check(message)
-
-    def _prepare(self) -> None:
-        """Build the monitor anew when there is a new set of documents."""
         try:
             documents = self._documents.poll()
             if documents is not None:
                 self._build(documents)
+            for message in states if self._monitor is not None else ():
+                self._check(message)
         except CrgameError as error:
+            # Documents that cannot be used, or a map that breaks while it is read.
             self._monitor = None
-            self.get_logger().error(str(error))
+            self.get_logger().error(f'{error}; nothing is checked until the next game')
 
     def _build(self, documents: ScenarioSet) -> None:
         game, driven = documents.game, documents.driven
         network = documents.loaded.scenario.lanelet_network
-        monitor = DrivabilityMonitor(driven, documents.others, network, game.drivability)
+        place = game.content.get('occupancy')
+        monitor = DrivabilityMonitor(
+            driven, documents.others, network, game.drivability,
+            None if place is None else TiledOccupancy(Path(place)))
         monitor.prepare(np.array([entry['state'] for entry in (*game.humans, *game.avs)]))
         for item in driven:
             if item.id not in self._reports:

@@ -1,0 +1,111 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""map_node: the permanent obstacles near the driven vehicles (FS II-A2)."""
+
+from array import array
+from pathlib import Path
+
+from nav_msgs.msg import OccupancyGrid as OccupancyGridMessage
+import numpy as np
+from numpy.typing import NDArray
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.node import Node
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import MAP
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.spinning import poll
+from crgame_ros.scenario.occupancy import OccupancyGrid
+from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
+from crgame_ros.simulation.documents import parse_game_document
+
+PERIOD_S = 0.1
+# Joints of a vehicle in /vehicles/state: x, y, yaw, steering.
+JOINTS = 4
+# What is published where nothing is occupied: viewers want at least one cell.
+NOTHING = OccupancyGrid((0.0, 0.0), 1.0, np.zeros((1, 1), dtype=bool))
+
+
+class MapNode(Node):
+    """Publishes the map's tiles around the driven vehicles, whenever these are other tiles."""
+
+    def __init__(self) -> None:
+        super().__init__('map_node')
+        self._reach: float = self.declare_parameter('reach', 60.0, ParameterDescriptor(
+            description='how far around each vehicle the map is published [m]', read_only=True,
+            floating_point_range=[FloatingPointRange(from_value=1.0, to_value=1000.0)])).value
+        endpoints = Endpoints(self)
+        self._games = endpoints.polled('/scenario/game')
+        self._states = endpoints.polled('/vehicles/state', depth=1)
+        self._publisher = endpoints.publisher('/occupancy')
+        self._map: TiledOccupancy | None = None
+        self._published: OccupancyGrid | None = None
+        self._left_out = 0
+
+    def run(self, stop: StopFlag) -> None:
+        """Publish until asked to stop."""
+        poll(self, stop, PERIOD_S, self._work)
+
+    def _work(self) -> None:
+        try:
+            message = self._games.latest()
+            if message is not None:
+                self._open(message.data)
+            message = self._states.latest()
+            if message is not None and self._map is not None:
+                points = np.array(message.points[0].positions).reshape(-1, JOINTS)[:, :2]
+                self._publish(self._near(self._map, points) or NOTHING)
+        except CrgameError as error:
+            self._clear()
+            self.get_logger().error(str(error))
+
+    def _open(self, text: str) -> None:
+        """Open the map of a new game; the one before is forgotten even if it is the same file."""
+        path = parse_game_document(text).content.get('occupancy')
+        if path is None:
+            self._clear()
+        else:
+            self._map = TiledOccupancy(Path(path))
+
+    def _clear(self) -> None:
+        """Take back what was published."""
+        self._map = None
+        if self._published is not None:
+            self._publish(NOTHING)
+
+    def _near(self, occupancy: TiledOccupancy, points: NDArray[np.float64]
+              ) -> OccupancyGrid | None:
+        """Give the neighbourhood of the vehicles, without the last ones if they are too far."""
+        count = len(points)
+        while count > 1 and not occupancy.fits(points[:count], self._reach):
+            count -= 1
+        if len(points) - count > self._left_out:
+            self.get_logger().warning(
+                f'the driven vehicles are too far apart for one map: it shows the first {count} '
+                f'of {len(points)}')
+        self._left_out = len(points) - count
+        return occupancy.near(points[:count], self._reach)
+
+    def _publish(self, grid: OccupancyGrid) -> None:
+        if grid is self._published:
+            return
+        self._published = grid
+        message = OccupancyGridMessage()
+        message.header.frame_id = MAP
+        message.header.stamp = message.info.map_load_time = self.get_clock().now().to_msg()
+        message.info.resolution = grid.resolution
+        message.info.height, message.info.width = grid.occupied.shape
+        message.info.origin.position.x, message.info.origin.position.y = grid.origin
+        message.info.origin.orientation.w = 1.0
+        message.data = array('b', np.where(grid.occupied, 100, 0).astype(np.int8).tobytes())
+        self._publisher.publish(message)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(MapNode, args)
+
+
+if __name__ == '__main__':
+    main()
