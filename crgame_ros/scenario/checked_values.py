@@ -30,10 +30,12 @@ def short(value: Any) -> str:
     return _SHORT.repr(value)
 
 
-def build(kind: type[T], values: Any, where: str) -> T:
+def build(kind: type[T], values: Any, where: str,
+          bounds: Mapping[str, tuple[float, float]] = BOUNDS) -> T:
     """
     Build a dataclass from a mapping, checking every key and type.
 
+    :param bounds: lower and upper bounds of numbers, by their name.
     :raises InputError: for an unknown or missing key, a wrong type, a number out of bounds.
     """
     if not isinstance(values, Mapping):
@@ -48,20 +50,23 @@ def build(kind: type[T], values: Any, where: str) -> T:
     for field in fields(kind):
         if field.name in values:
             checked[field.name] = _checked(
-                values[field.name], hints[field.name], field.name, where)
+                values[field.name], hints[field.name], field.name, where, bounds)
         elif field.default is MISSING and field.default_factory is MISSING:
             raise InputError(f'"{field.name}" is missing', where)
     return kind(**checked)
 
 
-def _checked(value: Any, hint: Any, name: str, where: str) -> Any:
+def _checked(value: Any, hint: Any, name: str, where: str,
+             bounds: Mapping[str, tuple[float, float]]) -> Any:
     options = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
     if value is None and type(None) in options:
         return None
     if hint is float or hint is int:
-        return _number(value, hint, name, where)
+        return _number(value, hint, name, where, bounds)
     if int in options:
-        return _number(value, int, name, where)
+        return _number(value, int, name, where, bounds)
+    if options == (float, types.NoneType):
+        return _number(value, float, name, where, bounds)
     for option in options:
         origin = get_origin(option)
         if origin is Literal:
@@ -76,11 +81,12 @@ def _checked(value: Any, hint: Any, name: str, where: str) -> Any:
     raise InputError(f'"{name}" is {short(value)}', where, f'give a {names}')
 
 
-def _number(value: Any, kind: type, name: str, where: str) -> float | int:
+def _number(value: Any, kind: type, name: str, where: str,
+            bounds: Mapping[str, tuple[float, float]]) -> float | int:
     allowed = int | float if kind is float else int
     if isinstance(value, bool) or not isinstance(value, allowed) or value != value:
         raise InputError(f'"{name}" is {short(value)}', where, 'give a number')
-    low, high = BOUNDS.get(name, (-math.inf, math.inf))
+    low, high = bounds.get(name, (-math.inf, math.inf))
     largest = math.inf if name == 'duration' else sys.float_info.max
     if not max(low, -largest) <= value <= min(high, largest):
         raise InputError(f'"{name}" is {short(value)}', where,

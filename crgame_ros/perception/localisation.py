@@ -1,0 +1,170 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Imperfect localisation: biased white noise on the truth, and an extended Kalman filter (FS II-B1).
+
+The filter's states are x, y, yaw and v of the rear axle. It predicts by the kinematic model
+
+    x' = v cos(yaw),  y' = v sin(yaw),  yaw' = w,  v' = a
+
+whose inputs, the changes of heading and speed since the last step, an inertial unit measures with
+white noise, and is corrected by measurements of all four (Thrun, Burgard, Fox: Probabilistic
+Robotics, 2005, table 3.3). Its noise covariances are those of the noise that is injected.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.perception.noise import KeyedNoise
+from crgame_ros.perception.spec import LocalisationSpec
+from crgame_ros.vehicle.state import VehicleState
+
+Array = NDArray[np.float64]
+
+STATES = 4
+# Wheel encoders see that a vehicle stands: below this speed they err by no more than this [m/s].
+STANDING = 0.01
+# Columns of a step's row of random numbers.
+_HEADING, _SPEED_CHANGE, _WALK, _MEASUREMENT, _WIDTH = 0, 1, 2, 4, 8
+
+
+class Localisation:
+    """
+    Where an AV takes itself to be, in simulation coordinates.
+
+    It begins with the measurement of step 0. Steering angle, acceleration, yaw rate and steering
+    rate of the estimate are the true ones, as the vehicle's own sensors give them: they do not
+    depend on localisation. Steps may be left out; the inertial unit then hands over the change
+    since the last one.
+
+    :param spec: noise, bias and rates
+    :param seed: of the noise
+    :param name: of the vehicle, which makes its noise its own
+    :param initial: true state at step 0
+    :param dt_s: simulation step [s]
+    """
+
+    def __init__(self, spec: LocalisationSpec, seed: int, name: str, initial: VehicleState,
+                 dt_s: float) -> None:
+        self._spec = spec
+        self._dt_s = dt_s
+        self._noise = KeyedNoise(seed, f'{name}/localisation', _WIDTH)
+        self._period = max(1, round(1.0 / (spec.rate * dt_s)))
+        self._lost_probability = min(1.0, spec.dropout_rate * dt_s)
+        self._lost_steps = round(spec.dropout_duration / dt_s)
+        self._lost_until = 0
+        self._n = 0
+        self._truth = initial
+        self._walk: Array = np.zeros(2)
+        deviations = self._deviations(initial)
+        self._covariance: Array = np.diag(np.square(deviations))
+        self._state: Array = self._measurement(0, initial, deviations)
+        self._jacobian: Array = np.eye(STATES)
+        self._input: Array = np.zeros((STATES, 2))
+        self._input[2, 0] = self._input[3, 1] = 1.0
+
+    @property
+    def estimate(self) -> VehicleState:
+        """
+        The vehicle's state as the filter has it.
+
+        Its speed never has the wrong sign: the gear is known.
+        """
+        x, y, yaw, speed = self._state.tolist()
+        truth = self._truth
+        speed = max(speed, 0.0) if truth.speed >= 0.0 else min(speed, 0.0)
+        return truth._replace(x=x, y=y, yaw=yaw, speed=speed)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (4, 4) of the estimated x [m], y [m], yaw [rad] and speed [m/s]."""
+        return self._covariance.copy()
+
+    @property
+    def lost(self) -> bool:
+        """Tell whether the pose is not measured at present."""
+        return self._n < self._lost_until
+
+    def step(self, n: int, truth: VehicleState) -> None:
+        """
+        Take a step into account; steps up to the last one say nothing new.
+
+        :param truth: the true state at n
+        """
+        if n <= self._n:
+            return
+        rows = np.sum([self._noise.normal(step) for step in range(self._n + 1, n + 1)], axis=0)
+        self._find_dropouts(n)
+        self._predict(n - self._n, truth, rows)
+        self._walk += self._spec.bias_walk * math.sqrt(self._dt_s) * rows[_WALK:_WALK + 2]
+        self._n = n
+        self._truth = truth
+        if n % self._period == 0:
+            self._correct(n, truth)
+
+    def _predict(self, steps: int, truth: VehicleState, rows: Array) -> None:
+        """Move the estimate on by what the inertial unit measured, with its noise summed up."""
+        spec, before, time_s = self._spec, self._truth, steps * self._dt_s
+        unit = math.sqrt(self._dt_s)
+        turn = wrap_pi(truth.yaw - before.yaw) + spec.yaw_rate_noise * unit * rows[_HEADING]
+        faster = truth.speed - before.speed \
+            + spec.acceleration_noise * unit * rows[_SPEED_CHANGE]
+        x, y, yaw, speed = self._state.tolist()
+        middle, mean = yaw + 0.5 * turn, speed + 0.5 * faster
+        cos, sin = time_s * math.cos(middle), time_s * math.sin(middle)
+        self._state[:] = (x + mean * cos, y + mean * sin, wrap_pi(yaw + turn), speed + faster)
+        jacobian, gain = self._jacobian, self._input
+        jacobian[0, 2], jacobian[0, 3] = -mean * sin, cos
+        jacobian[1, 2], jacobian[1, 3] = mean * cos, sin
+        gain[:2] = 0.5 * jacobian[:2, 2:]
+        scaled = gain * (math.sqrt(time_s) * np.array(
+            (spec.yaw_rate_noise, spec.acceleration_noise)))
+        covariance = jacobian @ self._covariance @ jacobian.T + scaled @ scaled.T
+        covariance[0, 0] += spec.motion_noise ** 2 * time_s
+        covariance[1, 1] += spec.motion_noise ** 2 * time_s
+        self._covariance = 0.5 * (covariance + covariance.T)
+
+    def _correct(self, n: int, truth: VehicleState) -> None:
+        """Use a measurement of the pose and the speed; of the speed alone in a dropout."""
+        deviations = self._deviations(truth)
+        measured = slice(3, STATES) if self.lost else slice(0, STATES)
+        innovation = self._measurement(n, truth, deviations) - self._state
+        innovation[2] = wrap_pi(innovation[2])
+        noise = np.diag(np.square(deviations[measured]))
+        covariance = self._covariance
+        gain = np.linalg.solve(covariance[measured, measured] + noise, covariance[measured]).T
+        self._state += gain @ innovation[measured]
+        self._state[2] = wrap_pi(float(self._state[2]))
+        # Joseph's form: stays positive definite whatever the rounding.
+        remaining = np.eye(STATES)
+        remaining[:, measured] -= gain
+        covariance = remaining @ covariance @ remaining.T + gain @ noise @ gain.T
+        self._covariance = 0.5 * (covariance + covariance.T)
+
+    def _deviations(self, truth: VehicleState) -> Array:
+        """Give the standard deviations (4) of a measurement of x, y, yaw and speed."""
+        spec = self._spec
+        speed = min(spec.speed_noise, STANDING) if abs(truth.speed) < STANDING \
+            else spec.speed_noise
+        return np.array((spec.position_noise, spec.position_noise, spec.yaw_noise, speed))
+
+    def _measurement(self, n: int, truth: VehicleState, deviations: Array) -> Array:
+        """Measure x, y, yaw and speed (4): the truth with bias and noise."""
+        spec = self._spec
+        bias_x, bias_y = spec.position_bias
+        biased = np.array((truth.x + bias_x + self._walk[0], truth.y + bias_y + self._walk[1],
+                           truth.yaw + spec.yaw_bias, truth.speed))
+        measured: Array = biased + deviations * self._noise.normal(n)[_MEASUREMENT:]
+        measured[2] = wrap_pi(float(measured[2]))
+        return measured
+
+    def _find_dropouts(self, n: int) -> None:
+        """Let dropouts begin in the steps up to n, whether or not they were asked for."""
+        if not self._lost_probability:
+            return
+        for step in range(max(self._n + 1, n - self._lost_steps), n + 1):
+            if self._noise.uniform(step) < self._lost_probability:
+                self._lost_until = step + self._lost_steps

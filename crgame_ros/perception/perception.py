@@ -1,0 +1,246 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The perception of an AV: turns the engine's true request into what the AV knows (FS II-B)."""
+
+from collections.abc import Callable, Sequence
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.perception.bodies import Bodies
+from crgame_ros.perception.localisation import Localisation
+from crgame_ros.perception.mounted_sensor import Detections, MountedSensor
+from crgame_ros.perception.request_layout import RequestLayout
+from crgame_ros.perception.sensors import Scan
+from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
+from crgame_ros.perception.tracking import Tracks
+from crgame_ros.planner.joints import JointSeries, vehicle_to_joints
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.scenario.occupancy import OccupancyGrid, OccupancyMap
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import StateColumn, VehicleState
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+GridSource = Callable[[Array, float], OccupancyGrid | None]
+
+# Their heading says little of where they go.
+FREE_MOVERS = ('pedestrian', 'unknown')
+
+
+class _View(NamedTuple):
+    """What one scan saw, on its way to being known at step `due_n`."""
+
+    due_n: int
+    n: int
+    until_n: int
+    things: Index
+    poses: Array
+    velocities: Array
+
+
+class Perception:
+    """
+    What one AV knows, step by step.
+
+    The truth comes in at every simulation step, in simulation coordinates; a step that is lost
+    leaves the random numbers of all others as they are. What sensors see is placed in the map by
+    the estimated pose, so that an error of localisation shifts everything seen alike.
+
+    :param av_id: av0, …
+    :param spec: what the game says
+    :param descriptions: driven vehicles in their order, then objects
+    :param vehicle: parameters of the AV
+    :param transform: from simulation to the AV's scenario coordinates (CRG 6-8)
+    :param initial: true state of the AV at n = 0
+    :param seed: the game's, for a specification without a seed of its own
+    :param dt_s: simulation step [s]
+    :param occupancy: permanent obstacles, or a function of points (N, 2) and a reach [m]
+    :raises InputError: if a sensor cannot be made.
+    """
+
+    def __init__(self, av_id: str, spec: PerceptionSpec,
+                 descriptions: Sequence[ObjectDescription], vehicle: VehicleParameters,
+                 transform: RigidTransform, initial: VehicleState, seed: int, dt_s: float,
+                 occupancy: OccupancyMap | GridSource | None = None) -> None:
+        self.av_id = av_id
+        self.spec = spec
+        seed = seed if spec.seed is None else spec.seed
+        self._ids = [description.id for description in descriptions]
+        self._own = self._ids.index(av_id)
+        self._vehicles = sum(description.role.is_ego for description in descriptions)
+        self._to_center = np.array([d.rear_to_center for d in descriptions[:self._vehicles]])
+        self._static = np.array([d.role is Role.STATIC for d in descriptions], dtype=bool)
+        self._transform = transform
+        self._dt_s = dt_s
+        self._memory = round(spec.memory / dt_s)
+        self._near: GridSource | None = (
+            occupancy if occupancy is None or callable(occupancy) else occupancy.near)
+        self._localisation = None if spec.localisation is None else Localisation(
+            spec.localisation, seed, av_id, initial, dt_s)
+        self._sensors = [MountedSensor(sensor, vehicle, len(self._ids), seed, av_id, dt_s)
+                         for sensor in spec.sensors]
+        self._bodies = Bodies(descriptions)
+        free = np.array([d.type in FREE_MOVERS for d in descriptions], dtype=bool)
+        self._tracks = Tracks(~(free | self._static), dt_s)
+        self._pending: list[_View] = []
+        self._scans: dict[str, tuple[SensorSpec, int, Scan]] = {}
+        self._n = 0
+        self._truth = initial
+        self._present = np.ones(len(self._ids), dtype=bool)
+        self._layout: tuple[tuple[str, ...], RequestLayout] | None = None
+
+    @property
+    def estimate(self) -> VehicleState:
+        """Where the AV takes itself to be, in simulation coordinates."""
+        return self._truth if self._localisation is None else self._localisation.estimate
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (4, 4) of the estimated x, y, yaw and speed; zero where they are known."""
+        return np.zeros((4, 4)) if self._localisation is None else self._localisation.covariance
+
+    @property
+    def scans(self) -> tuple[tuple[SensorSpec, int, Scan], ...]:
+        """The latest scan of each sensor and the step n that it was made at."""
+        return tuple(self._scans.values())
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Whether each thing (V + M) is known at present: seen, remembered or the AV itself."""
+        known = self._tracks.known(self._n) if self._sensors else self._present.copy()
+        known[self._own] = True
+        return known
+
+    def observe(self, n: int, vehicle_states: Array, object_poses: Array,
+                object_velocities: Array, objects_age_s: float = 0.0) -> None:
+        """
+        Take the truth at simulation step n, in simulation coordinates.
+
+        :param vehicle_states: (V, 8) rear-axle states of driven vehicles
+        :param object_poses: (M, 3) centre poses of objects; NaN where absent
+        :param object_velocities: (M, 3)
+        :param objects_age_s: time since the objects were where they are said to be, over which
+            they have kept their velocity: they move at scenario steps only [s]
+        """
+        self._n = n
+        self._truth = VehicleState(*vehicle_states[self._own].tolist())
+        if self._localisation is not None:
+            self._localisation.step(n, self._truth)
+        if not self._sensors:
+            self._present[self._vehicles:] = np.isfinite(object_poses[:, 0])
+            return
+        firing = [sensor for sensor in self._sensors if sensor.fires(n)]
+        if firing:
+            poses = object_poses + objects_age_s * object_velocities
+            self._scan(n, firing, vehicle_states, poses, object_velocities)
+        if self._pending:
+            self._deliver(n)
+
+    def perceive(self, request: JointSeries) -> JointSeries:
+        """
+        Turn a true request into the one that the planner gets.
+
+        :param request: of the step last observed, in the AV's scenario coordinates
+        :return: the same joints and times. The AV itself is where it takes itself to be, whoever
+            is neither seen nor remembered is NaN, all others are where they were seen, moved on.
+            Their steering angles and accelerations are not observable: NaN.
+        :raises InputError: if it names something that was not described.
+        """
+        if self._localisation is None and not self._sensors:
+            return request
+        arrays = [request.positions.copy(), request.velocities.copy(),
+                  request.accelerations.copy()]
+        if self._localisation is not None:
+            joints = vehicle_to_joints(self._in_scenario(self._localisation.estimate))
+            for array, values in zip(arrays, joints, strict=True):
+                array[0, :4] = values
+        if self._sensors:
+            self._fill(request, *arrays)
+        return JointSeries(request.stamp_ns, request.names, request.times_ns, *arrays)
+
+    def _scan(self, n: int, firing: Sequence[MountedSensor], vehicle_states: Array,
+              object_poses: Array, object_velocities: Array) -> None:
+        """Let sensors look at the world; what they see is known after their latency."""
+        yaw, speed = vehicle_states[:, StateColumn.YAW], vehicle_states[:, StateColumn.SPEED]
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        poses = np.concatenate((vehicle_states[:, :3], object_poses))
+        velocities = np.concatenate((
+            np.stack((speed * cos, speed * sin, vehicle_states[:, StateColumn.YAW_RATE]), axis=1),
+            object_velocities))
+        centers = poses.copy()
+        centers[:self._vehicles, 0] += self._to_center * cos
+        centers[:self._vehicles, 1] += self._to_center * sin
+        # A sensor does not see the vehicle that carries it.
+        centers[self._own] = np.nan
+        self._bodies.place(centers)
+        for sensor in firing:
+            scan, found = sensor.scan(n, self._truth, self._bodies, self._grid(sensor))
+            self._scans[sensor.spec.name] = (sensor.spec, n, scan)
+            due = n + sensor.latency
+            self._pending.append(_View(
+                due, n, due + sensor.period + self._memory, found.things,
+                *self._placed(poses[found.things], velocities[found.things], found)))
+
+    def _grid(self, sensor: MountedSensor) -> OccupancyGrid | None:
+        if self._near is None:
+            return None
+        x, y, _ = sensor.pose(self._truth)
+        return self._near(np.array([[x, y]]), sensor.spec.horizon)
+
+    def _placed(self, poses: Array, velocities: Array,
+                found: Detections) -> tuple[Array, Array]:
+        """Place what a sensor sees (D, 3) in the map, by the estimated pose and with noise."""
+        if self._localisation is not None:
+            truth, estimate = self._truth, self._localisation.estimate
+            turn = estimate.yaw - truth.yaw
+            turned = np.array([[math.cos(turn), math.sin(turn)],
+                               [-math.sin(turn), math.cos(turn)]])
+            poses[:, :2] = (poses[:, :2] - truth[:2]) @ turned + estimate[:2]
+            poses[:, 2] += turn
+            velocities[:, :2] = velocities[:, :2] @ turned
+        poses += found.pose_errors
+        poses[:, 2] = wrap_pi_array(poses[:, 2])
+        moving = ~self._static[found.things]
+        velocities[moving, :2] += found.velocity_errors[moving]
+        return poses, velocities
+
+    def _deliver(self, n: int) -> None:
+        for view in self._pending:
+            if view.due_n <= n:
+                self._tracks.update(view.things, view.n, view.until_n, view.poses,
+                                    view.velocities)
+        self._pending = [view for view in self._pending if view.due_n > n]
+
+    def _fill(self, request: JointSeries, positions: Array, velocities: Array,
+              accelerations: Array) -> None:
+        """Put what is known of others into a request, and nothing else."""
+        if self._layout is None or self._layout[0] != request.names:
+            self._layout = (request.names,
+                            RequestLayout.of(request.names, self.av_id, self._ids))
+        layout = self._layout[1]
+        for array in (positions, velocities, accelerations):
+            array[:, 4:] = np.nan
+        known = np.flatnonzero(self._tracks.known(self._n)[layout.things])
+        things, columns = layout.things[known], layout.columns[known]
+        times_s = 1e-9 * request.times_ns.astype(np.float64)
+        poses, rates = self._tracks.predict(things, self._n, times_s)
+        # The engine gives driven vehicles in the AV's scenario coordinates, objects as they are.
+        driven = things < self._vehicles
+        if not self._transform.is_identity and driven.any():
+            turn = self._transform.yaw_offset
+            cos, sin = math.cos(turn), math.sin(turn)
+            poses[:, driven] = self._transform.to_scenario(poses[:, driven])
+            rates[:, driven, :2] = rates[:, driven, :2] @ np.array([[cos, sin], [-sin, cos]])
+        positions[:, columns] = poses
+        velocities[:, columns] = rates
+
+    def _in_scenario(self, state: VehicleState) -> VehicleState:
+        if self._transform.is_identity:
+            return state
+        x, y, yaw = self._transform.to_scenario(np.array(state[:3])).tolist()
+        return state._replace(x=x, y=y, yaw=yaw)
