@@ -10,7 +10,8 @@ from setuptools import find_packages, setup
 
 PACKAGE = 'crgame_ros'
 NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'timesync_node',
-         'recorder_node', 'marker_node', 'cockpit_node')
+         'recorder_node', 'marker_node', 'cockpit_node', 'perception_node', 'traffic_node',
+         'map_node')
 DATA_DIRECTORIES = ('launch', 'config', 'scenarios', 'msg_defs')
 # Relative paths only: setuptools refuses absolute ones in data_files.
 ROOT = Path(__file__).resolve().parent
@@ -96,8 +97,8 @@ setup(
         'zstandard>=0.25,<1',
     ],
     extras_require={'test': [
-        'mypy>=2.4,<3', 'pytest>=7.4,<8', 'ruff>=0.17.5,<0.18', 'selenium>=4.51,<5',
-        'types-PyYAML>=6.0.12,<7',
+        'mypy>=2.4,<3', 'pillow>=12,<14', 'pytest>=7.4,<8', 'ruff>=0.17.5,<0.18',
+        'selenium>=4.51,<5', 'types-PyYAML>=6.0.12,<7',
     ]},
     entry_points={
         'console_scripts': [

@@ -4,7 +4,8 @@
 The graph for `ros2 launch crgame_ros crgame.launch.py`.
 
 `game:=FILE` names a game file; `humans:=hv0` and `avs:=av0,av1` say which drivers and planners to
-start (those of the game), `bag:=FOLDER` where to record.
+start (those of the game), `perceiving:=av0` which AVs have perception, `traffic:=true` and `map:=true`
+whether the game has reactive traffic and a map of permanent obstacles, `bag:=FOLDER` where to record.
 """
 
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
@@ -23,11 +24,16 @@ def nodes(context: LaunchContext) -> list:
 
     humans = [item for item in value('humans').split(',') if item]
     avs = [item for item in value('avs').split(',') if item]
+    perceiving = [item for item in value('perceiving').split(',') if item]
     companions = [
         *(Node(package='crgame_ros', executable='driver_node', name=f'driver_node_{human}',
                parameters=[{'vehicle': human}]) for human in humans),
         *(Node(package='crgame_ros', executable='planner_node', name=f'planner_node_{av}',
                parameters=[{'vehicle': av}], respawn=True) for av in avs),
+        *(Node(package='crgame_ros', executable='perception_node', name=f'perception_node_{av}',
+               parameters=[{'vehicle': av}], respawn=True) for av in perceiving),
+        *(Node(package='crgame_ros', executable=f'{name}_node', respawn=True)
+          for name in ('traffic', 'map') if value(name) == 'true'),
         Node(package='crgame_ros', executable='drivability_node', respawn=True),
         Node(package='crgame_ros', executable='timesync_node', respawn=True),
         Node(package='crgame_ros', executable='recorder_node',
@@ -35,6 +41,8 @@ def nodes(context: LaunchContext) -> list:
     waiting = ['recorder_node', 'drivability_node', 'timesync_node']
     waiting += ['driver_node'] if humans else []
     waiting += ['planner_node'] if avs else []
+    waiting += ['perception_node'] if perceiving else []
+    waiting += [f'{name}_node' for name in ('traffic', 'map') if value(name) == 'true']
     simulation = Node(
         package='crgame_ros', executable='sim_node', output='screen',
         parameters=[{'game': value('game'), 'wait_for': waiting}])
@@ -54,6 +62,9 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument('game', default_value='', description='game file'),
         DeclareLaunchArgument('humans', default_value='hv0', description='humans of the game'),
         DeclareLaunchArgument('avs', default_value='av0', description='AVs of the game'),
+        DeclareLaunchArgument('perceiving', default_value='', description='AVs with perception'),
+        DeclareLaunchArgument('traffic', default_value='false', description='reactive traffic'),
+        DeclareLaunchArgument('map', default_value='false', description='permanent obstacles'),
         DeclareLaunchArgument('port', default_value='8080', description="of the cockpit's page"),
         DeclareLaunchArgument('bag', default_value='bag', description='folder of the recording'),
         OpaqueFunction(function=nodes)])

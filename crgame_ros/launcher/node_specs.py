@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which nodes a run has, and which ones a game that is chosen later adds."""
 
-from collections.abc import Mapping
 import json
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from crgame_ros.driver.source import COCKPIT
 from crgame_ros.launcher.node_process import NodeSpec
 from crgame_ros.launcher.run_plan import RunPlan
 from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.simulation.roster import Participants
 
 COMPANION_NICE = 5
 # Pictures for people give way to everybody.
@@ -20,8 +20,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     """List the nodes of a run: sim_node first, which waits for its companions, viewers last."""
     setup, request = plan.setup, plan.request
     companions = [
-        *vehicle_specs({human.id: human.driver for human in setup.humans},
-                       {av.id: av.spec.planner for av in setup.avs}),
+        *participant_specs(Participants.of(setup)),
         NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
                  nice=COMPANION_NICE, restart=True),
         NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
@@ -40,18 +39,20 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     return [simulation, *companions, *viewers]
 
 
-def vehicle_specs(drivers: Mapping[str, str], planners: Mapping[str, str]) -> list[NodeSpec]:
-    """
-    List the nodes that a game's vehicles need.
-
-    :param drivers: driver source by human.
-    :param planners: planner by AV.
-    """
-    return [
+def participant_specs(who: Participants) -> list[NodeSpec]:
+    """List the nodes that a game's vehicles, perception, traffic and map need."""
+    specs = [
         *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av}, nice=COMPANION_NICE,
-                   restart=True) for av, planner in planners.items() if planner != EXTERNAL),
+                   restart=True) for av, planner in who.avs.items() if planner != EXTERNAL),
         *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human}, restart=True)
-          for human, driver in drivers.items() if driver != COCKPIT)]
+          for human, driver in who.humans.items() if driver != COCKPIT),
+        *(NodeSpec('perception_node', f'perception_node_{av}', {'vehicle': av},
+                   nice=COMPANION_NICE, restart=True) for av in who.perceiving)]
+    if who.traffic:
+        specs.append(NodeSpec('traffic_node', 'traffic_node', nice=COMPANION_NICE, restart=True))
+    if who.occupancy:
+        specs.append(NodeSpec('map_node', 'map_node', nice=COMPANION_NICE, restart=True))
+    return specs
 
 
 def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
@@ -89,4 +90,4 @@ class Roster:
             return []
         self._seen = (stat.st_mtime_ns, stat.st_ino)
         content = json.loads(self._path.read_text(encoding='utf-8'))
-        return vehicle_specs(content['humans'], content['avs'])
+        return participant_specs(Participants.read(content))

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """sim_node: paces the simulation against the wall clock (CRG algorithms 1 and 2, live)."""
 
+from dataclasses import asdict
 import json
 import os
 
@@ -12,6 +13,7 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.ros.live_run import LiveRun, Outcome
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.sim_control import SimControl
+from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
 
 NS_PER_S = 1_000_000_000
@@ -76,8 +78,7 @@ class SimNode(Node):
         path = self._control.roster
         if path is None:
             return
-        content = {'humans': {human.id: human.driver for human in setup.humans},
-                   'avs': {av.id: av.spec.planner for av in setup.avs}}
+        content = asdict(Participants.of(setup))
         fresh = path.with_suffix('.new')
         try:
             fresh.write_text(json.dumps(content), encoding='utf-8')

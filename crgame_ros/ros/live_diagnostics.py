@@ -6,6 +6,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from crgame_ros.ros.sim_inputs import SimInputs
 from crgame_ros.ros.sim_outputs import SimOutputs
+from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation
 
 # Refusals published as they happen, between two reports: a flood must not cost the cycle.
@@ -38,6 +39,12 @@ class LiveDiagnostics:
             {'n': simulation.n, 'k': simulation.scheduler.k(simulation.n),
              'real_time_factor': real_time_factor}, simulation.scheduler.stamp_ns(simulation.n))
 
+    def late_traffic(self, n: int, k: int, agents_k: int) -> None:
+        """Tell that agents of an earlier tick had to do."""
+        self._outputs.publish_diagnostics(
+            'traffic', DiagnosticStatus.WARN, f'agents are {k - agents_k} scenario steps late',
+            {'n': n, 'k': k, 'agents_k': agents_k}, self._simulation.scheduler.stamp_ns(n))
+
     def event_refused(self, name: str, reason: str) -> None:
         """Tell why a trigger brought nothing about."""
         self._refusals += 1
@@ -67,10 +74,23 @@ class LiveDiagnostics:
                  'steps_without_plan': counters.steps_without_plan,
                  'latency_ms': round(counters.last_latency_steps * dt_s * 1e3, 3),
                  'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
-                 'last_refusal': counters.last_refusal}, stamp_ns)
+                 'last_refusal': counters.last_refusal, **_tracking(av)}, stamp_ns)
         for seat in self._inputs.seats.all:
             self._outputs.publish_diagnostics(
                 f'{seat.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
                 'driver lost' if seat.lost else 'driven',
                 {'source': seat.source, 'losses': seat.losses, 'malformed': seat.malformed,
                  'outdated': seat.outdated}, stamp_ns)
+
+
+def _tracking(av: AutonomousVehicle) -> dict[str, object]:
+    """Give how far a tracked AV is from its plan, now and at worst."""
+    execution = av.execution
+    if execution is None:
+        return {}
+    values: dict[str, object] = {}
+    for when, errors in (('', execution.errors), ('worst_', execution.worst)):
+        for name in ('lateral', 'along', 'heading', 'speed'):
+            value = '' if errors is None else round(getattr(errors, name), 4)
+            values[f'{when}{name}_error'] = value
+    return values

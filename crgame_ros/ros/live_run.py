@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One epoch of a live run: from the request of k0 to the end, a reset or a stop."""
 
+from dataclasses import replace
 from enum import auto, Enum
 import gc
 import time
@@ -13,6 +14,7 @@ from rclpy.node import Node
 from crgame_ros.errors import InputError
 from crgame_ros.ros.live_diagnostics import LiveDiagnostics
 from crgame_ros.ros.node_main import StopFlag
+from crgame_ros.ros.remote_traffic import RemoteTraffic
 from crgame_ros.ros.sim_control import SimControl
 from crgame_ros.ros.sim_inputs import SimInputs
 from crgame_ros.ros.sim_outputs import SimOutputs
@@ -58,13 +60,16 @@ class LiveRun:
         self._epoch = epoch
         self._outputs = SimOutputs(node, setup)
         self._inputs = SimInputs(node, setup, clock_offset_ns, control.seat_sources)
-        self.simulation = Simulation(setup, clock_offset_ns)
-        scheduler = self.simulation.scheduler
+        scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
+        feed = None if setup.traffic is None else RemoteTraffic(
+            self._inputs.take_agents, setup.traffic, scheduler)
+        self.simulation = Simulation(setup, clock_offset_ns, feed)
         self._dt_s = scheduler.dt_s
         self._controller = TimeController(setup.game.timing, self._dt_s)
         self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
         duration_s = control.duration_s or setup.game.duration
         self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
+        self._feed = feed
         # At high rates half a step has to do, or nobody could ever stop the run.
         self._service_slack_ns = min(SERVICE_SLACK_NS, 0.5 * self._dt_s * NS_PER_S)
         self._service_every = max(1, round(1.0 / self._dt_s / SERVICE_RATE))
@@ -120,7 +125,8 @@ class LiveRun:
         control = self._control
         self._tell_state('waiting')
         gate = StartGate(self._outputs, self._inputs, self.simulation, result,
-                         control.companions, self._take_plan, self._node.get_logger().warning)
+                         control.companions, self._take_plan, self._node.get_logger().warning,
+                         None if self._feed is None else self._feed.is_ahead)
         while not (is_open := gate.is_open(time.monotonic_ns(), control.planner_timeout_s)) \
                 or self._stands_still():
             self._executor.spin_once(timeout_sec=0.005)
@@ -149,10 +155,14 @@ class LiveRun:
     def _take_plan(self, av_id: str) -> bool:
         """Offer an AV the plan that has come for it; tell whether it was accepted."""
         try:
+            perceived = self._inputs.take_perceived(av_id)
+            reason = None if perceived is None else self.simulation.request_perceived(
+                av_id, perceived)
             plan = self._inputs.take_plan(av_id)
-            if plan is None:
+            if plan is not None:
+                reason = self.simulation.offer_plan(av_id, plan)
+            elif reason is None:
                 return False
-            reason = self.simulation.offer_plan(av_id, plan)
         except InputError as error:
             reason = str(error)
             self.simulation.refuse_malformed_plan(av_id, reason)
@@ -262,6 +272,8 @@ class LiveRun:
         for event in result.fired:
             self._node.get_logger().info(
                 f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
+        if result.agents_k is not None and result.agents_k < result.k:
+            self._diagnostics.late_traffic(result.n, result.k, result.agents_k)
         order = self._inputs.frame_skip_order()
         if order is not None:
             self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping

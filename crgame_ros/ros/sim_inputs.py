@@ -3,11 +3,13 @@
 """What sim_node takes in at each cycle: commands of the seats and plans of the AVs."""
 
 from collections.abc import MutableMapping
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
 from rclpy.node import Node
 
+from crgame_ros.errors import InputError
 from crgame_ros.planner.joints import JointSeries
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_joint_trajectory
@@ -39,6 +41,10 @@ class SimInputs:
             endpoints.service('/<av>/planner_run', partial(self._on_planner_run, av.id), av.id)
             for av in setup.avs]
         self._plans = {av.id: endpoints.polled('/<av>/plan', av.id) for av in setup.avs}
+        # What planners are told instead of the truth; a plan is checked against it.
+        self._perceived = {av.id: endpoints.polled('/<av>/plan_request', av.id)
+                           for av in setup.avs if av.spec.perception is not None}
+        self._agents = None if setup.traffic is None else endpoints.polled('/traffic/agents')
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._triggers = endpoints.polled('/trigger')
         self._drivability = {}
@@ -66,6 +72,25 @@ class SimInputs:
         message = self._plans[av_id].take()
         return None if message is None else from_joint_trajectory(message, f'/{av_id}/plan')
 
+    def take_perceived(self, av_id: str) -> JointSeries | None:
+        """
+        Take the request that perception has sent to an AV's planner, if one has come.
+
+        :raises InputError: if the message is malformed.
+        """
+        slot = self._perceived.get(av_id)
+        message = None if slot is None else slot.take()
+        return None if message is None else from_joint_trajectory(
+            message, f'/{av_id}/plan_request')
+
+    def take_agents(self) -> list[JointSeries]:
+        """Take the agents' states that have come; bad ones are dropped."""
+        taken: list[JointSeries] = []
+        while self._agents is not None and (message := self._agents.take()) is not None:
+            with suppress(InputError):
+                taken.append(from_joint_trajectory(message, '/traffic/agents'))
+        return taken
+
     def frame_skip_order(self) -> bool | None:
         """Give the supervisor's latest order to skip frames, None if there is no new one."""
         message = self._frame_skip.latest()
@@ -91,7 +116,8 @@ class SimInputs:
     def destroy(self) -> None:
         """Release the subscriptions, for a game with other vehicles."""
         slots = [*self.seats.slots, *self._plans.values(),
-                 *self._drivability.values(), self._frame_skip, self._triggers]
+                 *self._drivability.values(), *self._perceived.values(), self._frame_skip,
+                 self._triggers, *([] if self._agents is None else [self._agents])]
         for slot in slots:
             self._node.destroy_subscription(slot.subscription)
         for service in self._services:

@@ -23,19 +23,19 @@ from crgame_ros.planner.joints import (
     vehicle_joint_names,
     vehicle_to_joints,
 )
-from crgame_ros.ros.contract import load_contract
+from crgame_ros.ros.contract import Contract, load_contract
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import MAP, SeriesMessage, set_time, StateMessage, to_time
 from crgame_ros.scenario.events import FiredEvent
+from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.documents import events_document, game_document, objects_document
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import CycleRows
+from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.state import VehicleState
 
-# Rate to which /clock and the states are thinned above it [Hz].
-PUBLISHING_RATE = 100.0
 # For all acknowledgements together: a process that is stopped never gives one.
 ACKNOWLEDGE_S = 2.0
 
@@ -88,7 +88,7 @@ class SimOutputs:
         self._node = node
         self._setup = setup
         endpoints = Endpoints(node)
-        self.publish_every = max(1, math.ceil(setup.game.timing.rate / PUBLISHING_RATE))
+        self.publish_every = steps_between_messages(setup.game.timing.rate)
         self._clock = endpoints.publisher('/clock')
         self._state = endpoints.publisher('/vehicles/state')
         self._objects = endpoints.publisher('/traffic/objects')
@@ -98,8 +98,10 @@ class SimOutputs:
             '/scenario/signals',
             '/seats')}
         self._diagnostics = endpoints.publisher('/diagnostics')
-        self._requests = {av.id: endpoints.publisher('/<av>/plan_request', av.id)
-                          for av in setup.avs}
+        # Where perception stands between, it makes the plan request of the true one.
+        self._requests = {av.id: endpoints.publisher(
+            '/<av>/true_request' if av.spec.perception else '/<av>/plan_request', av.id)
+            for av in setup.avs}
         self._request_messages: dict[str, SeriesMessage] = {}
         self._vehicles = [VehicleOutputs(endpoints, vehicle) for vehicle in setup.vehicle_ids]
         self.frames_skipped = False
@@ -162,10 +164,7 @@ class SimOutputs:
         states = simulation.states
         self.publish_clock(stamp_ns)
         if result.objects is not None:
-            message = self._objects_message
-            message.positions[:] = result.objects.poses.ravel()
-            message.velocities[:] = result.objects.velocities.ravel()
-            self._objects.publish(message.stamp(stamp_ns))
+            self._publish_objects(result.objects, stamp_ns)
             self._publish_signals(result.k)
             for vehicle in self._vehicles:
                 vehicle.look_for_subscribers()
@@ -174,6 +173,19 @@ class SimOutputs:
             for vehicle, state in zip(self._vehicles, states, strict=True):
                 if vehicle.wanted:
                     vehicle.publish(state, stamp_ns)
+
+    def resend_world(self, simulation: Simulation, result: StepResult) -> None:
+        """Publish the world of a tick again to those who may not have been there."""
+        stamp_ns = simulation.scheduler.stamp_ns(result.n)
+        if result.objects is not None:
+            self._publish_objects(result.objects, stamp_ns)
+        self._publish_states(simulation.states, stamp_ns)
+
+    def _publish_objects(self, objects: ObjectStates, stamp_ns: int) -> None:
+        message = self._objects_message
+        message.positions[:] = objects.poses.ravel()
+        message.velocities[:] = objects.velocities.ravel()
+        self._objects.publish(message.stamp(stamp_ns))
 
     def publish_clock(self, stamp_ns: int) -> None:
         """Publish the time of a step; again, if drivers may not have heard it."""
@@ -233,12 +245,20 @@ class SimOutputs:
         for name, publishers in {
                 '/clock': {'': self._clock}, '/vehicles/state': {'': self._state},
                 '/traffic/objects': {'': self._objects}, '/timing/cycle': {'': self._cycle},
-                '/<av>/plan_request': self._requests}.items():
+                '/<av>/plan_request': self._requests_as(contract, '/<av>/plan_request'),
+                '/<av>/true_request': self._requests_as(contract, '/<av>/true_request'),
+                }.items():
             consumers = contract.topic(name).consumers
             for vehicle_id, publisher in publishers.items():
                 expected = {item for item in companions if _consumes(item, consumers, vehicle_id)}
                 found |= expected - self._connected(publisher, expected)
         return found
+
+    def _requests_as(self, contract: Contract, name: str) -> dict[str, Publisher]:
+        """Give the publishers of requests that go out under a name."""
+        topic = contract.topic(name)
+        return {av: publisher for av, publisher in self._requests.items()
+                if publisher.topic_name == topic.name_for(av)}
 
     def _connected(self, publisher: Publisher, expected: set[str]) -> set[str]:
         """Find who is connected to a topic; all or none, for the middleware tells no names."""

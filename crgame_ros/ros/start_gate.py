@@ -32,11 +32,13 @@ class StartGate:
     :param companions: nodes that must be connected, as `SimOutputs.missing` takes them.
     :param take_plan: offers an AV the plan that has come; tells whether it was accepted.
     :param say: tells people something in one line.
+    :param traffic_answers: tells whether the agents of the next tick have come; None without any.
     """
 
     def __init__(self, outputs: SimOutputs, inputs: SimInputs, simulation: Simulation,
                  result: StepResult, companions: Sequence[str],
-                 take_plan: Callable[[str], bool], say: Callable[[str], object]) -> None:
+                 take_plan: Callable[[str], bool], say: Callable[[str], object],
+                 traffic_answers: Callable[[], bool] | None = None) -> None:
         self._outputs = outputs
         self._simulation = simulation
         self._result = result
@@ -45,6 +47,7 @@ class StartGate:
         self._say = say
         self._connected = False
         self._planners = set(result.requests)
+        self._traffic_answers = traffic_answers
         self._seats = {seat.id: seat for seat in inputs.seats.humans
                        if {'driver_node', f'driver_node_{seat.id}'} & set(companions)}
         self._began_ns = 0
@@ -66,7 +69,8 @@ class StartGate:
             self._listen(now_ns)
         if now_ns - self._began_ns > timeout_s * NS_PER_S:
             self._give_up(now_ns, timeout_s)
-        return self._connected and not self._planners and not self._seats
+        return self._connected and not self._planners and not self._seats \
+            and self._traffic_answers is None
 
     def _publish(self, now_ns: int) -> None:
         self._connected = True
@@ -78,8 +82,12 @@ class StartGate:
         for seat in list(self._seats.values()):
             if seat.source != GAME or seat.listen(now_ns):
                 del self._seats[seat.id]
+        if self._traffic_answers is not None and self._traffic_answers():
+            self._traffic_answers = None
         if now_ns - self._asked_ns > ASK_AGAIN_NS:
             self._asked_ns = now_ns
+            if self._traffic_answers is not None:
+                self._outputs.resend_world(self._simulation, self._result)
             for av_id in self._planners:
                 self._outputs.resend(av_id, self._result)
         if self._seats and now_ns - self._told_ns > CLOCK_AGAIN_NS:
@@ -93,9 +101,11 @@ class StartGate:
     def _give_up(self, now_ns: int, timeout_s: float) -> None:
         missing = [] if self._connected else sorted(self._outputs.missing(self._companions))
         missing += [f'the planner of {av_id}' for av_id in sorted(self._planners)]
+        missing += ['the traffic'] if self._traffic_answers is not None else []
         if missing:
             self._say(f'starting without {" and ".join(missing)}: no answer in {timeout_s:g} s')
         if not self._connected:
             self._publish(now_ns)
         self._planners.clear()
         self._seats.clear()
+        self._traffic_answers = None

@@ -7,10 +7,38 @@ import math
 from pathlib import Path
 from typing import Any, Literal
 
+from crgame_ros.perception.spec import PerceptionSpec
 from crgame_ros.scenario.events import EventSpec
+from crgame_ros.scenario.object_file import ObjectSpec
+from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.vehicle.parameters import DEFAULT_VEHICLE
 
 DEFAULT_PLANNER = 'idm'
+
+
+@dataclass(frozen=True)
+class ModelSpec:
+    """
+    A model by its registered name, `module:Class` or `file.py:Class`.
+
+    :param options: keyword arguments of its constructor.
+    """
+
+    name: str
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class TrackerSpec:
+    """
+    What steers a tracked AV along its plan (FS II-C1).
+
+    :param model: the tracking controller.
+    :param pose: whether it steers by the true pose or by the estimated one.
+    """
+
+    model: ModelSpec = ModelSpec('lqr')
+    pose: Literal['true', 'estimated'] = 'true'
 
 
 @dataclass(frozen=True)
@@ -50,12 +78,14 @@ class HumanSpec:
         joy:FILE, joy, replay:BAG.
     :param vehicle: name of the vehicle parameters.
     :param spawn: where it starts; None places it beside or behind the first AV.
+    :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
     """
 
     id: str
     driver: str = 'auto'
     vehicle: str = DEFAULT_VEHICLE
     spawn: LaneletSpawn | PoseSpawn | None = None
+    dynamics: ModelSpec | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +100,11 @@ class AvSpec:
     :param vehicle: name of the vehicle parameters.
     :param spawn: `problem` starts at the planning problem's pose; `lanelet` at the nearest pose
         of lanelet geometry, aligned to the former by CRG 6-10.
+    :param execution: `perfect` follows the plan exactly (CRG), `tracked` by a controller on a
+        vehicle model (FS II-C).
+    :param tracker: the controller of a tracked AV.
+    :param dynamics: the vehicle model of a tracked AV (FS 2).
+    :param perception: how it perceives the world; None is perfectly.
     """
 
     id: str
@@ -78,6 +113,15 @@ class AvSpec:
     planning_problem: int | None = None
     vehicle: str = DEFAULT_VEHICLE
     spawn: Literal['problem', 'lanelet'] = 'problem'
+    execution: Literal['perfect', 'tracked'] = 'perfect'
+    tracker: TrackerSpec = TrackerSpec()
+    dynamics: ModelSpec = ModelSpec('dynamic-bicycle')
+    perception: PerceptionSpec | None = None
+
+    @property
+    def localisation_steers(self) -> bool:
+        """Tell whether a tracking controller steers by the estimated pose."""
+        return self.execution == 'tracked' and self.tracker.pose == 'estimated'
 
 
 @dataclass(frozen=True)
@@ -153,6 +197,9 @@ class Game:
     :param seed: seed of everything random.
     :param base: directory against which file names inside the game are resolved.
     :param events: what triggers and conditions bring about.
+    :param objects: objects of the game's own (FS II-A3).
+    :param traffic: vehicles that react (FS III); None for none.
+    :param occupancy: map of permanent obstacles (FS II-A2).
     """
 
     scenario: Path
@@ -166,3 +213,6 @@ class Game:
     timing: TimingSpec = TimingSpec()
     base: Path = Path('.')
     events: tuple[EventSpec, ...] = ()
+    objects: tuple[ObjectSpec, ...] = ()
+    traffic: TrafficSpec | None = None
+    occupancy: Path | None = None

@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from crgame_ros.errors import InputError
+from crgame_ros.perception.spec import parse_perception, perception_entry
 from crgame_ros.scenario.checked_values import build, named_file
 from crgame_ros.scenario.event_file import event_entry, parse_events
 from crgame_ros.scenario.game import (
@@ -20,10 +21,14 @@ from crgame_ros.scenario.game import (
     Game,
     HumanSpec,
     LaneletSpawn,
+    ModelSpec,
     PoseSpawn,
     PredictionSpec,
     TimingSpec,
+    TrackerSpec,
 )
+from crgame_ros.scenario.object_file import object_entry, parse_objects
+from crgame_ros.traffic.spec import parse_traffic, traffic_entry
 
 MAX_BYTES = 1 << 20
 PREFIX = {'humans': 'hv', 'avs': 'av'}
@@ -91,6 +96,12 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
                                              'rate': rate}, where)
     if 'events' in table:
         table['events'] = parse_events(table['events'], f'{where}: events', base)
+    if 'objects' in table:
+        table['objects'] = parse_objects(table['objects'], f'{where}: objects', base)
+    if table.get('traffic') is not None:
+        table['traffic'] = parse_traffic(table['traffic'], f'{where}: traffic', base)
+    if table.get('occupancy') is not None:
+        table['occupancy'] = _map_file(table['occupancy'], where, base)
     table['base'] = base
     game = build(Game, table, where)
     if not game.humans and game.avs == ():
@@ -118,6 +129,7 @@ def _vehicles(values: Any, group: str, where: str,
             table['spawn'] = build(kind, table['spawn'], f'{place}: spawn')
         elif table.get('spawn') == 'auto':
             table.pop('spawn')
+        _take_models(table, place, base)
         kind_of: type[HumanSpec | AvSpec] = HumanSpec if group == 'humans' else AvSpec
         spec = build(kind_of, table, place)
         if not re.fullmatch(PREFIX[group] + r'\d{1,3}', spec.id):
@@ -128,6 +140,40 @@ def _vehicles(values: Any, group: str, where: str,
     if len(set(ids)) != len(ids):
         raise InputError('ids repeat', f'{where}: {group}', 'give each vehicle its own id')
     return tuple(specs)
+
+
+def _take_models(table: dict[str, Any], where: str, base: Path) -> None:
+    """Read what a vehicle's entry says of dynamics, tracking and perception."""
+    if table.get('dynamics') is not None:
+        table['dynamics'] = _model(table['dynamics'], f'{where}: dynamics', base)
+    if 'tracker' in table:
+        entry = table['tracker']
+        pose = entry.get('pose', 'true') if isinstance(entry, Mapping) else 'true'
+        # YAML reads a bare true as a truth value.
+        pose = 'true' if pose is True else pose
+        rest = {key: value for key, value in entry.items() if key != 'pose'} \
+            if isinstance(entry, Mapping) else entry
+        place = f'{where}: tracker'
+        model = _model(rest, place, base) if rest else ModelSpec('lqr')
+        table['tracker'] = build(TrackerSpec, {'model': model, 'pose': pose}, place)
+    if table.get('perception') is not None:
+        table['perception'] = parse_perception(
+            table['perception'], f'{where}: perception', base)
+
+
+def _model(value: Any, where: str, base: Path) -> ModelSpec:
+    """Read a model: its name, or a mapping of its name and options."""
+    options = dict(value) if isinstance(value, Mapping) else {'name': value}
+    name = options.pop('name', None)
+    if not isinstance(name, str):
+        raise InputError('"name" is missing', where, 'name a model')
+    return ModelSpec(named_file(name, base), options)
+
+
+def _map_file(value: Any, where: str, base: Path) -> Path:
+    if not isinstance(value, str):
+        raise InputError('"occupancy" is no file name', where, 'name the YAML file of a map')
+    return base / value
 
 
 def dump_game(game: Game) -> str:
@@ -143,16 +189,39 @@ def dump_game(game: Game) -> str:
     here = Path.cwd()
     values['humans'] = [_without_empty(asdict(human)) | {
         'driver': _absolute_driver(human.driver, game.base),
-        'vehicle': named_file(human.vehicle, here)} for human in game.humans]
+        'vehicle': named_file(human.vehicle, here)}
+        | ({'dynamics': model_entry(human.dynamics)} if human.dynamics else {})
+        for human in game.humans]
     if game.avs is not None:
         values['avs'] = [_without_empty(asdict(av)) | {
             'vehicle': named_file(av.vehicle, here),
-            'planner': named_file(av.planner, here)} for av in game.avs]
+            'planner': named_file(av.planner, here)} | execution_entries(av) for av in game.avs]
     for key in ('prediction', 'drivability', 'timing'):
         values[key] = asdict(getattr(game, key))
     if game.events:
         values['events'] = [event_entry(event) for event in game.events]
+    if game.objects:
+        values['objects'] = [object_entry(item) for item in game.objects]
+    if game.traffic is not None:
+        values['traffic'] = traffic_entry(game.traffic)
+    if game.occupancy is not None:
+        values['occupancy'] = str(game.occupancy.resolve())
     return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def model_entry(model: ModelSpec) -> dict[str, Any]:
+    """Give a model as a game file says it, its file names absolute."""
+    return {'name': named_file(model.name, Path.cwd()), **model.options}
+
+
+def execution_entries(av: AvSpec) -> dict[str, Any]:
+    """Give how an AV executes its plans and perceives the world, as a game file says it."""
+    entries: dict[str, Any] = {
+        'tracker': {**model_entry(av.tracker.model), 'pose': av.tracker.pose},
+        'dynamics': model_entry(av.dynamics)}
+    if av.perception is not None:
+        entries['perception'] = perception_entry(av.perception)
+    return entries
 
 
 def _without_empty(values: dict[str, Any]) -> dict[str, Any]:

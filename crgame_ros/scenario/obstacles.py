@@ -3,7 +3,8 @@
 """The obstacles of a scenario: what they look like, and where they are at each time step."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+import copy
+from dataclasses import dataclass, replace
 import math
 
 from commonroad.common.util import Interval
@@ -75,6 +76,8 @@ class ScenarioObstacles:
         self._velocities: FloatArray = np.full((count, len(self.ids), 3), np.nan)
         for column, track in enumerate(tracks):
             self._fill(column, track)
+        # Columns of what the run itself moves.
+        self.living: NDArray[np.int_] = np.empty(0, dtype=int)
         self._held = {column: self._hold(column) for column, obstacle in enumerate(obstacles)
                       if obstacle.obstacle_id in held}
         self._poses.flags.writeable = False
@@ -105,6 +108,32 @@ class ScenarioObstacles:
             return ObjectStates(self._poses[row], self._velocities[row])
         return self._static
 
+    def with_living(self, agents: Collection[int],
+                    more: Sequence[ObjectDescription]) -> 'ScenarioObstacles':
+        """
+        Give these obstacles with some, and more, that live: the run itself moves them.
+
+        They are absent in all states here.
+
+        :param agents: columns of the recorded obstacles that become agents of traffic.
+        :param more: what the run adds, in columns behind all others.
+        """
+        other = copy.copy(self)
+        other.descriptions = (*(
+            replace(item, role=Role.TRAFFIC) if column in agents else item
+            for column, item in enumerate(self.descriptions)), *more)
+        other.ids = tuple(item.id for item in other.descriptions)
+        count = len(self.ids)
+        other.living = np.array([*sorted(agents), *range(count, count + len(more))], dtype=int)
+        other._poses, other._velocities = (
+            np.concatenate((values, np.full((len(values), len(more), 3), np.nan)), axis=1)
+            for values in (self._poses, self._velocities))
+        for values in (other._poses, other._velocities):
+            values[:, other.living] = np.nan
+            values.flags.writeable = False
+        other._static = ObjectStates(*other._only_static())
+        return other
+
     @property
     def held(self) -> Collection[int]:
         """Columns of the obstacles that stand until somebody lets them go."""
@@ -117,6 +146,10 @@ class ScenarioObstacles:
         :return: poses and velocities (n, 3) from its first time step on
         """
         return self._held[column] if column in self._held else self._recorded(column)
+
+    def first_step(self, column: int) -> int:
+        """Give the first time step of an obstacle's recorded course."""
+        return self.first_k + int(np.argmax(np.isfinite(self._poses[:, column, 0])))
 
     def _recorded(self, column: int) -> tuple[FloatArray, FloatArray]:
         present = np.isfinite(self._poses[:, column, 0])

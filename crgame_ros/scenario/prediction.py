@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.scenario.lane_line import LaneLine
+from crgame_ros.scenario.lane_lookup import LaneLookup
 from crgame_ros.scenario.objects import ObjectStates, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
@@ -102,7 +103,7 @@ class LanePrediction:
         self._obstacles = obstacles
         self._network = network
         self._follows_lanes = np.array([
-            d.role is Role.RECORDED and d.type not in _FREE_MOVERS
+            d.role is not Role.STATIC and d.type not in _FREE_MOVERS
             for d in obstacles.descriptions], dtype=bool)
         shape = obstacles.poses.shape[:2]
         self._lane: NDArray[np.int64] = np.full(shape, _NO_LANE, dtype=np.int64)
@@ -113,7 +114,16 @@ class LanePrediction:
             np.stack((np.cos(obstacles.poses[..., 2]), np.sin(obstacles.poses[..., 2])), -1))
         self._reach = 0.0
         self._assign_lanes()
+        self._lookup: LaneLookup | None = None
+        if len(obstacles.living):
+            # Where these will be is not known: any lane may be asked for.
+            for lane, lanelet_id in enumerate(network.lanelet_ids):
+                if network.is_for_cars(lanelet_id):
+                    self._number(lane)
         self._ensure_reach(_MIN_REACH)
+        if len(obstacles.living) and self._used:
+            self._lookup = LaneLookup(
+                [self._lane_samples(lane) for lane in self._used], _SPACING, _MAX_LANE_ANGLE)
 
     def predict(self, k: int, steps: int, now: ObjectStates | None = None,
                 changed: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
@@ -160,7 +170,8 @@ class LanePrediction:
         columns, speed = columns[moving], speed[moving]
         if not len(columns):
             return
-        lane, s, d = self._place(now.poses[columns])
+        place = self._place if self._lookup is None else self._lookup.find
+        lane, s, d = place(now.poses[columns])
         found = lane != _NO_LANE
         if found.any():
             poses[:, columns[found]] = self._along_lanes(
@@ -212,6 +223,11 @@ class LanePrediction:
             lanes[where] = self._number(lane)
             along_line[where], aside[where] = s[along], d[along]
         return lanes, along_line, aside
+
+    def _lane_samples(self, lane: int) -> FloatArray:
+        line = self._network.line(self._network.lanelet_ids[lane])
+        s = np.arange(0.0, line.length + _SPACING, _SPACING)
+        return line.poses(s, np.zeros_like(s))
 
     def _number(self, lane: int) -> int:
         """Find the number of a lane; a new one is tabulated before it is used."""

@@ -9,9 +9,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from crgame_ros.control.tracked_execution import TrackedExecution
+from crgame_ros.control.tracker import Reference
 from crgame_ros.driver.command import DriverCommand
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.planner.interface import Plan
 from crgame_ros.planner.joints import JointSeries, plan_from_joints
 from crgame_ros.planner.plan_check import check_plan
@@ -48,17 +51,35 @@ class AvCounters:
     last_latency_steps: int = 0
 
 
-class AutonomousVehicle:
-    """Follows the latest accepted plan; owns the busy flag of algorithm 2."""
+@dataclass
+class _Asked:
+    """Where an AV was at a request, and where its planner was told it is; None: not yet known."""
 
-    def __init__(self, setup: AvSetup, scheduler: ScenarioScheduler, timing: TimingSpec) -> None:
+    true: VehicleState
+    told: VehicleState | None
+
+
+class AutonomousVehicle:
+    """
+    Follows the latest accepted plan; owns the busy flag of algorithm 2.
+
+    :param execution: tracks the plan on a vehicle model (FS II-C); None follows it exactly (CRG).
+    """
+
+    def __init__(self, setup: AvSetup, scheduler: ScenarioScheduler, timing: TimingSpec,
+                 execution: TrackedExecution | None = None) -> None:
         self.setup = setup
         self.state = setup.state
         self.counters = AvCounters()
         self.plan: Plan | None = None
         self._scheduler = scheduler
         self._tracker = ProgressTracker(scheduler.steps_per_tick, timing.realign, timing.sample)
-        self._asked: OrderedDict[int, VehicleState] = OrderedDict()
+        self._asked: OrderedDict[int, _Asked] = OrderedDict()
+        self._early: JointSeries | None = None
+        self.execution = execution
+        self._reference: Reference | None = None
+        # Where a tracked AV believes to be, if its tracker steers by that.
+        self.believed: VehicleState | None = None
         self._busy_since: int | None = None
         self._followed_request_n = -1
         self._without_plan = False
@@ -100,10 +121,24 @@ class AutonomousVehicle:
     def request_sent(self, n: int, stamp_ns: int, ego: VehicleState) -> None:
         """Remember what the planner was asked (algorithm 2, line 8)."""
         self._busy_since = n
-        self._asked[stamp_ns] = ego
+        self._asked[stamp_ns] = _Asked(ego, None if self.setup.spec.perception else ego)
         if len(self._asked) > REMEMBERED_REQUESTS:
             self._asked.popitem(last=False)
         self.counters.requests += 1
+
+    def request_perceived(self, stamp_ns: int, ego: VehicleState, n: int) -> str | None:
+        """
+        Remember where the planner was told that its AV is.
+
+        :param ego: of the perceived request, in the AV's scenario coordinates.
+        :param n: step from which on a plan is followed that has come before this.
+        :return: the reason for refusing such a plan.
+        """
+        asked = self._asked.get(stamp_ns)
+        if asked is not None:
+            asked.told = ego
+        early, self._early = self._early, None
+        return None if early is None else self.offer(early, n)
 
     def offer(self, series: JointSeries, n: int) -> str | None:
         """
@@ -133,13 +168,17 @@ class AutonomousVehicle:
             return None
         if request_n < self._followed_request_n:
             return f'stamp {series.stamp_ns} ns is older than the followed plan'
+        if asked.told is None:
+            # The perceived request is on its way to the engine, as it was to the planner.
+            self._early = series
+            return None
         if self._busy_since == request_n:
             self._busy_since = None
         try:
             plan = plan_from_joints(series, self.setup.id, self._scheduler.time_step_ns)
         except InputError as error:
             return str(error)
-        reason = check_plan(plan, asked, series.stamp_ns, self.setup.vehicle,
+        reason = check_plan(plan, asked.told, series.stamp_ns, self.setup.vehicle,
                             self._scheduler.time_step_s)
         if reason is not None:
             return reason
@@ -147,15 +186,27 @@ class AutonomousVehicle:
         self._followed_request_n = request_n
         self.counters.accepted += 1
         self.counters.last_latency_steps = n - request_n
-        self.counters.realigned += self._tracker.adopt(
-            self._in_simulation(plan.states), request_n, n, self.state)
+        states = self._in_simulation(plan.states, asked.true, asked.told)
+        if self.execution is not None:
+            self._reference = Reference(states, self._scheduler.time_step_s)
+        self.counters.realigned += self._tracker.adopt(states, request_n, n, self.state)
         return None
 
-    def _in_simulation(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
-        if self.setup.transform.is_identity:
+    def _in_simulation(self, states: NDArray[np.float64], true: VehicleState,
+                       told: VehicleState) -> NDArray[np.float64]:
+        """
+        Give planned states where the vehicle is to drive them.
+
+        A plan that starts where the AV wrongly believes to be is driven from where it is, unless
+        a tracker steers by that same belief.
+        """
+        moved = told[:3] != true[:3] and not self.setup.spec.localisation_steers
+        if self.setup.transform.is_identity and not moved:
             return states
         mapped = states.copy()
-        mapped[:, :3] = self.setup.transform.to_simulation(states[:, :3])
+        if moved:
+            mapped[:, :3] = RigidTransform.between(told[:3], true[:3]).to_scenario(mapped[:, :3])
+        mapped[:, :3] = self.setup.transform.to_simulation(mapped[:, :3])
         return mapped
 
     def planned_state(self, n: int) -> VehicleState | None:
@@ -173,6 +224,8 @@ class AutonomousVehicle:
         """
         if self._driven is None:
             self._driven = HumanVehicle(self.setup.vehicle, self.state)
+        if self.execution is not None:
+            self.execution.reset(self.state)
         self._given_back_n = None
         self._without_plan = False
         self.state = self._driven.step(command, dt_s)
@@ -190,6 +243,8 @@ class AutonomousVehicle:
         if self._given_back_n is not None and self._followed_request_n >= self._given_back_n:
             self._given_back_n = None
         rolls = self._rolls_on(n)
+        if self.execution is not None and not rolls:
+            return self._tracked(self.execution, n)
         planned = None if self._given_back_n is not None else self._tracker.sample(n)
         self._without_plan = planned is None and not rolls
         if rolls:
@@ -199,6 +254,17 @@ class AutonomousVehicle:
             self.state = self._braking()
         else:
             self.state = self._never_back(planned)
+        return self.state
+
+    def _tracked(self, execution: TrackedExecution, n: int) -> VehicleState:
+        """Let the tracking controller drive one step."""
+        reference = None
+        if self._given_back_n is None and self._reference is not None:
+            since_s = (n - 1 - self._followed_request_n) * self._scheduler.dt_s
+            reference = self._reference.at(since_s)
+        self._without_plan = reference is None or reference.used_up
+        self.counters.steps_without_plan += self._without_plan
+        self.state = execution.step(self.state, reference, self.believed)
         return self.state
 
     def _rolls_on(self, n: int) -> bool:

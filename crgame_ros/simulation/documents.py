@@ -18,9 +18,12 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.event_file import document_entry, parse_document_entries
 from crgame_ros.scenario.events import EventSpec, FiredEvent
 from crgame_ros.scenario.game import DrivabilitySpec
+from crgame_ros.scenario.game_file import execution_entries
+from crgame_ros.scenario.object_file import object_entry
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.traffic.spec import traffic_entry
 from crgame_ros.vehicle.parameters import VehicleParameters
 
 GAME_TOPIC = '/scenario/game'
@@ -56,11 +59,15 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
              'state': list(av.state), 'planner': av.spec.planner, 'options': av.spec.options,
              'planning_problem': av.planning_problem.planning_problem_id,
              'transform': [av.transform.yaw_offset, av.transform.offset_x,
-                           av.transform.offset_y]}
+                           av.transform.offset_y],
+             'execution': av.spec.execution, **execution_entries(av.spec)}
             for av in setup.avs],
         'prediction': asdict(game.prediction), 'drivability': asdict(game.drivability),
         'timing': asdict(game.timing),
-        'events': [document_entry(event) for event in game.events]}
+        'events': [document_entry(event) for event in game.events],
+        'objects': [object_entry(item) for item in game.objects],
+        'traffic': None if game.traffic is None else traffic_entry(game.traffic),
+        'occupancy': None if game.occupancy is None else str(game.occupancy.resolve())}
     return json.dumps(document, allow_nan=False)
 
 

@@ -9,13 +9,22 @@ import hashlib
 import numpy as np
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
-from crgame_ros.planner.joints import JointSeries, vehicles_from_joints
+from crgame_ros.planner.joints import JointSeries
 from crgame_ros.scenario.events import FiredEvent, PlannerRun
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
+from crgame_ros.simulation.av_models import (
+    ego_of,
+    make_execution,
+    make_localisation,
+    make_vehicle_model,
+    published,
+)
 from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.plan_requests import PlanRequests
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.simulation.world import TrafficFeed, World
+from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.state import VehicleState
 
@@ -31,6 +40,8 @@ class StepResult:
     :param requests: the plan requests to send, by AV id.
     :param objects: poses of everything that is no driven vehicle.
     :param fired: the events that took effect at this tick.
+    :param agents_k: tick whose agents the objects show, less than k if traffic is late; None
+        without agents.
     """
 
     n: int
@@ -39,6 +50,7 @@ class StepResult:
     requests: Mapping[str, JointSeries]
     objects: ObjectStates | None
     fired: tuple[FiredEvent, ...] = ()
+    agents_k: int | None = None
 
 
 class Simulation:
@@ -51,22 +63,39 @@ class Simulation:
 
     :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
+    :param feed: moves the agents of traffic; None moves them in process.
     """
 
-    def __init__(self, setup: Setup, clock_offset_ns: int = 0) -> None:
+    def __init__(self, setup: Setup, clock_offset_ns: int = 0,
+                 feed: TrafficFeed | None = None) -> None:
         self.setup = setup
         self.scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
         self.n = 0
-        self.humans = [HumanVehicle(human.vehicle, human.state) for human in setup.humans]
-        self.avs = [AutonomousVehicle(av, self.scheduler, setup.game.timing) for av in setup.avs]
+        dt_s = self.scheduler.dt_s
+        self.humans = [
+            HumanVehicle(human.vehicle, human.state, make_vehicle_model(
+                human.dynamics, human.vehicle, f'{human.id}: dynamics'))
+            for human in setup.humans]
+        self.avs = [
+            AutonomousVehicle(av, self.scheduler, setup.game.timing,
+                              make_execution(av.spec, av.vehicle, dt_s)) for av in setup.avs]
+        self._localisations = [
+            (av, localisation) for av in self.avs if (localisation := make_localisation(
+                av.setup.spec, av.state, setup.game.seed, dt_s)) is not None]
+        self._localise_every = steps_between_messages(setup.game.timing.rate)
         self.commands: list[DriverCommand | None] = [
             *[DriverCommand()] * len(self.humans), *[None] * len(self.avs)]
-        self.objects = setup.obstacles.states_at(self.scheduler.k0)
         self._events = RunEvents(setup) if setup.game.events else None
+        self._world = World(setup, self._events, feed)
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
+
+    @property
+    def objects(self) -> ObjectStates:
+        """States of everything that is no driven vehicle, at the present tick."""
+        return self._world.objects
 
     @property
     def states(self) -> list[VehicleState]:
@@ -75,8 +104,18 @@ class Simulation:
 
     def begin(self) -> StepResult:
         """Give the requests and objects of step 0, before anything has moved."""
+        self._localise()
         self._add_to_hash()
         return self._result()
+
+    def request_perceived(self, av_id: str, request: JointSeries) -> str | None:
+        """
+        Take what an AV's planner is told instead of the true request.
+
+        :return: the reason for refusing a plan that has come before it, else None.
+        """
+        return self._av_by_id[av_id].request_perceived(
+            request.stamp_ns, ego_of(request), self.n + 1)
 
     def offer_plan(self, av_id: str, plan: JointSeries) -> str | None:
         """
@@ -128,6 +167,7 @@ class Simulation:
                 av.advance(self.n)
             else:
                 av.drive(command, dt_eff_s)
+        self._localise()
         result = self._result()
         self._add_to_hash()
         return result
@@ -136,33 +176,37 @@ class Simulation:
         k = self.scheduler.k(self.n)
         if not self.scheduler.is_tick(self.n):
             return StepResult(self.n, k, False, {}, None)
-        fired: tuple[FiredEvent, ...] = ()
-        if self._events is None:
-            self.objects = self.setup.obstacles.states_at(k)
-        else:
-            fired = self._take_effect(self._events, k)
+        objects = self._world.advance(k)
+        fired = () if self._events is None else self._take_effect(self._events, k, objects)
+        objects = self._world.settle(self.states)
         asking = [av for av in self.avs if av.wants_request(self.n)]
         requests: dict[str, JointSeries] = {}
         if asking:
             states = self.states
-            forecast = self._requests.forecast(k, self.n, states, self.avs)
+            forecast = self._requests.forecast(
+                k, self.n, states, self.avs, objects, self._world.changed)
             stamp_ns = self.scheduler.stamp_ns(self.n)
             for av in asking:
                 request = self._requests.build(av.setup, stamp_ns, states, forecast)
-                ego = vehicles_from_joints(request.positions[0, :4], request.velocities[0, :4],
-                                           request.accelerations[0, :4])
-                av.request_sent(self.n, stamp_ns, VehicleState(*ego.tolist()))
+                av.request_sent(self.n, stamp_ns, ego_of(request))
                 requests[av.setup.id] = request
-        return StepResult(self.n, k, True, requests, self.objects, fired)
+        return StepResult(self.n, k, True, requests, objects, fired, self._world.agents_k)
 
-    def _take_effect(self, events: RunEvents, k: int) -> tuple[FiredEvent, ...]:
+    def _take_effect(self, events: RunEvents, k: int,
+                     objects: ObjectStates) -> tuple[FiredEvent, ...]:
         """Let events change what is there and who plans, at a tick."""
-        fired = events.at_tick(self.n, k, self.states)
+        fired = events.at_tick(self.n, k, self.states, objects)
         for action in events.actions(fired):
             if isinstance(action, PlannerRun):
                 self.set_planner_running(action.av, action.run)
-        self.objects = events.obstacles.states_at(k)
         return fired
+
+    def _localise(self) -> None:
+        """Let AVs estimate the pose that they steer by."""
+        if self.n % self._localise_every == 0:
+            for av, localisation in self._localisations:
+                localisation.step(self.n, published(av.state))
+                av.believed = localisation.estimate
 
     def _add_to_hash(self) -> None:
         self._hash.update(np.array(self.states, dtype=np.float64).tobytes())

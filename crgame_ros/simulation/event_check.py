@@ -58,7 +58,8 @@ def check_events(game: Game, where: str, network: RoadNetwork, obstacles: Scenar
         'moving obstacle': [*recorded], 'lanelet': [*network.lanelet_ids],
         'AV': [spec.id for spec in avs],
         'vehicle or object': [*humans, *(spec.id for spec in avs),
-                              *(item.id for item in obstacles.descriptions)]}
+                              *(item.id for item in obstacles.descriptions),
+                              *(item.id for item in game.objects)]}
     for event in game.events:
         place = f'{where}: event {event.name}'
         for kind, name in _named(event):

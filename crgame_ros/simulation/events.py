@@ -70,17 +70,19 @@ class RunEvents:
         """Give what events do, in their order."""
         return [self._actions[event.name] for event in fired]
 
-    def at_tick(self, n: int, k: int, states: Sequence[VehicleState]) -> tuple[FiredEvent, ...]:
+    def at_tick(self, n: int, k: int, states: Sequence[VehicleState],
+                objects: ObjectStates) -> tuple[FiredEvent, ...]:
         """
         Let take effect what is due, before the objects and requests of a tick are made.
 
         :param states: of the driven vehicles at n.
+        :param objects: at k, as earlier events have left them.
         :return: what took effect now.
         """
         self._k = k
         if not self._waiting:
             return ()
-        where = _Places(self._setup, states, self._columns, self.obstacles.states_at(k))
+        where = _Places(self._setup, states, self._columns, objects)
         due = [event for event in self._waiting.values()
                if (event.name in self._triggered
                    or (event.when is not None and self._holds(event.when, k, where.of)))

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from crgame_ros.control.tracked_execution import TrackingErrors
 from crgame_ros.drivability.monitor import changes, DrivabilityMonitor, VehicleDrivability
 from crgame_ros.driver.command import RELEASED
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
+from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
 from crgame_ros.planner.crew import PlannerCrew
 from crgame_ros.planner.interface import PlannerContext
@@ -19,9 +21,12 @@ from crgame_ros.planner.joints import JointSeries, plan_to_joints
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.scenario.events import FiredEvent
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
+from crgame_ros.simulation.av_models import make_perception, published_states
 from crgame_ros.simulation.drivers import offline_driver
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.publishing import steps_between_messages
+from crgame_ros.vehicle.state import VehicleState
 
 DEFAULT_DURATION_S = 20.0
 
@@ -33,10 +38,12 @@ class PlannerRecord:
 
     :param counters: requests and plans as the engine saw them.
     :param statistics: answers, braking plans and times of the planner itself.
+    :param tracking: worst errors of a tracked AV; None of one that follows plans exactly.
     """
 
     counters: AvCounters
     statistics: PlannerStatistics
+    tracking: TrackingErrors | None = None
 
     @property
     def accepted_ratio(self) -> float:
@@ -94,9 +101,19 @@ class PlannerSeat:
             setup.scheduler.time_step_s, setup.scheduler.k0, setup.game.seed)
         self.crew = PlannerCrew(
             context, av.spec.planner, av.spec.options, setup.game.events, clock_s)
+        self.perception: Perception | None = None
+        if av.spec.perception is not None:
+            initial = published_states([av.state])[0]
+            self.perception = make_perception(
+                av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
+                VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
+                setup.open_occupancy())
 
     def ask(self, request: JointSeries) -> None:
         """Plan now; the answer is due after the latency (at once for the first request)."""
+        if self.perception is not None:
+            request = self.perception.perceive(request)
+            self._simulation.request_perceived(self.id, request)
         plan = self.crew.plan(self._reader.read(request))
         series = plan_to_joints(plan, self.id, self._simulation.scheduler.time_step_ns)
         n = self._simulation.n
@@ -109,8 +126,9 @@ class PlannerSeat:
 
     def record(self) -> PlannerRecord:
         """Sum up what the planner did."""
-        counters = next(av.counters for av in self._simulation.avs if av.setup.id == self.id)
-        return PlannerRecord(counters, self.crew.statistics)
+        av = next(av for av in self._simulation.avs if av.setup.id == self.id)
+        return PlannerRecord(av.counters, self.crew.statistics,
+                             None if av.execution is None else av.execution.worst)
 
 
 def run_offline(
@@ -145,7 +163,15 @@ def run_offline(
     intervals: list[float] = [] if intervals_s is None else intervals_s.tolist()
     _trigger(simulation, triggers, 0)
     result = simulation.begin()
+    perceiving = [seat.perception for seat in seats if seat.perception is not None]
+    perceive_every = steps_between_messages(setup.game.timing.rate)
     for _ in range(steps):
+        if perceiving and simulation.n % perceive_every == 0:
+            states = published_states(simulation.states)
+            for perception in perceiving:
+                perception.observe(
+                    simulation.n, states, simulation.objects.poses,
+                    simulation.objects.velocities, simulation.scheduler.since_tick_s(simulation.n))
         for seat in seats:
             seat.crew.apply([event.name for event in result.fired])
             if seat.id in result.requests:
@@ -196,7 +222,8 @@ class _Trace:
         self._previous: tuple[VehicleDrivability, ...] = ()
         self._monitor = DrivabilityMonitor(
             setup.vehicle_descriptions, setup.obstacles.descriptions,
-            setup.loaded.scenario.lanelet_network, setup.game.drivability) if check else None
+            setup.loaded.scenario.lanelet_network, setup.game.drivability,
+            occupancy=setup.open_occupancy()) if check else None
         if self._monitor is not None:
             self._monitor.prepare(np.array([
                 vehicle.state for vehicle in setup.vehicles]))

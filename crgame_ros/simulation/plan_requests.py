@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Building plan requests: one atomic snapshot with predictions (CRG III-A1c and d)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from crgame_ros.planner.joints import (
     vehicle_to_joints,
 )
 from crgame_ros.scenario.courses import ObstacleCourses
+from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.scenario.prediction import (
     LanePrediction,
     predict_constant_steering,
@@ -72,8 +75,14 @@ class PlanRequests:
             self._names[av.id] = (*names, *object_names)
 
     def forecast(self, k: int, n: int, states: list[VehicleState],
-                 avs: list[AutonomousVehicle]) -> Forecast:
-        """Predict everybody's motion from scenario step k (simulation step n) on."""
+                 avs: list[AutonomousVehicle], objects: ObjectStates,
+                 changed: Sequence[int]) -> Forecast:
+        """
+        Predict everybody's motion from scenario step k (simulation step n) on.
+
+        :param objects: at k.
+        :param changed: columns of those that are not where the scenario says.
+        """
         steps = self.points - 1
         poses, velocities = predict_constant_steering(
             np.array(states), self._wheelbases, steps, self._time_step_s)
@@ -82,15 +91,18 @@ class PlanRequests:
             for index, av in enumerate(avs):
                 self._follow_plan(av, n, poses[:, first_av + index],
                                   velocities[:, first_av + index])
-        courses = self._courses
+        predicted = self._lane_prediction.predict(k, steps, objects, changed) \
+            if self._mode != 'recorded' or len(self._setup.obstacles.living) else None
         if self._mode == 'recorded':
-            objects = recorded_future(courses or self._setup.obstacles, k, steps)
-        elif courses is None or not courses.changed:
-            objects = self._lane_prediction.predict(k, steps)
-        else:
-            objects = self._lane_prediction.predict(
-                k, steps, courses.states_at(k), courses.changed)
-        return Forecast(poses, velocities, *objects)
+            futures = recorded_future(self._courses or self._setup.obstacles, k, steps)
+            if predicted is not None:
+                # Nobody knows the future of what reacts.
+                living = self._setup.obstacles.living
+                for future, prediction in zip(futures, predicted, strict=True):
+                    future[:, living] = prediction[:, living]
+            predicted = futures
+        assert predicted is not None
+        return Forecast(poses, velocities, *predicted)
 
     def _follow_plan(self, av: AutonomousVehicle, n: int, poses: Poses, velocities: Poses) -> None:
         """Overwrite a prediction with what the AV's plan says, as far as it reaches."""

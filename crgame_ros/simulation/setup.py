@@ -2,21 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Everything that a run needs, resolved: a game with its scenario loaded and vehicles placed."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 
 from commonroad.planning.planning_problem import PlanningProblem
+import numpy as np
+from numpy.typing import NDArray
 
 from crgame_ros.driver.source import load_timeline, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.scenario.game import AvSpec, Game
+from crgame_ros.scenario.game import AvSpec, Game, ModelSpec
 from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.scenario.scripted_objects import ScriptedObjects
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.simulation.event_check import check_events, held_obstacles, put_obstacles
+from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, TrafficSetup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -35,6 +42,7 @@ class HumanSetup:
     :param state: its state at n = 0, rear axle, simulation coordinates.
     :param driver: the driver source that the game names.
     :param timeline: text of the scripted timeline, empty for any other source.
+    :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
     """
 
     id: str
@@ -42,6 +50,7 @@ class HumanSetup:
     state: VehicleState
     driver: str
     timeline: str = ''
+    dynamics: ModelSpec | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +90,7 @@ class Setup:
     :param avs: the AVs.
     :param scheduler: time grids, with a clock offset of zero.
     :param notices: remarks for the user, one line each.
+    :param traffic: the agents at the first tick; None without any.
     """
 
     game: Game
@@ -91,6 +101,34 @@ class Setup:
     avs: tuple[AvSetup, ...]
     scheduler: ScenarioScheduler
     notices: tuple[str, ...] = ()
+    traffic: TrafficSetup | None = None
+
+    @cached_property
+    def scripted_columns(self) -> NDArray[np.int_]:
+        """Columns of the game's own objects among all objects."""
+        return self._columns(item.id for item in self.game.objects)
+
+    @cached_property
+    def agent_columns(self) -> NDArray[np.int_]:
+        """Columns of the agents among all objects, in the order of traffic."""
+        return self._columns(item.id for item in (
+            () if self.traffic is None else self.traffic.descriptions))
+
+    def _columns(self, ids: Iterable[str]) -> NDArray[np.int_]:
+        places = {item: column for column, item in enumerate(self.obstacles.ids)}
+        return np.array([places[item] for item in ids], dtype=int)
+
+    def make_scripted(self) -> ScriptedObjects | None:
+        """Make the game's own objects as they are at the first tick."""
+        return _scripted(self.game, self.network, self.scheduler)
+
+    def open_occupancy(self) -> TiledOccupancy | None:
+        """
+        Open the map of permanent obstacles; None if the game has none.
+
+        :raises InputError: if it cannot be used.
+        """
+        return None if self.game.occupancy is None else TiledOccupancy(self.game.occupancy)
 
     @property
     def vehicles(self) -> tuple['HumanSetup | AvSetup', ...]:
@@ -146,12 +184,48 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
             [av.vehicle for av in avs] + [human.vehicle for human in humans])
         source = parse_source(spec.driver)
         timeline = load_timeline(source, game.base).to_text() if source.has_timeline else ''
-        humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline))
+        humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline,
+                                 spec.dynamics))
     if not humans and not avs:
         raise InputError('has neither humans nor planning problems', loaded.source,
                          'add a human to the game')
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
-    return Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler, tuple(notices))
+    setup = Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler,
+                  tuple(notices))
+    return _with_living(setup)
+
+
+def _scripted(game: Game, network: RoadNetwork,
+              scheduler: ScenarioScheduler) -> ScriptedObjects | None:
+    return ScriptedObjects(game.objects, network, scheduler.time_step_s, scheduler.k0) \
+        if game.objects else None
+
+
+def _with_living(setup: Setup) -> Setup:
+    """Add what the run itself moves: objects of the game, and agents of traffic."""
+    game, base = setup.game, setup.obstacles
+    scripted = setup.make_scripted()
+    described = () if scripted is None else scripted.descriptions
+    taken = {*base.ids, *setup.vehicle_ids}
+    for item in described:
+        if item.id in taken:
+            raise InputError(f'"{item.id}" is the id of something else', 'objects',
+                             'choose another one')
+    kept = {name for event in game.events if (name := event.object_id) is not None}
+    agents = adopted_columns(game.traffic, base, setup.network, kept)
+    setup = replace(setup, obstacles=base.with_living(agents, described))
+    if game.traffic is None:
+        return setup
+    states = base.states_at(setup.scheduler.k0)
+    if scripted is not None:
+        states = ObjectStates(np.concatenate((states.poses, scripted.states.poses)),
+                              np.concatenate((states.velocities, scripted.states.velocities)))
+    traffic = place_traffic(
+        game.traffic, setup.loaded, setup.network, setup.descriptions, base, agents,
+        [vehicle.state for vehicle in setup.vehicles], states, setup.scheduler, game.seed)
+    slots = traffic.descriptions[len(agents):]
+    return replace(setup, traffic=traffic,
+                   obstacles=base.with_living(agents, (*described, *slots)))
 
 
 def _recorded_egos(loaded: LoadedScenario, avs: tuple[AvSetup, ...], k0: int) -> dict[int, str]:

@@ -71,6 +71,10 @@ class ScenarioScheduler:
         """Tell whether the scenario time advances at step n."""
         return n % self.steps_per_tick == 0
 
+    def since_tick_s(self, n: int) -> float:
+        """Give the time since the scenario time last advanced [s]."""
+        return (n % self.steps_per_tick) * self.dt_s
+
     def step_of_stamp(self, stamp_ns: int) -> int:
         """Find the simulation step nearest to a stamp [ns]; negative before the run."""
         elapsed = (stamp_ns - self.clock_offset_ns) * self.steps_per_tick

@@ -22,6 +22,7 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 import yaml
 
+from crgame_ros.cli import main
 from crgame_ros.ros.contract import load_contract, Topic
 from crgame_ros.ros.endpoints import Endpoints
 
@@ -35,6 +36,10 @@ SERVICES_OF_EVERY_NODE = {
 ONLY_WITH_A_JOY_NODE = ('/<hv>/joy', 'driver_node')
 ONLY_WITH_DRIVABILITY_STOP = ('/<v>/drivability', 'sim_node')
 OPTIONAL = frozenset({ONLY_WITH_A_JOY_NODE, ONLY_WITH_DRIVABILITY_STOP})
+ONLY_WITH_PERCEPTION = (('/<av>/plan_request', 'sim_node'), ('/<av>/localization', 'cockpit_node'),
+                        ('/<av>/scan', 'cockpit_node'))
+# Processes that only a game with reactive traffic and a map has.
+ENGINES = ('traffic_node', 'map_node')
 PARAMETER_TYPES = {'bool': 1, 'integer': 2, 'double': 3, 'string': 4}
 
 Endpoint = tuple[str, str, str, str, str]
@@ -48,31 +53,43 @@ class Case:
     :param humans: ids of the humans' vehicles.
     :param avs: ids of the AVs.
     :param used: which optional subscriptions the game needs.
+    :param perceiving: AVs with perception.
+    :param engines: whether it has reactive traffic and a map of permanent obstacles.
     """
 
     humans: tuple[str, ...]
     avs: tuple[str, ...]
     used: frozenset[tuple[str, str]]
+    perceiving: tuple[str, ...] = ()
+    engines: bool = False
 
     def nodes(self, executable: str, vehicle: str) -> list[str]:
         """Name the processes of an executable that serve a vehicle; all of them without one."""
-        groups = {'driver_node': self.humans, 'planner_node': self.avs}
+        groups = {'driver_node': self.humans, 'planner_node': self.avs,
+                  'perception_node': self.perceiving}
         if executable not in groups:
-            return [executable]
+            return [executable] if self.engines or executable not in ENGINES else []
         served = [item for item in groups[executable] if vehicle in ('', item)]
         return [f'{executable}_{item}' for item in served]
 
     def publishers(self, topic: Topic) -> set[Endpoint]:
         """List the publishers that a topic must have."""
-        return self._endpoints(topic, topic.producers, frozenset())
+        return self._endpoints(topic, topic.producers, frozenset(), frozenset(
+            (name, 'sim_node', av) for av in self.avs for name in (
+                ['/<av>/plan_request'] if av in self.perceiving else ['/<av>/true_request'])))
 
     def subscriptions(self, topic: Topic) -> set[Endpoint]:
         """List the subscriptions that a topic must have."""
         executables = tuple(name for name in topic.consumers if name != 'external')
-        return self._endpoints(topic, executables, OPTIONAL - self.used)
+        perfect = set(self.avs) - set(self.perceiving)
+        idle = {(name, node, av) for name, node in ONLY_WITH_PERCEPTION for av in perfect}
+        if not self.engines:
+            idle.add(('/traffic/agents', 'sim_node', ''))
+        return self._endpoints(topic, executables, OPTIONAL - self.used, frozenset(idle))
 
     def _endpoints(self, topic: Topic, executables: tuple[str, ...],
-                   unused: frozenset[tuple[str, str]]) -> set[Endpoint]:
+                   unused: frozenset[tuple[str, str]],
+                   without: frozenset[tuple[str, str, str]]) -> set[Endpoint]:
         found = set()
         for name in topic.names(self.humans, self.avs):
             vehicle = name.split('/')[1] if topic.placeholder else ''
@@ -80,22 +97,26 @@ class Case:
                 pair = (topic.name, executable)
                 # Only a human's violation may end the run.
                 idle = pair == ONLY_WITH_DRIVABILITY_STOP and vehicle not in self.humans
-                if pair not in unused and not idle:
+                if pair not in unused and not idle and (*pair, vehicle) not in without:
                     found |= {(name, node, topic.type_name, topic.qos.reliability,
                                topic.qos.durability) for node in self.nodes(executable, vehicle)}
         return found
 
 
 PLAIN = Case(('hv0',), ('av0',), frozenset())
-FULL = Case(('hv0',), ('av0', 'av1'), OPTIONAL)
+FULL = Case(('hv0',), ('av0', 'av1'), OPTIONAL, ('av1',), engines=True)
 
 
 def _full_game(folder: Path) -> Path:
-    """Write a game of two AVs that needs every optional endpoint."""
+    """Write a game of two AVs that needs every optional endpoint and every node."""
     game = yaml.safe_load((SCENARIOS / 'two_avs.yaml').read_text())
     game['scenario'] = str(SCENARIOS / game['scenario'])
     game['humans'][0]['driver'] = 'joy'
     game['drivability']['stop'] = True
+    game['avs'][1]['perception'] = {}
+    game['traffic'] = {'agents': 2}
+    assert main(['rasterize', game['scenario'], str(folder / 'map')]) == 0
+    game['occupancy'] = str(folder / 'map' / 'map.yaml')
     path = folder / 'full.yaml'
     path.write_text(yaml.safe_dump(game))
     return path
@@ -190,7 +211,9 @@ def test_nodes_are_those_of_the_game(graph: Graph) -> None:
     expected = {('sim_node',), ('recorder_node',), ('drivability_node',), ('timesync_node',),
                 ('marker_node',), ('cockpit_node',),
                 *((f'driver_node_{item}',) for item in case.humans),
-                *((f'planner_node_{item}',) for item in case.avs), (TESTER,)}
+                *((f'planner_node_{item}',) for item in case.avs),
+                *((f'perception_node_{item}',) for item in case.perceiving),
+                *((name,) for name in ENGINES if case.engines), (TESTER,)}
     _compare(_settled(lambda: {(name,) for name in graph.node.get_node_names()}, expected),
              expected)
     names = graph.node.get_node_names()

@@ -1,0 +1,160 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""perception_node: what one AV perceives of the true world (FS II-B)."""
+
+import gc
+import math
+from pathlib import Path
+import time
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.perception.perception import Perception
+from crgame_ros.perception.spec import parse_perception
+from crgame_ros.planner.joints import JointSeries
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import from_joint_trajectory, SeriesMessage
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.node_report import NodeReport
+from crgame_ros.ros.perception_messages import LocalizationMessage, ScanMessages
+from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
+from crgame_ros.ros.spinning import poll
+from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
+from crgame_ros.simulation.av_models import make_perception
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+
+PERIOD_S = 0.002
+COLLECT_EVERY = 100
+
+
+class PerceptionNode(Node):
+    """Turns the true requests of one AV into the perceived ones that its planner gets."""
+
+    def __init__(self) -> None:
+        super().__init__('perception_node')
+        self._vehicle_id: str = self.declare_parameter(
+            'vehicle', 'av0', ParameterDescriptor(
+                description='id of the AV that perceives', read_only=True)).value
+        endpoints = Endpoints(self)
+        self._documents = ScenarioDocuments(endpoints)
+        self._world = WorldFollower(endpoints)
+        self._true = endpoints.polled('/<av>/true_request', self._vehicle_id)
+        self._perceived = endpoints.publisher('/<av>/plan_request', self._vehicle_id)
+        self._localization = LocalizationMessage(endpoints, self._vehicle_id)
+        self._scans = ScanMessages(endpoints, self._vehicle_id)
+        self._report = NodeReport(endpoints, f'perception_node: {self._vehicle_id}')
+        self._scenario: ScenarioSet | None = None
+        self._perception: Perception | None = None
+        self._asked: JointSeries | None = None
+        self._message: SeriesMessage | None = None
+        self._n = -1
+        self._steps = 0
+
+    def run(self, stop: StopFlag) -> None:
+        """Follow the world until asked to stop."""
+        poll(self, stop, PERIOD_S, self._work)
+
+    def _work(self) -> None:
+        try:
+            scenario = self._documents.poll()
+            if scenario is not None:
+                self._scenario, self._perception, self._asked = scenario, None, None
+                self._n = -1
+                self._world.begin(scenario)
+            message = self._true.latest()
+            if message is not None:
+                self._asked = from_joint_trajectory(
+                    message, f'/{self._vehicle_id}/true_request')
+            for step in self._world.steps():
+                self._observe(step)
+            self._answer()
+        except CrgameError as error:
+            self.get_logger().error(f'{self._vehicle_id}: {error}', throttle_duration_sec=1.0)
+
+    def _observe(self, step: WorldStep) -> None:
+        """Look at the true world at one step."""
+        scenario = self._scenario
+        if scenario is None or step.n <= self._n:
+            return
+        place = next((row for row, item in enumerate(scenario.driven)
+                      if item.id == self._vehicle_id), None)
+        states = step.states
+        if self._perception is None:
+            if place is None:
+                return
+            self._perception = self._made(scenario, VehicleState(*states[place].tolist()))
+            if self._perception is None:
+                return
+        begin_s = time.perf_counter()
+        scheduler = scenario.game.scheduler
+        self._perception.observe(step.n, states, step.objects.poses, step.objects.velocities,
+                                 scheduler.since_tick_s(step.n))
+        self._n = step.n
+        stamp_ns = scheduler.stamp_ns(step.n)
+        if self._report.worked(time.perf_counter() - begin_s):
+            self._tell(self._perception, stamp_ns)
+        self._localization.publish(stamp_ns, self._perception)
+        self._scans.publish(scheduler, self._perception)
+        self._steps += 1
+        if self._steps % COLLECT_EVERY == 0:
+            gc.collect()
+        self._answer()
+
+    def _tell(self, perception: Perception, stamp_ns: int) -> None:
+        """Report what the AV knows."""
+        seen = int(perception.seen.sum())
+        sigma = math.sqrt(max(perception.covariance[0, 0] + perception.covariance[1, 1], 0.0))
+        self._report.publish(f'{seen} known', {
+            'known': seen, 'position_sigma': f'{sigma:.3f}', 'n': self._n}, stamp_ns)
+
+    def _made(self, scenario: ScenarioSet, initial: VehicleState) -> Perception | None:
+        """Make the perception of a new run, from where the AV is now; None if it has none."""
+        game = scenario.game
+        entry = game.vehicle(self._vehicle_id)
+        if entry is None or entry.get('perception') is None:
+            return None
+        spec = parse_perception(entry['perception'], '/scenario/game: perception', Path())
+        occupancy = game.content.get('occupancy')
+        perception = make_perception(
+            self._vehicle_id, spec, scenario.objects, VehicleParameters(**entry['vehicle']),
+            RigidTransform(*entry['transform']), initial, int(game.content['seed']),
+            game.scheduler.dt_s, None if occupancy is None else TiledOccupancy(Path(occupancy)))
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        sensors = ', '.join(sensor.name for sensor in spec.sensors) or 'no sensors'
+        self.get_logger().info(f'{self._vehicle_id}: perceiving with {sensors}')
+        return perception
+
+    def _answer(self) -> None:
+        """Answer the true request once its step has been observed."""
+        if self._asked is None or self._perception is None or self._scenario is None:
+            return
+        n = self._scenario.game.scheduler.tick_of_stamp(self._asked.stamp_ns)
+        if n is None or n > self._n:
+            return
+        asked, self._asked = self._asked, None
+        if n < self._n - self._scenario.game.scheduler.steps_per_tick:
+            return
+        try:
+            request = self._perception.perceive(asked)
+        except (KeyError, ValueError) as error:
+            raise InputError(f'is of another run ({error})',
+                             f'/{self._vehicle_id}/true_request') from error
+        if self._message is None or not self._message.fits(request):
+            self._message = SeriesMessage(request.names, request.times_ns)
+        self._perceived.publish(self._message.fill(request))
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(PerceptionNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,151 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""traffic_node: reactive traffic in its own process (FS III)."""
+
+import gc
+from pathlib import Path
+import time
+
+import numpy as np
+from rclpy.node import Node
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.planner.joints import object_joint_names
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import StateMessage
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.node_report import NodeReport
+from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
+from crgame_ros.ros.spinning import poll
+from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.scenario.objects import ObjectStates, Role
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.simulation.traffic_setup import make_traffic
+from crgame_ros.simulation.world_reader import WorldReader
+from crgame_ros.traffic.spec import parse_traffic, TrafficSpec
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world import WorldView
+
+PERIOD_S = 0.002
+# Garbage is collected after an answer, never in the middle of one.
+COLLECT_EVERY = 10
+# Ticks.
+MAX_BEHIND = 5
+
+
+class TrafficNode(Node):
+    """Moves the agents of a run one tick ahead of the world that it hears of."""
+
+    def __init__(self) -> None:
+        super().__init__('traffic_node')
+        endpoints = Endpoints(self)
+        self._documents = ScenarioDocuments(endpoints)
+        self._world = WorldFollower(endpoints)
+        self._agents = endpoints.publisher('/traffic/agents')
+        self._report = NodeReport(endpoints, 'traffic_node: agents')
+        self._scenario: ScenarioSet | None = None
+        self._spec: TrafficSpec | None = None
+        self._traffic: Traffic | None = None
+        self._k = 0
+        self._ticks = 0
+
+    def run(self, stop: StopFlag) -> None:
+        """Follow the world until asked to stop."""
+        poll(self, stop, PERIOD_S, self._work)
+
+    def _work(self) -> None:
+        try:
+            scenario = self._documents.poll()
+            if scenario is not None:
+                self._begin(scenario)
+            ticks = [step for step in self._world.steps() if step.tick]
+            # A little late, the agents catch up; after a standstill they go on from where they
+            # are by now.
+            for step in ticks if len(ticks) <= MAX_BEHIND else ticks[-1:]:
+                if self._spec is not None:
+                    self._advance(step)
+        except CrgameError as error:
+            self._spec = None
+            self.get_logger().error(str(error))
+
+    def _begin(self, scenario: ScenarioSet) -> None:
+        """Get ready for a run; its agents are made when its world is heard of."""
+        self._world.begin(scenario)
+        self._scenario, self._traffic, self._spec = scenario, None, None
+        entry = scenario.game.content.get('traffic')
+        if entry is None:
+            return
+        self._spec = parse_traffic(entry, '/scenario/game: traffic', Path())
+        self._network = RoadNetwork(scenario.loaded.scenario.lanelet_network)
+        self._obstacles = ScenarioObstacles(scenario.loaded)
+        self._reader = WorldReader(scenario.objects, TrafficLights(scenario.loaded.scenario))
+        objects = [item for item in scenario.objects if not item.role.is_ego]
+        agents = [item for item in objects if item.role is Role.TRAFFIC]
+        self._columns = [objects.index(item) for item in agents]
+        self._adopted = [self._obstacles.ids.index(item.id) for item in agents
+                         if item.id in self._obstacles.ids]
+        self._message = StateMessage(
+            [name for item in agents for name in object_joint_names(item.id)])
+        self._message.accelerations[:] = np.nan
+        self.get_logger().info(f'{len(agents)} agents at most')
+
+    def _advance(self, step: WorldStep) -> None:
+        """Move the agents from the world of a tick to the next one."""
+        assert self._scenario is not None
+        scheduler = self._scenario.game.scheduler
+        k = scheduler.k(step.n)
+        if self._traffic is not None and k == self._k - 1:
+            # Told again because the answer may have been lost.
+            self._agents.publish(self._message.message)
+            return
+        begin_s = time.perf_counter()
+        view = self._reader.view(k, step.positions, step.velocities, step.objects)
+        traffic = self._traffic
+        if traffic is None or k != self._k:
+            traffic = self._made(view, k, step)
+        traffic.advance(view)
+        self._traffic, self._k = traffic, k + 1
+        states, message = traffic.states, self._message
+        message.positions[:] = states.poses.ravel()
+        message.velocities[:] = states.velocities.ravel()
+        stamp_ns = scheduler.stamp_ns(step.n + scheduler.steps_per_tick)
+        self._agents.publish(message.stamp(stamp_ns))
+        if self._report.worked(time.perf_counter() - begin_s):
+            count = int(np.isfinite(states.poses[:, 0]).sum())
+            self._report.publish(f'{count} agents', {'agents': count, 'k': k}, stamp_ns)
+        self._ticks += 1
+        if self._ticks % COLLECT_EVERY == 0:
+            gc.collect()
+
+    def _made(self, view: WorldView, k: int, step: WorldStep) -> Traffic:
+        """Make the agents of a new run, or go on with those that others have seen."""
+        assert self._scenario is not None and self._spec is not None
+        game, traffic = self._scenario.game, self._traffic
+        if traffic is None:
+            traffic = make_traffic(
+                self._spec, self._scenario.loaded, self._network, self._reader.others,
+                self._obstacles, self._adopted, view, game.scheduler,
+                int(game.content['seed']))
+            if tuple(item.id for item in traffic.descriptions) != tuple(
+                    item.id for item in self._scenario.objects if item.role is Role.TRAFFIC):
+                raise InputError('has other agents than this version makes',
+                                 '/scenario/objects', 'run all nodes in one version')
+            gc.collect()
+            gc.freeze()
+            gc.disable()
+        if k != game.scheduler.k0:
+            self.get_logger().warning(f'going on at k = {k}')
+            traffic.resume(k, ObjectStates(step.objects.poses[self._columns],
+                                           step.objects.velocities[self._columns]))
+        return traffic
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(TrafficNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,52 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a companion node tells of itself once a second on /diagnostics."""
+
+from collections.abc import Mapping
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import numpy as np
+
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import to_time
+
+PERIOD_S = 1.0
+
+
+class NodeReport:
+    """
+    Collects how long pieces of work take, and publishes a status now and then.
+
+    :param endpoints: of the node.
+    :param name: of the status: node and subject.
+    """
+
+    def __init__(self, endpoints: Endpoints, name: str) -> None:
+        self._publisher = endpoints.publisher('/diagnostics')
+        self._name = name
+        self._durations_s: list[float] = []
+        self._sent_s = 0.0
+
+    def worked(self, duration_s: float) -> bool:
+        """Take how long a piece of work took [s]; tell whether a report is due."""
+        self._durations_s.append(duration_s)
+        return time.monotonic() - self._sent_s > PERIOD_S
+
+    def publish(self, text: str, values: Mapping[str, object], stamp_ns: int) -> None:
+        """
+        Publish a status, with the times of the work since the last one.
+
+        :param stamp_ns: simulation time [ns]
+        """
+        self._sent_s = time.monotonic()
+        times_ms = 1e3 * np.array(self._durations_s or [0.0])
+        self._durations_s.clear()
+        work = {'work_ms_median': f'{np.median(times_ms):.3f}',
+                'work_ms_worst': f'{times_ms.max():.3f}'}
+        status = DiagnosticStatus(level=DiagnosticStatus.OK, name=self._name, message=text)
+        status.values = [KeyValue(key=key, value=str(value))
+                         for key, value in {**values, **work}.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = to_time(stamp_ns)
+        self._publisher.publish(message)

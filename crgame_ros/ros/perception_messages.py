@@ -1,0 +1,78 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What an AV's perception knows, in the types that ROS tools expect."""
+
+from array import array
+import math
+
+from nav_msgs.msg import Odometry
+import numpy as np
+from sensor_msgs.msg import LaserScan
+
+from crgame_ros.perception.perception import Perception
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import MAP, set_time
+from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+
+# Places of x, y and yaw in the 6 x 6 covariance of a pose.
+POSE_PLACES = (0, 1, 5)
+
+
+class LocalizationMessage:
+    """
+    The estimated pose and speed with their covariance.
+
+    :param endpoints: of the node.
+    :param av_id: the AV.
+    """
+
+    def __init__(self, endpoints: Endpoints, av_id: str) -> None:
+        self._publisher = endpoints.publisher('/<av>/localization', av_id)
+        self._message = Odometry(child_frame_id=f'{av_id}/base_link')
+        self._message.header.frame_id = MAP
+
+    def publish(self, stamp_ns: int, perception: Perception) -> None:
+        """Publish the present estimate."""
+        message, estimate = self._message, perception.estimate
+        set_time(message.header.stamp, stamp_ns)
+        pose, twist = message.pose, message.twist
+        pose.pose.position.x, pose.pose.position.y = estimate.x, estimate.y
+        pose.pose.orientation.z = math.sin(0.5 * estimate.yaw)
+        pose.pose.orientation.w = math.cos(0.5 * estimate.yaw)
+        twist.twist.linear.x, twist.twist.angular.z = estimate.speed, estimate.yaw_rate
+        covariance = np.zeros((6, 6))
+        covariance[np.ix_(POSE_PLACES, POSE_PLACES)] = perception.covariance[:3, :3]
+        pose.covariance = covariance.ravel()
+        speeds = np.zeros(36)
+        speeds[0] = perception.covariance[3, 3]
+        twist.covariance = speeds
+        self._publisher.publish(message)
+
+
+class ScanMessages:
+    """
+    What each sensor's rays have hit.
+
+    :param endpoints: of the node.
+    :param av_id: the AV.
+    """
+
+    def __init__(self, endpoints: Endpoints, av_id: str) -> None:
+        self._publisher = endpoints.publisher('/<av>/scan', av_id)
+        self._av_id = av_id
+        self._sent: dict[str, int] = {}
+
+    def publish(self, scheduler: ScenarioScheduler, perception: Perception) -> None:
+        """Publish every scan that is new."""
+        for spec, n, scan in perception.scans:
+            if self._sent.get(spec.name) == n:
+                continue
+            self._sent[spec.name] = n
+            step = spec.field_of_view / max(1, len(scan.angles) - 1)
+            message = LaserScan(
+                angle_min=float(scan.angles[0]), angle_max=float(scan.angles[-1]),
+                angle_increment=step, scan_time=1.0 / spec.rate, range_max=spec.horizon,
+                ranges=array('f', scan.ranges.astype(np.float32).tobytes()))
+            message.header.frame_id = f'{self._av_id}/{spec.name}'
+            set_time(message.header.stamp, scheduler.stamp_ns(n))
+            self._publisher.publish(message)

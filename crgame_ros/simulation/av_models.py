@@ -1,0 +1,104 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What executes an AV's plans and perceives the world for it, made from what its game says."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.control.tracked_execution import TrackedExecution
+from crgame_ros.control.trackers import TRACKERS
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.perception.localisation import Localisation
+from crgame_ros.perception.perception import Perception
+from crgame_ros.perception.spec import PerceptionSpec
+from crgame_ros.planner.joints import JointSeries, vehicle_to_joints, vehicles_from_joints
+from crgame_ros.scenario.game import AvSpec, ModelSpec
+from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
+from crgame_ros.vehicle.models import VEHICLE_MODELS, VehicleModel
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+
+
+def make_vehicle_model(spec: ModelSpec | None, vehicle: VehicleParameters,
+                       where: str) -> VehicleModel | None:
+    """
+    Make a vehicle model.
+
+    :param where: the vehicle, for messages.
+    :raises InputError: if there is none of that name, or an option is wrong.
+    """
+    if spec is None:
+        return None
+    model: VehicleModel = VEHICLE_MODELS.create(spec.name, spec.options, where, vehicle=vehicle)
+    return model
+
+
+def make_execution(spec: AvSpec, vehicle: VehicleParameters,
+                   dt_s: float) -> TrackedExecution | None:
+    """
+    Make what tracks an AV's plans; None if it follows them exactly.
+
+    :raises InputError: if a model cannot be made, or there is no pose to steer by.
+    """
+    if spec.execution == 'perfect':
+        return None
+    if spec.localisation_steers and (
+            spec.perception is None or spec.perception.localisation is None):
+        raise InputError('"pose" is estimated, but nothing estimates it', f'{spec.id}: tracker',
+                         'give the AV a perception with localisation')
+    model = make_vehicle_model(spec.dynamics, vehicle, f'{spec.id}: dynamics')
+    assert model is not None
+    tracker = TRACKERS.create(spec.tracker.model.name, spec.tracker.model.options,
+                              f'{spec.id}: tracker', vehicle=vehicle, dt_s=dt_s)
+    return TrackedExecution(vehicle, tracker, model, dt_s)
+
+
+def make_localisation(spec: AvSpec, initial: VehicleState, game_seed: int,
+                      dt_s: float) -> Localisation | None:
+    """Make the localisation that a tracker steers by; the same as the perception's own."""
+    if not spec.localisation_steers or spec.perception is None \
+            or spec.perception.localisation is None:
+        return None
+    seed = game_seed if spec.perception.seed is None else spec.perception.seed
+    return Localisation(spec.perception.localisation, seed, spec.id, published(initial), dt_s)
+
+
+def make_perception(av_id: str, spec: PerceptionSpec, descriptions: Sequence[ObjectDescription],
+                    vehicle: VehicleParameters, transform: RigidTransform,
+                    initial: VehicleState, game_seed: int, dt_s: float,
+                    occupancy: TiledOccupancy | None) -> Perception:
+    """
+    Make an AV's perception.
+
+    :param descriptions: of everything that can appear: driven vehicles, then objects.
+    :param initial: the AV's state when it begins, as published.
+    """
+    return Perception(av_id, spec, descriptions, vehicle, transform, initial, game_seed, dt_s,
+                      occupancy=occupancy)
+
+
+def published_states(states: Sequence[VehicleState]) -> NDArray[np.float64]:
+    """
+    Give states (V, 8) of driven vehicles as `/vehicles/state` carries them.
+
+    Both runners let perception see these bits.
+    """
+    joints = [np.array(rows) for rows in zip(
+        *(vehicle_to_joints(state) for state in states), strict=True)]
+    return vehicles_from_joints(*joints)
+
+
+def published(state: VehicleState) -> VehicleState:
+    """Give one vehicle's state as `/vehicles/state` carries it."""
+    return VehicleState(*published_states([state])[0].tolist())
+
+
+def ego_of(request: JointSeries) -> VehicleState:
+    """Give the state of the AV that a plan request is for, in its scenario coordinates."""
+    state = vehicles_from_joints(request.positions[0, :4], request.velocities[0, :4],
+                                 request.accelerations[0, :4])
+    return VehicleState(*state.tolist())

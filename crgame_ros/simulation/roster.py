@@ -1,0 +1,40 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who and what takes part in a game, as far as it decides which processes a run needs."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from crgame_ros.simulation.setup import Setup
+
+
+@dataclass(frozen=True)
+class Participants:
+    """
+    What a game needs beside the simulation itself.
+
+    :param humans: driver source by human.
+    :param avs: planner by AV.
+    :param perceiving: AVs with perception.
+    :param traffic: whether there are agents.
+    :param occupancy: whether there is a map of permanent obstacles.
+    """
+
+    humans: dict[str, str]
+    avs: dict[str, str]
+    perceiving: tuple[str, ...] = ()
+    traffic: bool = False
+    occupancy: bool = False
+
+    @classmethod
+    def of(cls, setup: Setup) -> 'Participants':
+        """Read them from a run."""
+        return cls({human.id: human.driver for human in setup.humans},
+                   {av.id: av.spec.planner for av in setup.avs},
+                   tuple(av.id for av in setup.avs if av.spec.perception is not None),
+                   setup.traffic is not None, setup.game.occupancy is not None)
+
+    @classmethod
+    def read(cls, content: dict[str, Any]) -> 'Participants':
+        """Read them from what `dataclasses.asdict` gave, by way of JSON."""
+        return cls(**content | {'perceiving': tuple(content['perceiving'])})

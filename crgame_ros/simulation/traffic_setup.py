@@ -1,0 +1,92 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reactive traffic of a run before its first step, for both runners and for traffic_node."""
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.scenario.objects import ObjectDescription, ObjectStates
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.simulation.world_reader import joints_of, WorldReader
+from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.traffic.spawning import adoptable, Adopted
+from crgame_ros.traffic.spec import TrafficSpec
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world import WorldView
+from crgame_ros.vehicle.state import VehicleState
+
+# Agents move at this rate, whatever the simulation's [Hz] (FS III).
+MOTION_RATE = 100.0
+
+
+@dataclass(frozen=True)
+class TrafficSetup:
+    """
+    The agents at the first tick.
+
+    :param descriptions: of all that may appear, adopted obstacles first.
+    :param make: makes a fresh set of agents, the same every time.
+    """
+
+    descriptions: tuple[ObjectDescription, ...]
+    make: Callable[[], Traffic]
+
+
+def adopted_columns(spec: TrafficSpec | None, obstacles: ScenarioObstacles, network: RoadNetwork,
+                    kept: Collection[str] = ()) -> tuple[int, ...]:
+    """
+    Choose the recorded obstacles that become agents.
+
+    :param kept: ids of those that events are about, which stay as recorded.
+    :return: their columns, in order
+    """
+    if spec is None or spec.recorded != 'reactive':
+        return ()
+    return tuple(column for column, item in enumerate(obstacles.descriptions)
+                 if item.id not in kept
+                 and adoptable(item, obstacles.track(column)[0], network))
+
+
+def make_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwork,
+                 others: Sequence[ObjectDescription], obstacles: ScenarioObstacles,
+                 adopted: Sequence[int], world: WorldView, scheduler: ScenarioScheduler,
+                 seed: int) -> Traffic:
+    """
+    Make the agents of a run.
+
+    :param others: everything that is no agent, in the order of `world`.
+    :param obstacles: the recorded obstacles.
+    :param adopted: columns of those that become agents.
+    :param world: everything that is no agent at the first tick.
+    :param seed: of the game; the traffic's own goes before it.
+    """
+    tracks = [Adopted(obstacles.descriptions[column], obstacles.first_step(column),
+                      *obstacles.track(column)) for column in adopted]
+    return Traffic(spec, network, loaded.scenario, others, tracks, scheduler.time_step_s,
+                   max(1, round(scheduler.time_step_s * MOTION_RATE)), seed, scheduler.k0, world)
+
+
+def place_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwork,
+                  descriptions: Sequence[ObjectDescription], obstacles: ScenarioObstacles,
+                  adopted: Sequence[int], vehicles: Sequence[VehicleState],
+                  objects: ObjectStates, scheduler: ScenarioScheduler,
+                  seed: int) -> TrafficSetup:
+    """
+    Place the agents of a run around everything else.
+
+    :param descriptions: of driven vehicles and objects; adopted ones are agents already.
+    :param obstacles: the recorded obstacles.
+    :param adopted: columns of those that become agents.
+    :param vehicles: states of the driven vehicles at the first tick.
+    :param objects: states of all objects at the first tick.
+    """
+    reader = WorldReader(descriptions, TrafficLights(loaded.scenario))
+    world = reader.view(scheduler.k0, *joints_of(vehicles), objects)
+
+    def make() -> Traffic:
+        return make_traffic(spec, loaded, network, reader.others, obstacles, adopted, world,
+                            scheduler, seed)
+    return TrafficSetup(make().descriptions, make)

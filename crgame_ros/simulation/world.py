@@ -1,0 +1,132 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Everything in a run that is no driven vehicle, tick by tick."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from crgame_ros.scenario.objects import ObjectStates
+from crgame_ros.simulation.events import RunEvents
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.simulation.surroundings import Surroundings
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world import WorldView
+from crgame_ros.vehicle.state import VehicleState
+
+
+class TrafficFeed(Protocol):
+    """
+    Whatever moves the agents: in process, or another process over DDS.
+
+    Agents at tick k come from the world of k - 1, live and offline alike.
+    """
+
+    def states_for(self, k: int) -> tuple[ObjectStates, int]:
+        """Give the agents at tick k, and the tick whose states could be used for that."""
+
+    def tell(self, view: WorldView) -> None:
+        """Tell what the agents react to."""
+
+
+class LocalTraffic:
+    """
+    Agents that are moved in process, when the next tick asks for them.
+
+    :param traffic: at the first tick.
+    :param k: that tick.
+    """
+
+    def __init__(self, traffic: Traffic, k: int) -> None:
+        self._traffic = traffic
+        self._k = k
+        self._view: WorldView | None = None
+
+    def states_for(self, k: int) -> tuple[ObjectStates, int]:
+        """Advance the agents to tick k."""
+        if k > self._k and self._view is not None:
+            self._traffic.advance(self._view)
+            self._k += 1
+        return self._traffic.states, self._k
+
+    def tell(self, view: WorldView) -> None:
+        """Keep what the agents will react to."""
+        self._view = view
+
+
+class World:
+    """
+    The objects of one run: recorded ones, changed by events, and those that live.
+
+    :param setup: the run.
+    :param events: of the run; None where the game has none.
+    :param feed: moves the agents; None moves them in process.
+    :ivar objects: the states of all objects at the present tick.
+    :ivar agents_k: tick of the agents' states in use; None without agents.
+    """
+
+    def __init__(self, setup: Setup, events: RunEvents | None,
+                 feed: TrafficFeed | None = None) -> None:
+        self._setup = setup
+        self._events = events
+        self._courses = setup.obstacles if events is None else events.obstacles
+        self._k = setup.scheduler.k0
+        self._scripted = setup.make_scripted()
+        self._feed = feed
+        if feed is None and setup.traffic is not None:
+            self._feed = LocalTraffic(setup.traffic.make(), self._k)
+        self._surroundings = Surroundings(setup)
+        self.agents_k: int | None = None
+        self._agents: ObjectStates | None = None
+        if self._feed is not None:
+            self._agents, self.agents_k = self._feed.states_for(self._k)
+        self.objects = self._at(self._k)
+
+    @property
+    def changed(self) -> Sequence[int]:
+        """Columns of the objects whose states are not the scenario's, in order."""
+        moved = [] if self._events is None else self._events.obstacles.changed
+        return sorted({*moved, *self._setup.obstacles.living.tolist()})
+
+    def advance(self, k: int) -> ObjectStates:
+        """
+        Let what lives move to tick k, before events of that tick happen.
+
+        :return: all objects at k, events of earlier ticks included.
+        """
+        if k > self._k:
+            if self._scripted is not None:
+                self._scripted.advance(self._k, *self._surroundings.of_scripted())
+            if self._feed is not None:
+                self._agents, self.agents_k = self._feed.states_for(k)
+            self._k = k
+        self.objects = self._at(k)
+        return self.objects
+
+    def settle(self, states: Sequence[VehicleState]) -> ObjectStates:
+        """
+        Give all objects at this tick once events have happened, and let what lives see them.
+
+        :param states: of the driven vehicles at this tick.
+        """
+        if self._events is not None:
+            self.objects = self._at(self._k)
+        if self._feed is not None or self._scripted is not None:
+            self._surroundings.see(states, self.objects)
+        if self._feed is not None:
+            self._feed.tell(self._surroundings.of_agents(self._k))
+        return self.objects
+
+    def _at(self, k: int) -> ObjectStates:
+        states = self._courses.states_at(k)
+        if not len(self._setup.obstacles.living):
+            return states
+        poses, velocities = states.poses.copy(), states.velocities.copy()
+        if self._scripted is not None:
+            columns = self._setup.scripted_columns
+            poses[columns] = self._scripted.states.poses
+            velocities[columns] = self._scripted.states.velocities
+        if self._agents is not None:
+            columns = self._setup.agent_columns
+            poses[columns] = self._agents.poses
+            velocities[columns] = self._agents.velocities
+        return ObjectStates(poses, velocities)

@@ -1,0 +1,80 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What traffic sees of the world, the same bits live and offline.
+
+Driven vehicles are read as the joints that `/vehicles/state` carries.
+"""
+
+from collections.abc import Sequence
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.planner.joints import vehicle_to_joints
+from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.traffic.world import WorldView
+from crgame_ros.vehicle.state import VehicleState
+
+FloatArray = NDArray[np.float64]
+Joints = Sequence[Sequence[float]] | FloatArray
+
+
+def driven_centers(positions: Joints, velocities: Joints,
+                   rear_to_center: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """
+    Give the centres of driven vehicles.
+
+    :param positions: (V, 4) joints of the rear axles
+    :param velocities: (V, 4) their derivatives
+    :param rear_to_center: (V) from the rear axle to the centre [m]
+    :return: poses and velocities, both (V, 3)
+    """
+    poses, rates = np.empty((len(positions), 3)), np.empty((len(positions), 3))
+    for row, (at, rate, ahead) in enumerate(zip(positions, velocities, rear_to_center,
+                                                strict=True)):
+        cos, sin = ahead * math.cos(at[2]), ahead * math.sin(at[2])
+        poses[row] = at[0] + cos, at[1] + sin, at[2]
+        rates[row] = rate[0] - sin * rate[2], rate[1] + cos * rate[2], rate[2]
+    return poses, rates
+
+
+class WorldReader:
+    """
+    Makes the agents' view of the world from joints and objects.
+
+    :param descriptions: of everything that can appear: driven vehicles, then objects.
+    :param lights: the traffic lights.
+    """
+
+    def __init__(self, descriptions: Sequence[ObjectDescription], lights: TrafficLights) -> None:
+        driven = [item for item in descriptions if item.role.is_ego]
+        objects = [item for item in descriptions if not item.role.is_ego]
+        self._ahead = [item.rear_to_center for item in driven]
+        self._lights = lights
+        self._columns = [column for column, item in enumerate(objects)
+                         if item.role is not Role.TRAFFIC]
+        self.others: tuple[ObjectDescription, ...] = (
+            *driven, *(objects[column] for column in self._columns))
+
+    def view(self, k: int, positions: Joints, velocities: Joints,
+             objects: ObjectStates) -> WorldView:
+        """
+        Give what agents react to at tick k.
+
+        :param positions: (V, 4) joints of the driven vehicles
+        :param velocities: (V, 4)
+        :param objects: all objects.
+        """
+        poses, rates = driven_centers(positions, velocities, self._ahead)
+        return WorldView(k, np.concatenate((poses, objects.poses[self._columns])),
+                         np.concatenate((rates, objects.velocities[self._columns])),
+                         self._lights.states_at(k))
+
+
+def joints_of(states: Sequence[VehicleState]) -> tuple[Joints, Joints]:
+    """Give the joint positions and velocities of driven vehicles, (V, 4) each."""
+    joints = [vehicle_to_joints(state) for state in states]
+    return [item[0] for item in joints], [item[1] for item in joints]

@@ -1,0 +1,208 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Keeping a distance to the vehicle ahead (FS M2), vectorised over agents."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import InputError
+from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
+from crgame_ros.registry import ModelRegistry
+
+Array = NDArray[np.float64]
+
+# A standing agent stays until its model wants this much; a slower one that wants less is held.
+STANDING = 0.1
+START = 0.2
+# The guard begins at this share of the hardest deceleration and demands all of it at 1: steady
+# following needs less, and so do the gaps that are short by agreement after a lane change.
+GUARD_SHARE = 0.8
+# What the guard leaves between bumpers, as a share of the gap at standstill.
+GUARD_GAP = 0.5
+LEAST_ROOM = 0.01
+
+
+class CarFollowing(ABC):
+    """
+    A law for the acceleration of an agent behind its leader.
+
+    The law proper is a subclass's `follow`. This class adds what every one of them needs to share
+    a road with people: limits, an emergency guard and a standstill that doesn't creep.
+
+    :param standstill_gap: gap behind a standing leader s0, bumper to bumper [m]
+    :param max_acceleration: of a driver in no hurry [m/s^2]
+    :param max_deceleration: emergency braking on dry asphalt [m/s^2]
+    """
+
+    name: ClassVar[str]
+
+    def __init__(self, standstill_gap: float, max_acceleration: float,
+                 max_deceleration: float) -> None:
+        self.standstill_gap = standstill_gap
+        self.max_acceleration = max_acceleration
+        self.max_deceleration = max_deceleration
+
+    @abstractmethod
+    def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
+        """
+        Give the acceleration of the law, without limits; arguments as in `acceleration`.
+
+        :param gap: may be inf, and 0 or negative once vehicles overlap [m]
+        """
+
+    @abstractmethod
+    def desired_gap(self, speed: Array) -> Array:
+        """Give the steady gap behind a leader of the same speed, (A,) [m]."""
+
+    def acceleration(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array,
+                     relief: Array | float = 0.0) -> Array:
+        """
+        Give the acceleration for the next decision interval.
+
+        A mover integrates it with v = max(0, v + a dt): a standing agent that should wait is held
+        by a negative value.
+
+        :param speed: (A,) of the agents, at least 0 [m/s]
+        :param desired_speed: (A,) on a free road [m/s]
+        :param gap: (A,) to the leader, bumper to bumper; inf where there is none [m]
+        :param lead_speed: (A,) of the leader along the lane; any value where there is none [m/s]
+        :param relief: (A,) by how much the desired gap may be missed for now (`courtesy`); the
+            guard against collisions looks at the true gap [m]
+        :return: (A,) [m/s^2]
+        """
+        lead_speed = np.where(np.isposinf(gap), speed, lead_speed)
+        missing = np.maximum(self.desired_gap(speed) - gap, 0.0)
+        # Nearer than the gap at standstill nobody is patient.
+        patience = np.clip(2.0 * gap / self.standstill_gap - 1.0, 0.0, 1.0)
+        spared = np.minimum(relief, missing) * patience
+        wanted = self.follow(speed, desired_speed, gap + spared, lead_speed)
+        guard = self.guard_deceleration(speed, gap, lead_speed)
+        wanted = np.where(guard > 0.0, np.minimum(wanted, -guard), wanted)
+        held = (speed < STANDING) & (wanted < START)
+        wanted = np.where(held, np.minimum(wanted, -START), wanted)
+        return np.clip(wanted, -self.max_deceleration, self.max_acceleration)
+
+    def guard_deceleration(self, speed: Array, gap: Array, lead_speed: Array) -> Array:
+        """
+        Give the braking without which it would soon be too late, whatever the law wants.
+
+        Behind a leader that brakes its hardest, b_max, to a stop, constant braking with
+        v^2 / (2 (gap - s0 / 2 + v_leader^2 / (2 b_max))) just avoids contact, as in Gipps (1981).
+        What is demanded rises from 0 where that is 0.8 b_max to b_max where it is b_max.
+
+        :return: (A,) [m/s^2]
+        """
+        stopping = (gap - GUARD_GAP * self.standstill_gap
+                    + np.maximum(lead_speed, 0.0) ** 2 / (2.0 * self.max_deceleration))
+        share = speed ** 2 / (2.0 * self.max_deceleration * np.maximum(stopping, LEAST_ROOM))
+        ramp = np.clip((share - GUARD_SHARE) / (1.0 - GUARD_SHARE), 0.0, 1.0)
+        return self.max_deceleration * ramp
+
+
+class AdaptiveCruise(CarFollowing):
+    """
+    Keep a constant time gap (FS 3; Rajamani 2011, chapter 6).
+
+    S_desired = l_lead + T v, S_actual = x_lead - x_host, delta = S_desired - S_actual,
+    a = -(1 / h) (-dS_actual/dt + lambda delta). Taken between centres, l_lead is their distance
+    at contact plus the gap s0 at standstill (FS has the leader's length alone, so that vehicles
+    stop bumper on bumper); then delta = s0 + T v - gap. On a free road the speed approaches the
+    desired one; the smaller of both accelerations holds.
+
+    A vehicle answers its leader's motion with (s + lambda) / (h s^2 + (1 + lambda T) s + lambda).
+    Its gain is nowhere above 1, and a platoon string stable, if and only if
+    h <= T + lambda T^2 / 2. With h = T, the default, it is 1 / (T s + 1): no overshoot either,
+    the speed of a follower is a plain average of its leader's.
+
+    :param time_gap: T; drivers keep 1 to 2 s, the usual advice is at least 1.5 s (ours) [s]
+    :param h: None is T [s]
+    :param gain: lambda, with which spacing errors decay; 0.4 stops from 15 m/s with 2.8 m/s^2,
+        from 30 m/s with 5.6 m/s^2 (ours) [1/s]
+    :param standstill_gap: s0, as Treiber et al. (2000) have it [m]
+    :param max_acceleration: [m/s^2]
+    :param comfortable_deceleration: with which an excess of speed is shed (ours) [m/s^2]
+    :param max_deceleration: [m/s^2]
+    :param speed_time: time constant of approaching the desired speed (ours) [s]
+    """
+
+    name: ClassVar[str] = 'acc'
+
+    def __init__(self, time_gap: float = 1.5, h: float | None = None, gain: float = 0.4,
+                 standstill_gap: float = 2.0, max_acceleration: float = 1.5,
+                 comfortable_deceleration: float = 2.0, max_deceleration: float = 8.0,
+                 speed_time: float = 2.0) -> None:
+        super().__init__(standstill_gap, max_acceleration, max_deceleration)
+        self.h = time_gap if h is None else h
+        _check_positive(self.name, time_gap=time_gap, h=self.h, gain=gain,
+                        standstill_gap=standstill_gap, max_acceleration=max_acceleration,
+                        comfortable_deceleration=comfortable_deceleration,
+                        max_deceleration=max_deceleration, speed_time=speed_time)
+        self.time_gap = time_gap
+        self.gain = gain
+        self._comfortable_deceleration = comfortable_deceleration
+        self._speed_time = speed_time
+
+    def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
+        """Give the smaller of FS 3 and the approach to the desired speed."""
+        error = self.desired_gap(speed) - gap
+        following = -(speed - lead_speed + self.gain * error) / self.h
+        free = np.maximum((desired_speed - speed) / self._speed_time,
+                          -self._comfortable_deceleration)
+        return np.minimum(following, free)
+
+    def desired_gap(self, speed: Array) -> Array:
+        """Give s0 + T v."""
+        return self.standstill_gap + self.time_gap * speed
+
+
+class IntelligentDriver(CarFollowing):
+    """
+    Follow with the Intelligent Driver Model (Treiber, Hennecke and Helbing 2000).
+
+    The defaults are those of the planner of the same name; the paper has T = 1.6 s, a = 0.73 and
+    b = 1.67 m/s^2 on a motorway.
+
+    :param time_gap: T [s]
+    :param standstill_gap: s0 [m]
+    :param max_acceleration: a [m/s^2]
+    :param comfortable_deceleration: b [m/s^2]
+    :param max_deceleration: [m/s^2]
+    """
+
+    name: ClassVar[str] = 'idm'
+
+    def __init__(self, time_gap: float = 1.5, standstill_gap: float = 2.0,
+                 max_acceleration: float = 1.5, comfortable_deceleration: float = 2.0,
+                 max_deceleration: float = 8.0) -> None:
+        super().__init__(standstill_gap, max_acceleration, max_deceleration)
+        _check_positive(self.name, time_gap=time_gap, standstill_gap=standstill_gap,
+                        max_acceleration=max_acceleration, max_deceleration=max_deceleration,
+                        comfortable_deceleration=comfortable_deceleration)
+        self._model = IdmParameters(time_gap, standstill_gap, max_acceleration,
+                                    comfortable_deceleration, max_deceleration)
+
+    def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
+        """Give a (1 - (v / v0)^4 - (s* / s)^2)."""
+        desired = np.maximum(desired_speed, STANDING)
+        return (free_acceleration(speed, desired, self._model, np.maximum)
+                + interaction(speed, gap, lead_speed, self._model, np.maximum))
+
+    def desired_gap(self, speed: Array) -> Array:
+        """Give s0 + T v, where the interaction term equals a."""
+        return self._model.s0 + self._model.time_headway * speed
+
+
+def _check_positive(model: str, **values: float) -> None:
+    for key, value in values.items():
+        if not 0.0 < value < np.inf:
+            raise InputError(f'"{key}" is {value:g}', f'options of car-following model {model}',
+                             'give a number above 0')
+
+
+CAR_FOLLOWING = ModelRegistry('car_following', 'car-following model', {
+    'acc': 'crgame_ros.traffic.car_following:AdaptiveCruise',
+    'idm': 'crgame_ros.traffic.car_following:IntelligentDriver',
+}, CarFollowing, 'docs/traffic.md')

@@ -1,0 +1,230 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""When agents change lanes, and who makes room for them (FS M3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.car_following import CarFollowing
+from crgame_ros.traffic.conflicts import Conflicts
+from crgame_ros.traffic.courtesy import CourtesyRules, relief_at_change
+from crgame_ros.traffic.lane_change import (
+    CHANGE_THRESHOLD,
+    GapAcceptance,
+    incentive,
+    look_ahead,
+    quintic,
+    urgency,
+)
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.leaders import LaneOrder
+from crgame_ros.traffic.neighbours import Beside, look_beside
+from crgame_ros.traffic.placement import Entries
+from crgame_ros.traffic.routes import Routes
+
+BoolArray = NDArray[np.bool_]
+
+# After a change, time without another one; and with which the next for speed is thought of [s].
+CALM = 4.0
+# Changes for speed are left alone where the route wants the lane within this distance [m].
+COMMITTED = 250.0
+SLOWEST = 3.0
+# The route's change begins this far before the last point where it is possible [m].
+PREPARE = 400.0
+# Nobody begins to change lanes this shortly before or in a junction [m].
+NO_CHANGE = 15.0
+
+
+@dataclass(frozen=True)
+class Wish:
+    """Agents (N) that want into the lane beside them: slots, side, urgency, and what is there."""
+
+    slots: IntArray
+    side: IntArray
+    urgency: FloatArray
+    beside: Beside
+
+    def take(self, rows: NDArray[np.bool_]) -> 'Wish':
+        """Pick some of them."""
+        columns = {name: getattr(self.beside, name)[rows] for name in (
+            'lane', 's', 'd', 'turn', 'lead_gap', 'lead_speed', 'follow_gap', 'follow_speed',
+            'follower')}
+        return Wish(self.slots[rows], self.side[rows], self.urgency[rows], Beside(**columns))
+
+
+class LaneChanges:
+    """
+    Decides on lane changes, for the route, past slow leaders and where a lane ends.
+
+    :param graph: the lanes.
+    :param routes: where agents go.
+    :param conflicts: of the lanes.
+    :param model: of car following.
+    :param politeness: weight of others' loss (MOBIL).
+    :param cooperative: whether others make room.
+    :param time_step_s: Delta t_c [s]
+    """
+
+    def __init__(self, graph: LaneGraph, routes: Routes, conflicts: Conflicts,
+                 model: CarFollowing, politeness: float, cooperative: bool,
+                 time_step_s: float) -> None:
+        self._graph, self._routes, self._conflicts = graph, routes, conflicts
+        self._model = model
+        self._politeness = politeness
+        self._cooperative = cooperative
+        self._calm = max(1, round(CALM / time_step_s))
+        self._gaps = GapAcceptance()
+        self._courtesy = CourtesyRules()
+
+    def finish(self, agents: Agents) -> None:
+        """End the changes that have come to their end."""
+        done = (agents.source != NOBODY) & (agents.s - agents.from_s >= agents.span)
+        agents.source[done] = NOBODY
+
+    def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
+               acceleration: FloatArray, blocked: FloatArray, entries: Entries,
+               order: LaneOrder) -> FloatArray:
+        """
+        Begin lane changes, and say how those brake who make room.
+
+        :param slots: (A) of the agents.
+        :param desired: (A) desired speeds [m/s]
+        :param acceleration: (A) that they want in their own lanes [m/s^2]
+        :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
+        :return: (A) accelerations that courtesy allows, inf where it asks for nothing.
+        """
+        yielding = np.full(agents.count, np.inf)
+        wish = self._wishes(k, agents, slots, blocked, entries, order)
+        if wish is None:
+            return yielding[slots]
+        want, now = np.zeros(agents.count), np.zeros(agents.count)
+        want[slots], now[slots] = desired, acceleration
+        ok, gain = self._judge(agents, wish, want, now)
+        must = wish.urgency >= 0.0
+        gain = np.where(must, 100.0 + wish.urgency, gain)
+        chosen = ok & (must | (gain > CHANGE_THRESHOLD))
+        begun = self._begin(k, agents, wish, chosen, gain)
+        if self._cooperative:
+            waiting = wish.take(must & ~np.isin(wish.slots, begun))
+            self._make_room(agents, waiting, yielding)
+        return yielding[slots]
+
+    def _wishes(self, k: int, agents: Agents, slots: IntArray, blocked: FloatArray,
+                entries: Entries, order: LaneOrder) -> Wish | None:
+        """List who may want to change to which side; urgency -1 is for speed alone."""
+        graph, routes, found = self._graph, self._routes, []
+        lane, destination = agents.lane[slots], agents.destination[slots]
+        needs = routes.change[destination, lane]
+        remaining = routes.remaining[destination, lane] - agents.s[slots]
+        stuck = blocked < PREPARE
+        hurry = urgency(np.minimum(remaining, blocked), agents.speed[slots])
+        free = (agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k)
+        to_junction = np.where(self._conflicts.count[lane] > 0, 0.0, np.inf)
+        onto = routes.next[destination, lane]
+        to_junction = np.where(
+            (onto >= 0) & (self._conflicts.count[np.maximum(onto, 0)] > 0)
+            & (to_junction > 0.0), graph.length[lane] - agents.s[slots], to_junction)
+        free &= to_junction > NO_CHANGE
+        for side, table in ((1, graph.left), (-1, graph.right)):
+            aside = table[lane]
+            at = np.maximum(aside, 0)
+            must = free & (aside >= 0) & (stuck | ((needs == side) & (remaining < PREPARE)))
+            must &= np.isfinite(routes.cost[destination, at])
+            may = free & ~must & (needs == 0) & (aside >= 0) & (
+                np.isfinite(routes.cost[destination, at])) & (
+                (routes.change[destination, at] == 0)
+                | (routes.remaining[destination, at] - agents.s[slots] > COMMITTED)) & (
+                agents.speed[slots] > SLOWEST)
+            row = np.flatnonzero(must | may)
+            found.append((slots[row], np.full(len(row), side), aside[row],
+                          np.where(must[row], hurry[row], -1.0)))
+        who, sides, lanes, hurries = (np.concatenate([f[i] for f in found]) for i in range(4))
+        if not len(who):
+            return None
+        beside = look_beside(graph, routes, agents, who, lanes, entries, order)
+        return Wish(who, sides, hurries, beside)
+
+    def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
+               acceleration: FloatArray) -> tuple[BoolArray, FloatArray]:
+        """Tell whose gap is safe, and what each gains by changing (MOBIL) [m/s^2]."""
+        model, beside = self._model, wish.beside
+        speed = agents.speed[wish.slots]
+        there = model.acceleration(speed, desired[wish.slots], beside.lead_gap,
+                                   beside.lead_speed)
+        known = beside.follower >= 0
+        follower = np.maximum(beside.follower, 0)
+        wanted = np.where(known, desired[follower], beside.follow_speed)
+        follow = model.acceleration(np.maximum(beside.follow_speed, 0.0), wanted,
+                                    beside.follow_gap, speed)
+        hurry = np.maximum(wish.urgency, 0.0)
+        ok = self._gaps.accepts(speed, beside.lead_gap, beside.lead_speed, beside.follow_gap,
+                                beside.follow_speed, there, follow, hurry)
+        loss = np.where(known, follow - acceleration[follower], np.minimum(follow, 0.0))
+        loss = np.where(np.isinf(beside.follow_gap), 0.0, loss)
+        gain = incentive(acceleration[wish.slots], there, loss, self._politeness)
+        return np.asarray(ok & (np.abs(beside.turn) < 0.3)), np.asarray(gain)
+
+    def _begin(self, k: int, agents: Agents, wish: Wish, chosen: BoolArray,
+               gain: FloatArray) -> IntArray:
+        """Begin changes, the most wanted first; of two into one gap only one begins."""
+        begun: list[int] = []
+        taken: list[tuple[int, float]] = []
+        row = np.flatnonzero(chosen)
+        for i in row[np.lexsort((wish.slots[row], -gain[row]))].tolist():
+            slot, lane, s = (int(wish.slots[i]), int(wish.beside.lane[i]),
+                             float(wish.beside.s[i]))
+            room = 10.0 + float(agents.length[slot]) + float(agents.speed[slot])
+            if slot in begun or any(lane == other and abs(s - at) < room for other, at in taken):
+                continue
+            begun.append(slot)
+            taken.append((lane, s))
+            self._start(k, agents, wish, i)
+        return np.array(begun, dtype=np.int64)
+
+    def _start(self, k: int, agents: Agents, wish: Wish, i: int) -> None:
+        """Put an agent into the lane beside it, on a polynomial to its middle (FS 4)."""
+        slot, beside = int(wish.slots[i]), wish.beside
+        speed = agents.speed[slot:slot + 1]
+        shift, slope = beside.d[i:i + 1], np.tan(beside.turn[i:i + 1])
+        span = look_ahead(speed, np.abs(shift))
+        agents.curve[slot] = quintic(shift, slope, np.zeros(1), np.zeros(1), span)[0]
+        agents.span[slot], agents.from_s[slot] = span[0], beside.s[i]
+        agents.source[slot], agents.side[slot] = agents.lane[slot], wish.side[i]
+        agents.lane[slot], agents.s[slot] = beside.lane[i], beside.s[i]
+        agents.d[slot] = beside.d[i]
+        agents.previous[slot] = NOBODY
+        agents.calm_until[slot] = k + self._calm + round(
+            float(span[0] / max(speed[0], 1.0)) * self._calm / CALM)
+        self._relieve(agents, slot, beside.lead_gap[i], float(speed[0]))
+        if beside.follower[i] >= 0:
+            self._relieve(agents, int(beside.follower[i]), beside.follow_gap[i],
+                          float(beside.follow_speed[i]))
+
+    def _relieve(self, agents: Agents, slot: int, gap: float, speed: float) -> None:
+        """Let a driver open a gap that a change has shortened without haste (Hidas 2005)."""
+        if self._cooperative and np.isfinite(gap):
+            wanted = self._model.desired_gap(np.array([speed]))
+            agents.relief[slot] = max(agents.relief[slot], float(
+                relief_at_change(np.array([gap]), wanted)[0]))
+
+    def _make_room(self, agents: Agents, wish: Wish, yielding: FloatArray) -> None:
+        """Let followers beside, and agents that have to fall back, open the gaps (Hidas 2005)."""
+        beside, slots = wish.beside, wish.slots
+        speed = agents.speed[slots]
+        known = beside.follower >= 0
+        follower = np.maximum(beside.follower, 0)
+        needed = self._gaps.minimum_gap(beside.follow_speed, speed, wish.urgency)
+        deceleration, willing = self._courtesy.courtesy_deceleration(
+            beside.follow_speed, beside.follow_gap, speed, needed, wish.urgency,
+            agents.aggressivity[follower])
+        yields = known & willing
+        np.minimum.at(yielding, follower[yields], -deceleration[yields])
+        own = self._gaps.minimum_gap(speed, beside.lead_speed, wish.urgency)
+        back, willing = self._courtesy.courtesy_deceleration(
+            speed, beside.lead_gap, beside.lead_speed, own, wish.urgency,
+            np.zeros(len(slots)))
+        falls = np.isfinite(beside.lead_gap) & willing & (speed > 2.0)
+        np.minimum.at(yielding, slots[falls], -back[falls])

@@ -1,0 +1,156 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where lanes cross or merge, and who has the right of way there."""
+
+from commonroad.common.common_lanelet import LaneletType
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+import shapely
+
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+
+# Two vehicles meet where their lanes' centres are closer than a vehicle's width and a margin [m].
+WIDTH = 2.6
+# Lanes whose headings differ by more than this over a conflict are the two ways of one road.
+ONCOMING = 2.6
+TURN = 0.45
+# A sign counts for the way behind it as far as this, while no other way joins [m].
+SIGN_REACH = 80.0
+# With less room than this before a conflict nobody waits inside the junction [m].
+WAITING_ROOM = 15.0
+_YIELDING = {'YIELD', 'STOP', 'ROUNDABOUT'}
+_PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
+
+
+class Conflicts:
+    """
+    Pairs of lanes that cross or merge; each is two rows, one seen from either lane.
+
+    The rows of a lane are `first[lane]:first[lane] + count[lane]`. Vehicles keep to the right.
+
+    :param graph: the lanes.
+
+    Attributes of each row: `lane`, `other` (the row of the other lane), `start` and `end` (arc
+    lengths between which vehicles on the two lanes touch [m]) and `priority` (1: this lane goes
+    first, -1: the other, 0: whoever comes first).
+    """
+
+    def __init__(self, graph: LaneGraph) -> None:
+        self._graph = graph
+        rows: list[tuple[int, int, float, float]] = []
+        for i, j in _candidates(graph):
+            here, there = _stretch(graph, i, j), _stretch(graph, j, i)
+            if here is None or there is None or _is_fork(graph, i, j, here, there):
+                continue
+            rows += [(i, j, *here), (j, i, *there)]
+        rows.sort()
+        self.lane: IntArray = np.array([r[0] for r in rows], dtype=np.int64)
+        self.start: FloatArray = np.array([r[2] for r in rows], dtype=np.float64)
+        self.end: FloatArray = np.array([r[3] for r in rows], dtype=np.float64)
+        place = {(r[0], r[1]): n for n, r in enumerate(rows)}
+        self.other: IntArray = np.array([place[r[1], r[0]] for r in rows], dtype=np.int64)
+        self.count: IntArray = np.bincount(self.lane, minlength=len(graph)).astype(np.int64)
+        self.first: IntArray = np.cumsum(self.count) - self.count
+        self.rank: IntArray = np.array([_rank(graph, i) for i in range(len(graph))])
+        self.priority: IntArray = np.array(
+            [_priority(graph, self.rank, r[0], r[1]) for r in rows], dtype=np.int64)
+        # Where the first conflict of each lane begins [m].
+        self.entry: FloatArray = np.full(len(graph), np.inf)
+        np.minimum.at(self.entry, self.lane, self.start)
+        self.leave: FloatArray = np.zeros(len(graph))
+        np.maximum.at(self.leave, self.lane, self.end)
+
+        # The ways join for good: one goes on behind the other.
+        last = self.end > graph.length[self.lane] - 1.0
+        self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
+
+    def __len__(self) -> int:
+        return len(self.lane)
+
+    def tapers(self) -> NDArray[np.bool_]:
+        """Tell which lanes (L) end in a merge in which others go first, without a turn."""
+        graph = self._graph
+        start = graph.yaw[graph.first[self.lane]] - graph.yaw[graph.first[self.lane[self.other]]]
+        result = np.zeros(len(graph), dtype=bool)
+        result[self.lane[self.merges & (self.priority < 0) & (np.cos(start) > 0.9)]] = True
+        return result
+
+
+def _candidates(graph: LaneGraph) -> list[tuple[int, int]]:
+    lines = [shapely.LineString(np.stack((graph.x[a:b], graph.y[a:b]), axis=-1))
+             for a, b in zip(graph.first, graph.first + graph.count, strict=True)]
+    tree = shapely.STRtree(lines)
+    left, right = tree.query(lines, predicate='dwithin', distance=WIDTH)
+    following = [{int(j) for j in row if j >= 0} for row in graph.successors]
+    before = [{int(j) for j in row if j >= 0} for row in graph.predecessors]
+    return sorted((int(i), int(j)) for i, j in zip(left, right, strict=True)
+                  if i < j and j not in graph.beside[i] and i not in graph.beside[j]
+                  and j not in following[i] and i not in following[j]
+                  and not before[i] & before[j])
+
+
+def _stretch(graph: LaneGraph, i: int, j: int) -> tuple[float, float] | None:
+    """Find where lane i is within reach of lane j, as arc lengths on i."""
+    a = slice(int(graph.first[i]), int(graph.first[i] + graph.count[i]))
+    b = slice(int(graph.first[j]), int(graph.first[j] + graph.count[j]))
+    there = cKDTree(np.stack((graph.x[b], graph.y[b]), axis=-1))
+    distance, nearest = there.query(np.stack((graph.x[a], graph.y[a]), axis=-1))
+    turn = np.abs(np.angle(np.exp(1j * (graph.yaw[a] - graph.yaw[b][nearest]))))
+    close = np.flatnonzero((distance < WIDTH) & (turn < ONCOMING))
+    # Touching ends are those of consecutive ways, of which nobody gets into the other's.
+    if len(close) == 0 or (distance.min() > 0.5 * WIDTH and len(close) < 4):
+        return None
+    return float(close[0] * graph.step[i]), float(close[-1] * graph.step[i])
+
+
+def _is_fork(graph: LaneGraph, i: int, j: int, here: tuple[float, float],
+             there: tuple[float, float]) -> bool:
+    """Tell whether two lanes only part: they begin together, or one ends where other begins."""
+    starts = here[0] < 1.0 and there[0] < 1.0
+    a, b = int(graph.first[i]), int(graph.first[j])
+    same = abs(wrap_pi(float(graph.yaw[a] - graph.yaw[b]))) < 0.5
+    joined = (here[0] > graph.length[i] - 3.0 and there[1] < 3.0) or (
+        there[0] > graph.length[j] - 3.0 and here[1] < 3.0)
+    return (starts and same) or joined
+
+
+def _rank(graph: LaneGraph, lane: int) -> int:
+    """Give what signs before a lane say: 2 priority, 0 yield, 1 nothing."""
+    roads = graph.network.lanelet_network
+    current, distance, seen = lane, 0.0, {lane}
+    while True:
+        lanelet = roads.find_lanelet_by_id(graph.ids[current])
+        signs = set(lanelet.traffic_signs)
+        if lanelet.stop_line is not None:
+            signs |= lanelet.stop_line.traffic_sign_ref or set()
+        found = {element.traffic_sign_element_id.name for sign_id in sorted(signs)
+                 if (sign := roads.find_traffic_sign_by_id(sign_id)) is not None
+                 for element in sign.traffic_sign_elements}
+        if found & _YIELDING or LaneletType.ACCESS_RAMP in lanelet.lanelet_type:
+            return 0
+        if found & _PRIORITY:
+            return 2
+        before = [int(i) for i in graph.predecessors[current] if i >= 0]
+        if len(before) != 1 or distance > SIGN_REACH or before[0] in seen:
+            return 1
+        distance += float(graph.length[current]) if current != lane else 0.0
+        current = before[0]
+        seen.add(current)
+
+
+def _priority(graph: LaneGraph, rank: IntArray, i: int, j: int) -> int:
+    """Decide between two lanes: signs, then the left turn yields, then priority to the right."""
+    if rank[i] != rank[j]:
+        return 1 if rank[i] > rank[j] else -1
+    a, b = int(graph.first[i]), int(graph.first[j])
+    turn = wrap_pi(float(graph.yaw[b] - graph.yaw[a]))
+    if abs(turn) > 2.2:
+        left = [graph.turn(lane) > TURN for lane in (i, j)]
+        return 0 if left[0] == left[1] else -1 if left[0] else 1
+    if abs(turn) < 0.6:
+        bend = [abs(graph.turn(lane)) for lane in (i, j)]
+        return 0 if abs(bend[0] - bend[1]) < 0.2 else 1 if bend[0] < bend[1] else -1
+    # Who comes from the right drives to the left.
+    return -1 if turn > 0.0 else 1

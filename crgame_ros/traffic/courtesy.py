@@ -1,0 +1,113 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cooperative lane changes: who makes room, and how the short gap opens after (FS M3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CourtesyRules:
+    """
+    The courtesy of a driver towards another who wants to change into the own lane.
+
+    After Hidas (2005): the follower in the target lane slows down by Dv with the deceleration b
+    during D_t = Dv / b, so that the gap is wide enough then. How hard depends on how urgent the
+    change is and how aggressive the follower; one who would have to do more gives no courtesy.
+    The numbers are ours.
+
+    :param deceleration: hardest of a driver without aggressivity for a change without urgency
+        [m/s^2]
+    :param urgent_deceleration: the same at urgency 1 [m/s^2]
+    :param max_speed_drop: greatest Dv [m/s]
+    :param time: D_t [s]
+    """
+
+    deceleration: float = 1.0
+    urgent_deceleration: float = 2.5
+    max_speed_drop: float = 5.0
+    time: float = 4.0
+
+    def deceleration_limit(self, urgency: Array | float,
+                           aggressivity: Array | float) -> Array | float:
+        """
+        Give the hardest braking that a driver does for another.
+
+        :param urgency: (A,) of the other, 0 to 1
+        :param aggressivity: (A,) of the driver, 0 to 1; 1 does nothing
+        :return: (A,) [m/s^2]
+        """
+        eager = self.deceleration + urgency * (self.urgent_deceleration - self.deceleration)
+        return (1.0 - aggressivity) * eager
+
+    def courtesy_deceleration(self, follow_speed: Array, follow_gap: Array, speed: Array,
+                              needed_gap: Array, urgency: Array | float = 0.0,
+                              aggressivity: Array | float = 0.5,
+                              ) -> tuple[Array, NDArray[np.bool_]]:
+        """
+        Give the constant deceleration b that opens a gap within D_t.
+
+        gap(D_t) = gap - (v_f D_t - b D_t^2 / 2) + v D_t, solved for b. It holds for the follower
+        in the target lane, who lets somebody in, and for that one, who falls back behind the new
+        leader. Asked again at every decision the missing gap obeys
+        x'' + 2 x' / D_t + 2 x / D_t^2 = 0 until b is 0, and then closes at the difference of
+        speeds reached: who yields doesn't accelerate before the gap is there.
+
+        :param follow_speed: v_f, (A,) of the vehicle behind [m/s]
+        :param follow_gap: (A,) to the vehicle ahead as if both were in one lane, bumper to
+            bumper; negative while they are side by side [m]
+        :param speed: v, (A,) of the vehicle ahead [m/s]
+        :param needed_gap: (A,) from `GapAcceptance.minimum_gap` [m]
+        :param urgency: (A,) of the one who changes, 0 to 1
+        :param aggressivity: (A,) of the one who slows down, 0 to 1
+        :return: b (A,), 0 or above [m/s^2], and who yields (A,): these accelerate by -b at most,
+            the others, to whom it is too much or who leave room enough, as they like.
+        """
+        missing = needed_gap - follow_gap + (follow_speed - speed) * self.time
+        wanted = np.maximum(2.0 * missing / self.time ** 2, 0.0)
+        yields = ((wanted <= self.deceleration_limit(urgency, aggressivity))
+                  & (wanted * self.time <= np.minimum(self.max_speed_drop, follow_speed))
+                  & ((wanted > 0.0) | (follow_gap < needed_gap)))
+        return np.where(yields, wanted, 0.0), yields
+
+
+def relief_at_change(gap: Array, desired_gap: Array) -> Array:
+    """
+    Give how much shorter than usual a gap may be right after a lane change.
+
+    Hidas (2005) wants this gap opened gradually; how is ours, with Keane and Gao (2021): it fits
+    any car-following model.
+
+    A driver who agreed to a gap doesn't brake for it: without relief a controller of the gap
+    (FS 3) would, and send a wave of braking backwards. The relief is added to the gap that the
+    controller sees.
+
+    :param gap: (A,) to the new leader, bumper to bumper [m]
+    :param desired_gap: (A,) of the car-following model [m]
+    :return: (A,) [m]
+    """
+    return np.maximum(desired_gap - gap, 0.0)
+
+
+def fade_relief(relief: Array, gap: Array, desired_gap: Array, dt_s: float,
+                opening_time: float = 10.0) -> Array:
+    """
+    Let the gap open gradually to the usual one.
+
+    The relief decays with a time constant, and is never more than what is missing: once the gap
+    has opened it is gone, and a vehicle that stops keeps none.
+
+    :param relief: (A,) before [m]
+    :param gap: (A,) to the leader; inf where there is none [m]
+    :param desired_gap: (A,) of the car-following model at the present speed [m]
+    :param dt_s: time since the last call [s]
+    :param opening_time: time constant of what Laval and Leclercq (2008) call relaxation; the
+        value is ours [s]
+    :return: (A,) [m]
+    """
+    missing = np.maximum(desired_gap - gap, 0.0)
+    return np.minimum(relief * np.exp(-dt_s / opening_time), missing)

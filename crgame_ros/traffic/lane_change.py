@@ -1,0 +1,186 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Changing lanes (FS M3): the path of a change, its motives and the gaps that allow it."""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Greatest |f''| of f(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2 -+ sqrt(3) / 6.
+PEAK = 10.0 / math.sqrt(3.0)
+# Advantage below which nobody changes lanes (Kesting, Treiber and Helbing 2007: 0.1) [m/s^2].
+CHANGE_THRESHOLD = 0.2
+
+
+def look_ahead(speed: Array, shift: Array | float = 3.5, duration: float = 4.0,
+               shortest: float = 12.0, max_lateral_acceleration: float = 2.0) -> Array:
+    """
+    Give the length of a lane change, FS's empirical function of the speed.
+
+    L = max(L_min, v t, v sqrt(10 / sqrt(3) W / a_max)): drivers take about the same time at every
+    speed, and no more lateral acceleration than is comfortable.
+
+    :param speed: (A,) [m/s]
+    :param shift: W, (A,) distance between the lanes [m]
+    :param duration: t; drivers take 3 to 6 s (ours) [s]
+    :param shortest: L_min, about two and a half lengths of a car (ours) [m]
+    :param max_lateral_acceleration: comfortable (ours) [m/s^2]
+    :return: (A,) [m]
+    """
+    fastest = np.sqrt(PEAK * np.abs(shift) / max_lateral_acceleration)
+    return np.maximum(shortest, speed * np.maximum(duration, fastest))
+
+
+def quintic(offset: Array, slope: Array, curvature: Array, target: Array,
+            length: Array) -> Array:
+    """
+    Give the coefficients p_i of y = sum p_i x^i (FS 4) from now to the centre of a lane.
+
+    The six conditions are y, y', y'' at x = 0 and y = target, y' = y'' = 0 at x = L; solved in
+    u = x / L, where they do not depend on L.
+
+    :param offset: (A,) y at x = 0 [m]
+    :param slope: (A,) y'
+    :param curvature: (A,) y'' [1/m]
+    :param target: (A,) y at x = L [m]
+    :param length: (A,) L, above 0 [m]
+    :return: (A, 6) p_0 ... p_5 [m^(1 - i)]
+    """
+    rise = target - offset
+    first = slope * length
+    second = 0.5 * curvature * length ** 2
+    scaled = np.stack((offset, first, second,
+                       10.0 * rise - 6.0 * first - 3.0 * second,
+                       -15.0 * rise + 8.0 * first + 3.0 * second,
+                       6.0 * rise - 3.0 * first - second), axis=-1)
+    return scaled / length[:, None] ** np.arange(6)
+
+
+def evaluate(coefficients: Array, x: Array, length: Array) -> tuple[Array, Array, Array]:
+    """
+    Evaluate paths of lane changes.
+
+    :param coefficients: (A, 6) from `quintic`
+    :param x: (A,) or (A, P) distance since the start of the change; clipped to [0, L], so that
+        behind its end the path stays in the centre of the lane [m]
+    :param length: (A,) L [m]
+    :return: y [m], y', y'' [1/m], each of the shape of x
+    """
+    p = coefficients.T if x.ndim == 1 else coefficients.T[..., None]
+    x = np.clip(x, 0.0, length if x.ndim == 1 else length[:, None])
+    return (p[0] + x * (p[1] + x * (p[2] + x * (p[3] + x * (p[4] + x * p[5])))),
+            p[1] + x * (2.0 * p[2] + x * (3.0 * p[3] + x * (4.0 * p[4] + 5.0 * x * p[5]))),
+            2.0 * p[2] + x * (6.0 * p[3] + x * (12.0 * p[4] + 20.0 * x * p[5])))
+
+
+def peak_lateral_acceleration(shift: Array | float, speed: Array | float,
+                              length: Array | float) -> Array | float:
+    """
+    Give the greatest v^2 y'' of a change between parallel lanes: 10 / sqrt(3) W v^2 / L^2.
+
+    :param shift: W [m]
+    :param speed: v [m/s]
+    :param length: L [m]
+    :return: [m/s^2]
+    """
+    return PEAK * np.abs(shift) * np.square(speed) / np.square(length)
+
+
+@dataclass(frozen=True)
+class GapAcceptance:
+    """
+    The gaps that a driver takes, in front of and behind the own place in the target lane.
+
+    After Hidas (2005): a gap has to leave a least distance, and more of it where the vehicle
+    behind is faster; a change that is forced takes less. The headway share and the numbers are
+    ours. The limits of braking are MOBIL's safety criterion (Kesting et al. 2007).
+
+    :param standstill_gap: least gap at any speed [m]
+    :param closing_time: by which a gap grows per speed difference [s]
+    :param headway: by which a gap grows per speed of the vehicle behind, in no hurry [s]
+    :param forced_headway: the same at urgency 1 [s]
+    :param deceleration: hardest braking that a change may cause, in no hurry [m/s^2]
+    :param forced_deceleration: the same at urgency 1, b_safe of Kesting et al. [m/s^2]
+    """
+
+    standstill_gap: float = 2.0
+    closing_time: float = 0.9
+    headway: float = 0.5
+    forced_headway: float = 0.2
+    deceleration: float = 2.0
+    forced_deceleration: float = 4.0
+
+    def minimum_gap(self, behind_speed: Array, ahead_speed: Array,
+                    urgency: Array | float = 0.0) -> Array:
+        """
+        Give the least gap between two vehicles after a change.
+
+        :param behind_speed: (A,) of the one behind [m/s]
+        :param ahead_speed: (A,) of the one ahead [m/s]
+        :param urgency: (A,) 0 to 1
+        :return: (A,) bumper to bumper [m]
+        """
+        headway = self.headway + urgency * (self.forced_headway - self.headway)
+        return (self.standstill_gap + headway * behind_speed
+                + self.closing_time * np.maximum(behind_speed - ahead_speed, 0.0))
+
+    def accepts(self, speed: Array, lead_gap: Array, lead_speed: Array, follow_gap: Array,
+                follow_speed: Array, own_acceleration: Array, follow_acceleration: Array,
+                urgency: Array | float = 0.0) -> NDArray[np.bool_]:
+        """
+        Tell who may change now; all arguments are (A,).
+
+        :param speed: of the vehicle that wants to change [m/s]
+        :param lead_gap: to the vehicle that would be ahead; inf where there is none [m]
+        :param lead_speed: its speed; any value where there is none [m/s]
+        :param follow_gap: from the vehicle that would be behind; inf where there is none [m]
+        :param follow_speed: its speed; any value where there is none [m/s]
+        :param own_acceleration: answer of the car-following model to the new leader [m/s^2]
+        :param follow_acceleration: answer of the new follower's model [m/s^2]
+        :param urgency: 0 for a free change, up to 1 for a forced one
+        """
+        hardest = self.deceleration + urgency * (self.forced_deceleration - self.deceleration)
+        lead, follow = np.isposinf(lead_gap), np.isposinf(follow_gap)
+        ahead = lead | ((lead_gap >= self.minimum_gap(speed, lead_speed, urgency))
+                        & (own_acceleration >= -hardest))
+        behind = follow | ((follow_gap >= self.minimum_gap(follow_speed, speed, urgency))
+                           & (follow_acceleration >= -hardest))
+        return np.asarray(ahead & behind)
+
+
+def incentive(here: Array, there: Array, others: Array | float = 0.0,
+              politeness: float = 0.2) -> Array:
+    """
+    Give the advantage of a free change: MOBIL (Kesting, Treiber and Helbing 2007).
+
+    :param here: (A,) acceleration in the present lane, behind its slow leader [m/s^2]
+    :param there: (A,) acceleration in the target lane [m/s^2]
+    :param others: (A,) sum of the changes of acceleration of the old and the new follower [m/s^2]
+    :param politeness: their weight
+    :return: (A,) [m/s^2]; a change pays above `CHANGE_THRESHOLD`.
+    """
+    return there - here + politeness * others
+
+
+def urgency(distance: Array, speed: Array, changes: Array | float = 1.0,
+            horizon: float = 15.0, shortest: float = 100.0) -> Array:
+    """
+    Give the hurry of a change that the route asks for, growing towards the last place for it.
+
+    0 until the time horizon, then linear up to 1 where the lane change has just its length left;
+    every further lane to cross moves both back by as much (ours).
+
+    :param distance: (A,) to the last place for the change, inf where none is needed [m]
+    :param speed: (A,) [m/s]
+    :param changes: (A,) lanes to cross
+    :param horizon: time before that place at which the hurry begins [s]
+    :param shortest: distance at which it begins at least [m]
+    :return: (A,) from 0 to 1
+    """
+    last = look_ahead(speed) * changes
+    first = np.maximum(shortest, horizon * speed) * changes
+    return np.clip((first - distance) / np.maximum(first - last, 1.0), 0.0, 1.0)

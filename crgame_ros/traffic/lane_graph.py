@@ -1,0 +1,175 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The lanes of a road network as flat arrays, for many agents at once."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
+from crgame_ros.scenario.road_network import RoadNetwork
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+STEP = 0.5
+# Published maps hold successors that begin elsewhere: such a link is no way to drive on [m].
+MAX_GAP = 1.0
+# Headings of published centre lines jump from vertex to vertex; smoothed over this length [m].
+SMOOTHING = 4.0
+
+
+class LaneGraph:
+    """
+    The lanelets for cars, tabulated every half metre; a lane is a position in `ids`.
+
+    The tables of all lanes lie one behind the other: those of a lane are
+    `first[lane]:first[lane] + count[lane]`, a distance `step[lane]` apart.
+
+    :param network: the road network.
+    :param lateral_acceleration: comfortable in curves [m/s^2]
+    :param default_speed: where there is no speed limit [m/s]
+    :raises InputError: if no lanelet is for cars.
+    """
+
+    def __init__(self, network: RoadNetwork, lateral_acceleration: float = 2.0,
+                 default_speed: float = 13.9) -> None:
+        self.network = network
+        self.ids: tuple[int, ...] = tuple(i for i in network.lanelet_ids if network.is_for_cars(i))
+        if not self.ids:
+            raise InputError('no lanelet is for cars', 'scenario',
+                             'use a map with lanes, or run it without traffic')
+        self.index: dict[int, int] = {lanelet: i for i, lanelet in enumerate(self.ids)}
+        self._tabulate(network)
+        self._connect(network)
+        limits = [network.speed_limit(i) for i in self.ids]
+        self.limit: FloatArray = np.array(
+            [default_speed if limit is None else limit for limit in limits])
+        curve = np.sqrt(lateral_acceleration / np.maximum(np.abs(self.curvature), 1e-4))
+        # What a curve allows of itself; a limit is scaled by each driver's own factor.
+        self.curve_speed: FloatArray = np.maximum(curve, 2.0)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def _tabulate(self, network: RoadNetwork) -> None:
+        lines = [network.line(i) for i in self.ids]
+        self.length: FloatArray = np.array([line.length for line in lines])
+        self.count: IntArray = np.maximum(np.ceil(self.length / STEP - 1e-9), 1).astype(int) + 1
+        self.first: IntArray = np.concatenate(([0], np.cumsum(self.count)[:-1]))
+        self.step: FloatArray = self.length / (self.count - 1)
+        parts: list[FloatArray] = []
+        for i, line in enumerate(lines):
+            s = np.linspace(0.0, line.length, int(self.count[i]))
+            x, y, yaw = line.poses(s, np.zeros_like(s)).T
+            yaw = smooth(yaw, SMOOTHING / float(self.step[i]))
+            lanelet = network.lanelet_network.find_lanelet_by_id(self.ids[i])
+            across = (lanelet.left_vertices - lanelet.right_vertices)[:, :2]
+            half = 0.5 * np.interp(s, lanelet.distance, np.hypot(*across.T))
+            slope = np.gradient(yaw, s) if len(s) > 1 else np.zeros_like(s)
+            parts.append(np.stack((x, y, yaw, slope, half)))
+        self.x, self.y, self.yaw, self.curvature, self.half_width = np.concatenate(parts, axis=1)
+        self.cos, self.sin = np.cos(self.yaw), np.sin(self.yaw)
+
+    def _connect(self, network: RoadNetwork) -> None:
+        lanelets = [network.lanelet_network.find_lanelet_by_id(i) for i in self.ids]
+        following = [[self.index[j] for j in sorted(set(x.successor)) if j in self.index]
+                     for x in lanelets]
+        following = [[j for j in row if self._joined(i, j)] for i, row in enumerate(following)]
+        before: list[list[int]] = [[] for _ in self.ids]
+        for i, row in enumerate(following):
+            for j in row:
+                before[j].append(i)
+        self.successors = padded(following)
+        self.predecessors = padded(before)
+        left = [network.left_of(i) for i in self.ids]
+        right = [network.right_of(i) for i in self.ids]
+        self.left: IntArray = np.array([-1 if i is None else self.index.get(i, -1) for i in left])
+        self.right: IntArray = np.array(
+            [-1 if i is None else self.index.get(i, -1) for i in right])
+        # Neighbours of either direction share a border and no way.
+        self.beside: list[set[int]] = [
+            {self.index[j] for j in (x.adj_left, x.adj_right) if j in self.index}
+            for x in lanelets]
+
+    def _joined(self, lane: int, follower: int) -> bool:
+        """Tell whether a lane goes on in another without a jump or a turn on the spot."""
+        end, start = int(self.first[lane] + self.count[lane] - 1), int(self.first[follower])
+        gap = np.hypot(self.x[start] - self.x[end], self.y[start] - self.y[end])
+        turn = abs(wrap_pi(float(self.yaw[start] - self.yaw[end])))
+        return lane != follower and bool(gap <= MAX_GAP) and turn < 1.2
+
+    def rows(self, lane: IntArray, s: FloatArray) -> IntArray:
+        """Give the table row nearest to arc length s (N) of lanes (N)."""
+        row = np.rint(s / self.step[lane]).astype(np.int64)
+        return np.asarray(self.first[lane] + np.clip(row, 0, self.count[lane] - 1))
+
+    def segments(self, lane: IntArray, s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Give the table row at or before s (N), and the share of the step beyond it."""
+        share = s / self.step[lane]
+        row = np.clip(share.astype(np.int64), 0, self.count[lane] - 2)
+        return self.first[lane] + row, share - row
+
+    def poses(self, lane: IntArray, s: FloatArray, d: FloatArray) -> FloatArray:
+        """Give the poses (N, 3) at arc length s and offset d to the left; straight beyond."""
+        row, share = self.segments(lane, s)
+        inside = np.clip(share, 0.0, 1.0)
+        yaw = self.yaw[row] + inside * (self.yaw[row + 1] - self.yaw[row])
+        x = self.x[row] + share * (self.x[row + 1] - self.x[row]) - d * np.sin(yaw)
+        y = self.y[row] + share * (self.y[row + 1] - self.y[row]) + d * np.cos(yaw)
+        return np.stack((x, y, yaw), axis=-1)
+
+    def project(self, lane: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray,
+                rounds: int = 3) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """
+        Find positions (N) in the coordinates of lanes (N), near arc lengths that are guessed.
+
+        :return: s [m], d [m] and the lane's heading there [rad]
+        """
+        s = guess
+        for number in range(rounds):
+            pose = self.poses(lane, s, np.zeros_like(s))
+            cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+            along = (x - pose[:, 0]) * cos + (y - pose[:, 1]) * sin
+            if number < rounds - 1:
+                s = s + along
+        d = (y - pose[:, 1]) * cos - (x - pose[:, 0]) * sin
+        return s + along, d, pose[:, 2]
+
+    def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Find points (N) in the coordinates of one lane, wherever on it; s, d [m]."""
+        rows = slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))
+        away = (x[:, None] - self.x[None, rows]) ** 2 + (y[:, None] - self.y[None, rows]) ** 2
+        guess = np.argmin(away, axis=1) * self.step[lane]
+        s, d, _ = self.project(np.full(len(x), lane), x, y, guess)
+        return s, d
+
+    def turn(self, lane: int) -> float:
+        """Give the angle by which a lane turns, positive to the left [rad]."""
+        first = int(self.first[lane])
+        return float(self.yaw[first + int(self.count[lane]) - 1] - self.yaw[first])
+
+
+def smooth(values: FloatArray, width: float) -> FloatArray:
+    """Average values over a number of samples around each, fewer at the ends."""
+    half = int(0.5 * width)
+    if half < 1 or len(values) < 3:
+        return values
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    index = np.arange(len(values))
+    reach = np.minimum(half, np.minimum(index, len(values) - 1 - index))
+    return np.asarray((total[index + reach + 1] - total[index - reach]) / (2 * reach + 1))
+
+
+def padded(rows: list[list[int]]) -> IntArray:
+    """Put lists of different length into one array, filled up with -1."""
+    width = max(1, max((len(row) for row in rows), default=1))
+    result = np.full((len(rows), width), -1, dtype=np.int64)
+    for i, row in enumerate(rows):
+        result[i, :len(row)] = row
+    return result
+
+
+def heading_difference(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Give the angle from b to a in (-pi, pi] [rad]."""
+    return np.asarray(wrap_pi_array(a - b), dtype=np.float64)

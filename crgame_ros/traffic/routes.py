@@ -1,0 +1,150 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where agents can go, and which lane leads there."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+
+# A lane change counts as this detour [m], more where the lane is shorter than it wants to be.
+CHANGE_COST = 20.0
+CHANGE_LENGTH = 40.0
+# Staying in a lane that reaches the destination by a longer way is fine up to this [m].
+DETOUR = 100.0
+MAX_LOOP_DESTINATIONS = 16
+
+
+class Routes:
+    """
+    The ways to every destination, as tables over destinations (D) and lanes (L).
+
+    A destination is where a road leaves the map, all its parallel lanes together; in a net that
+    leaves nowhere, single lanes are.
+
+    :param graph: the lanes.
+    :param costly: (L) what driving along a lane costs besides its length [m]
+    """
+
+    def __init__(self, graph: LaneGraph, costly: FloatArray | None = None) -> None:
+        self._graph = graph
+        self._length = graph.length if costly is None else graph.length + costly
+        lanes = np.arange(len(graph))
+        stay, change = _edges(graph, self._length)
+        self.onward = _straightest(graph)
+        ends = graph.successors[:, 0] < 0
+        side = [[j for j in (graph.left[i], graph.right[i]) if j >= 0] for i in lanes]
+        # A lane that ends beside one that goes on: whoever is on it has to merge.
+        self.drops: NDArray[np.bool_] = ends & np.array(
+            [_goes_on(graph, int(i), ends) for i in lanes])
+        self.is_exit: NDArray[np.bool_] = ends & ~self.drops
+        links = [(i, j) for i in lanes[self.is_exit] for j in side[i] if self.is_exit[j]]
+        pair = np.array(links, dtype=np.int64).reshape(-1, 2).T
+        group = connected_components(csr_matrix(
+            (np.ones(pair.shape[1]), (pair[0], pair[1])), shape=stay.shape), directed=False)[1]
+        self.groups: list[IntArray] = [lanes[self.is_exit & (group == g)]
+                                       for g in np.unique(group[self.is_exit])]
+        both = (stay + change).tocsr().T.tocsr()
+        costs = [_cost(both, members) for members in self.groups]
+        reached = np.isfinite(costs).any(axis=0) if costs else np.zeros(len(graph), dtype=bool)
+        while not reached.all() and len(self.groups) < len(costs) + MAX_LOOP_DESTINATIONS:
+            self.groups.append(lanes[~reached][:1])
+            costs.append(_cost(both, self.groups[-1]))
+            reached |= np.isfinite(costs[-1])
+        self.cost: FloatArray = np.array(costs)
+        self._choose()
+
+    def __len__(self) -> int:
+        return len(self.groups)
+
+    def _choose(self) -> None:
+        """Tabulate the best successor, and where the lane has to be left for another."""
+        graph, count = self._graph, len(self.groups)
+        rows = np.arange(count)[:, None]
+        succ = graph.successors
+        onward = np.where(succ >= 0, self.cost[:, np.maximum(succ, 0)], np.inf)
+        best = np.argmin(onward, axis=2)
+        cost = np.take_along_axis(onward, best[:, :, None], axis=2)[:, :, 0]
+        chosen = succ[np.arange(len(graph))[None, :], best]
+        self.next: IntArray = np.where(np.isfinite(cost), chosen, self.onward[None, :])
+        stay = np.where(self.cost <= 0.0, 0.0, self._length[None, :] + cost)
+        aside = np.stack([np.where(
+            side >= 0, self.cost[:, np.maximum(side, 0)] + CHANGE_COST, np.inf)
+            for side in (graph.left, graph.right)])
+        better = np.min(aside, axis=0) + DETOUR < stay
+        # 1: to the left, -1: to the right, 0: this lane leads there.
+        self.change: IntArray = np.where(better, np.where(aside[0] <= aside[1], 1, -1), 0)
+        self.remaining: FloatArray = np.repeat(graph.length[None, :], count, axis=0)
+        for _ in range(8):
+            following = np.maximum(self.next, 0)
+            further = (self.next >= 0) & (self.change[rows, following] == self.change) & (
+                self.change != 0)
+            self.remaining = graph.length[None, :] + np.where(
+                further, self.remaining[rows, following], 0.0)
+            self.remaining = np.minimum(self.remaining, 1000.0)
+
+    def reachable(self, lane: int) -> IntArray:
+        """List the destinations that a lane leads to."""
+        return np.flatnonzero(np.isfinite(self.cost[:, lane]))
+
+    def draw(self, lane: int, generator: np.random.Generator) -> int:
+        """Draw one of the destinations that a lane leads to, each as likely."""
+        choice = self.reachable(lane)
+        return int(choice[generator.integers(len(choice))]) if len(choice) else 0
+
+    def towards(self, lane: int, target: int) -> int | None:
+        """Find a destination behind a lane that the way from another leads through, if any."""
+        for destination in np.argsort(self.cost[:, target], kind='stable'):
+            if not np.isfinite(self.cost[destination, [lane, target]]).all():
+                continue
+            current = lane
+            for _ in range(len(self._graph)):
+                if current == target or target in (
+                        self._graph.left[current], self._graph.right[current]):
+                    return int(destination)
+                current = int(self.next[destination, current])
+                if current < 0:
+                    break
+        return None
+
+
+def _edges(graph: LaneGraph, length: FloatArray) -> tuple[csr_matrix, csr_matrix]:
+    """Give the costs of going on and of changing lanes, (L, L) each."""
+    shape = (len(graph), len(graph))
+    lane, column = np.nonzero(graph.successors >= 0)
+    stay = csr_matrix((np.maximum(length[lane], 0.1),
+                       (lane, graph.successors[lane, column])), shape=shape)
+    change = csr_matrix(shape)
+    squeeze = CHANGE_COST * np.maximum(1.0, CHANGE_LENGTH / np.maximum(graph.length, 1.0))
+    for side in (graph.left, graph.right):
+        has = np.flatnonzero(side >= 0)
+        change = change + csr_matrix((squeeze[has], (has, side[has])), shape=shape)
+    return stay, change
+
+
+def _cost(reverse: csr_matrix, members: IntArray) -> FloatArray:
+    """Give the cost from each lane to the nearest of some lanes."""
+    return np.asarray(dijkstra(reverse, indices=members, min_only=True), dtype=np.float64)
+
+
+def _straightest(graph: LaneGraph) -> IntArray:
+    result = np.full(len(graph), -1, dtype=np.int64)
+    for lane in range(len(graph)):
+        following = [int(i) for i in graph.successors[lane] if i >= 0]
+        if following:
+            result[lane] = min(following, key=lambda i: (abs(graph.turn(i)), i))
+    return result
+
+
+def _goes_on(graph: LaneGraph, lane: int, ends: NDArray[np.bool_]) -> bool:
+    """Tell whether a lane beside this one goes on."""
+    for side in (graph.left, graph.right):
+        current, seen = int(side[lane]), {lane}
+        while current >= 0 and current not in seen:
+            if not ends[current]:
+                return True
+            seen.add(current)
+            current = int(side[current])
+    return False

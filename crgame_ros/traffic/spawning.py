@@ -1,0 +1,255 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How agents come onto the road: placed at random, arriving at its edges, or from a recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.conflicts import Conflicts
+from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
+from crgame_ros.traffic.longitudinal import Longitudinal
+from crgame_ros.traffic.placement import Bodies
+from crgame_ros.traffic.routes import Routes
+
+ADOPTED_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'taxi',
+                           'priorityVehicle'})
+# Whoever covers less than this in the whole recording is parked [m].
+PARKED = 2.0
+# Who points elsewhere than its lane by more than this does not drive on it [rad].
+ASTRAY = 0.8
+CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
+TRIES = 40
+# Between agents at the start, besides s0 [m] and at their speeds [s].
+START_GAP = 3.0
+START_TIME = 1.2
+SIDE_GAP = 0.6
+LANE = 3.5
+# With which a newcomer could stop before what lies ahead [m/s^2].
+EASY = 1.5
+
+
+@dataclass(frozen=True)
+class Adopted:
+    """
+    A recorded obstacle that is to become an agent.
+
+    :param description: of the obstacle.
+    :param first_k: scenario time step of its first pose.
+    :param poses: (n, 3) of its centre at each time step from there on [m, rad]
+    :param velocities: (n, 3) [m/s, rad/s]
+    """
+
+    description: ObjectDescription
+    first_k: int
+    poses: FloatArray
+    velocities: FloatArray
+
+
+def adoptable(description: ObjectDescription, poses: FloatArray, network: RoadNetwork) -> bool:
+    """
+    Tell whether a recorded obstacle can become an agent.
+
+    Vehicles and cyclists that move and at some time drive along a lane for cars can;
+    pedestrians, parked and static ones cannot.
+
+    :param poses: (n, 3) of its centre over the recording; NaN where absent [m, rad]
+    """
+    poses = poses[np.isfinite(poses).all(axis=1)]
+    if description.role is not Role.RECORDED or description.type not in ADOPTED_TYPES:
+        return False
+    if len(poses) < 2 or np.hypot(*np.ptp(poses[:, :2], axis=0)) < PARKED:
+        return False
+    lanes = network.lanelets_at(poses)
+    return any(_fits(network, int(lane), pose) for lane, pose in
+               zip(lanes, poses, strict=True) if lane >= 0)
+
+
+def _fits(network: RoadNetwork, lane: int, pose: FloatArray) -> bool:
+    lanelet = network.lanelet_ids[lane]
+    if not network.is_for_cars(lanelet):
+        return False
+    s, _ = network.locate(lanelet, float(pose[0]), float(pose[1]))
+    yaw = network.pose_on(lanelet, s)[2]
+    return bool(abs(heading_difference(pose[2:3], np.array([yaw]))[0]) < ASTRAY)
+
+
+def slot_descriptions(count: int, truck_share: float,
+                      generator: np.random.Generator) -> list[ObjectDescription]:
+    """Describe agents t0, t1, … of no recording: cars, and a share of trucks."""
+    trucks = generator.random(count) < truck_share
+    return [ObjectDescription(f't{i}', 'truck' if truck else 'car', Role.TRAFFIC,
+                              TRUCK if truck else CAR) for i, truck in enumerate(trucks)]
+
+
+class Spawner:
+    """
+    Puts agents on the road.
+
+    :param graph: the lanes.
+    :param routes: where agents go.
+    :param conflicts: nobody is placed inside a junction.
+    :param speeds: that are allowed somewhere.
+    :param adopted: recorded obstacles; they have the first slots.
+    :param flow: arrivals at each lane that begins at the edge of the map [1/h]
+    :param speed_factor: mean of desired speed over speed limit; `speed_spread` its deviation.
+    :param time_step_s: Delta t_c [s]
+    :param generator: of random numbers.
+    """
+
+    def __init__(self, graph: LaneGraph, routes: Routes, conflicts: Conflicts,
+                 speeds: Longitudinal, adopted: Sequence[Adopted], flow: float,
+                 speed_factor: float, speed_spread: float, time_step_s: float,
+                 generator: np.random.Generator) -> None:
+        self._graph, self._routes, self._conflicts = graph, routes, conflicts
+        self._speeds = speeds
+        self._adopted = tuple(adopted)
+        self._waiting = list(range(len(adopted)))
+        self._factor, self._spread = speed_factor, speed_spread
+        self._random = generator
+        self._time_step_s = time_step_s
+        begins = (graph.predecessors[:, 0] < 0) & (graph.length > 10.0) & ~routes.drops
+        self.entries: IntArray = np.flatnonzero(begins) if flow > 0.0 else np.zeros(0, int)
+        self._mean_s = 3600.0 / flow if flow > 0.0 else np.inf
+        self._due = self._random.exponential(self._mean_s, len(self.entries)) if flow > 0.0 \
+            else np.zeros(0)
+
+    def place_at_random(self, agents: Agents, count: int, others: Bodies) -> None:
+        """Place agents anywhere on the road, with gaps; fewer where it is full."""
+        graph, k0 = self._graph, -2**62
+        usable = np.flatnonzero((self._conflicts.count == 0) & (graph.length > 12.0))
+        if not len(usable):
+            return
+        weight = graph.length[usable] / graph.length[usable].sum()
+        slots = self._free(agents, k0)[:count]
+        for slot in slots.tolist():
+            self._character(agents, slot)
+            for _ in range(TRIES):
+                lane = int(usable[np.searchsorted(np.cumsum(weight), self._random.random(),
+                                                  side='right').clip(0, len(usable) - 1)])
+                half = 0.5 * float(agents.length[slot]) + 1.0
+                if graph.length[lane] < 2.0 * half:
+                    continue
+                s = self._random.uniform(half, float(graph.length[lane]) - half)
+                speed = self._speed(lane, s, float(agents.factor[slot]))
+                if self._try(agents, slot, lane, s, speed, others):
+                    break
+
+    def arrive(self, k: int, agents: Agents, others: Bodies) -> None:
+        """Let agents in at the edges of the map, as soon as there is room."""
+        self._due -= self._time_step_s
+        for number in np.flatnonzero(self._due <= 0.0).tolist():
+            free = self._free(agents, k)
+            if not len(free):
+                return
+            slot, lane = int(free[0]), int(self.entries[number])
+            self._character(agents, slot)
+            s = 0.5 * float(agents.length[slot])
+            wanted = self._speed(lane, s, float(agents.factor[slot]))
+            for share in (1.0, 0.6, 0.3):
+                if self._try(agents, slot, lane, s, share * wanted, others):
+                    self._due[number] += self._random.exponential(self._mean_s)
+                    break
+
+    def adopt(self, k: int, agents: Agents, others: Bodies) -> None:
+        """Let recorded obstacles appear where they are recorded at k, if the place is free."""
+        for slot in list(self._waiting):
+            found = self._adopted[slot]
+            row = k - found.first_k
+            if row < 0:
+                continue
+            if row >= len(found.poses):
+                self._waiting.remove(slot)
+            elif self._appear(k, agents, slot, found, row, others):
+                self._waiting.remove(slot)
+
+    def _appear(self, k: int, agents: Agents, slot: int, found: Adopted, row: int,
+                others: Bodies) -> bool:
+        graph, pose = self._graph, found.poses[row]
+        lane = self._lane_at(pose)
+        if lane is None:
+            return False
+        s, d = graph.nearest(lane, pose[:1], pose[1:2])
+        velocity = found.velocities[row]
+        speed = float(np.hypot(velocity[0], velocity[1]))
+        if not _is_free(pose, speed, agents.length[slot], agents.width[slot], agents, others,
+                        close=True):
+            return False
+        recorded = np.hypot(found.velocities[:, 0], found.velocities[:, 1])
+        fastest = float(np.nanmax(recorded)) / float(graph.limit[lane])
+        self._character(agents, slot)
+        agents.factor[slot] = np.clip(fastest, 0.5, 1.5)
+        agents.put(slot, lane, float(s[0]), float(d[0]), (pose[0], pose[1], pose[2]), speed)
+        goal = self._lane_at(found.poses[-1])
+        towards = None if goal is None else self._routes.towards(lane, goal)
+        agents.destination[slot] = (self._routes.draw(lane, self._random) if towards is None
+                                    else towards)
+        return True
+
+    def _lane_at(self, pose: FloatArray) -> int | None:
+        found = int(self._graph.network.lanelets_at(pose[None, :])[0])
+        if found < 0 or not _fits(self._graph.network, found, pose):
+            return None
+        return self._graph.index.get(self._graph.network.lanelet_ids[found])
+
+    def _free(self, agents: Agents, k: int) -> IntArray:
+        """List the slots that may be taken, without those of recorded obstacles."""
+        slots = np.flatnonzero(~agents.active & ((agents.free_at <= k) | (k == -2**62)))
+        return slots[slots >= len(self._adopted)]
+
+    def _character(self, agents: Agents, slot: int) -> None:
+        deviation = float(np.clip(self._random.standard_normal(), -2.0, 2.0))
+        agents.factor[slot] = max(0.1, self._factor * (1.0 + self._spread * deviation))
+        agents.aggressivity[slot] = self._random.random()
+
+    def _speed(self, lane: int, s: float, factor: float) -> float:
+        """Give the speed at which a newcomer drives: it could still stop before a junction."""
+        graph = self._graph
+        speed = self._speeds.allowed(lane, s, factor)
+        onto = graph.successors[lane]
+        ends = self._routes.drops[lane] or (self._conflicts.count[onto[onto >= 0]] > 0).any()
+        rest = max(float(graph.length[lane]) - s - 5.0, 0.0)
+        return min(speed, float(np.sqrt(2.0 * EASY * rest))) if ends else speed
+
+    def _try(self, agents: Agents, slot: int, lane: int, s: float, speed: float,
+             others: Bodies) -> bool:
+        x, y, yaw = self._graph.poses(np.array([lane]), np.array([s]), np.zeros(1))[0]
+        if not _is_free(np.array((x, y, yaw)), speed, agents.length[slot], agents.width[slot],
+                        agents, others):
+            return False
+        agents.put(slot, lane, s, 0.0, (float(x), float(y), float(yaw)), speed)
+        agents.destination[slot] = self._routes.draw(lane, self._random)
+        return True
+
+
+def _is_free(pose: FloatArray, speed: float, length: float, width: float, agents: Agents,
+             others: Bodies, close: bool = False) -> bool:
+    """
+    Tell whether a place is free, with a gap to the front and the rear.
+
+    :param close: whether touching nobody is enough.
+    """
+    here = np.flatnonzero(agents.active)
+    poses = np.concatenate((agents.centers()[here], others.poses))
+    if not len(poses):
+        return True
+    lengths = np.concatenate((agents.length[here], others.length))
+    widths = np.concatenate((agents.width[here], others.width))
+    speeds = np.concatenate((agents.speed[here], np.hypot(*others.velocities[:, :2].T)))
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    east, north = poses[:, 0] - pose[0], poses[:, 1] - pose[1]
+    along, aside = np.abs(east * cos + north * sin), np.abs(north * cos - east * sin)
+    turn = poses[:, 2] - pose[2]
+    long = 0.5 * (length + lengths * np.abs(np.cos(turn)) + widths * np.abs(np.sin(turn)))
+    wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
+    # Who is changing lanes takes both.
+    wide += np.concatenate((np.where(agents.source[here] != NOBODY, LANE, 0.0),
+                            np.zeros(len(others.length))))
+    gap = 0.5 if close else START_GAP + START_TIME * np.maximum(speeds, speed)
+    side = 0.2 if close else SIDE_GAP
+    return bool(((along > long + gap) | (aside > wide + side)).all())

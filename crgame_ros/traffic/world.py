@@ -1,0 +1,101 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What agents see: everybody and everything that is no agent."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.lane_graph import FloatArray
+from crgame_ros.traffic.placement import Bodies, VEHICLE_TIME, WALKER_TIME
+
+VEHICLES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'priorityVehicle', 'taxi',
+                      'train', 'unknown'})
+PARKED = frozenset({'parkedVehicle', 'constructionZone', 'roadBoundary', 'building', 'pillar',
+                    'median_strip'})
+# Longer bodies are looked at in pieces: a lane may bend along them [m].
+PIECE = 6.0
+# Others that have stood this long are swerved around [s].
+STANDING_TIME = 10.0
+STANDING_SPEED = 0.1
+
+
+@dataclass(frozen=True)
+class WorldView:
+    """
+    The world at one scenario time step, without the agents.
+
+    :param k: scenario time step.
+    :param poses: (O, 3) centres x [m], y [m], yaw [rad] in frame map; NaN where absent.
+    :param velocities: (O, 3) [m/s, m/s, rad/s]; NaN where absent.
+    :param signals: states of the traffic lights by their ids.
+    """
+
+    k: int
+    poses: FloatArray
+    velocities: FloatArray
+    signals: Mapping[int, str] = field(default_factory=dict)
+
+
+class Others:
+    """
+    The others (O) as bodies on the road.
+
+    :param descriptions: what they look like, in the order of every `WorldView`.
+    :param time_step_s: Delta t_c [s]
+
+    Attribute `drives` (O): which are vehicles that go where lanes lead.
+    """
+
+    def __init__(self, descriptions: Sequence[ObjectDescription], time_step_s: float) -> None:
+        self._descriptions = tuple(descriptions)
+        self.drives: NDArray[np.bool_] = np.array(
+            [x.role is not Role.STATIC and x.type in VEHICLES for x in descriptions], dtype=bool)
+        self._parked = np.array([x.role is Role.STATIC or x.type in PARKED
+                                 for x in descriptions], dtype=bool)
+        self._still = np.zeros(len(self._descriptions), dtype=np.int64)
+        self._long_enough = round(STANDING_TIME / time_step_s)
+        of, shift, length = [], [], []
+        for number, x in enumerate(descriptions):
+            pieces = max(1, int(np.ceil(x.shape.length / PIECE)))
+            size = x.shape.length / pieces
+            for i in range(pieces):
+                of.append(number)
+                shift.append((i - 0.5 * (pieces - 1)) * size)
+                length.append(size)
+        self._of = np.array(of, dtype=np.int64)
+        self._shift, self._length = np.array(shift, dtype=float), np.array(length, dtype=float)
+        self._width = np.array([descriptions[i].shape.width for i in of], dtype=float)
+        self._time = np.where(self.drives, VEHICLE_TIME, WALKER_TIME)[self._of] if of else \
+            np.zeros(0)
+
+    def bodies(self, world: WorldView) -> Bodies:
+        """Give the pieces of all who are there."""
+        present = np.isfinite(world.poses[self._of]).all(axis=1) & np.isfinite(
+            world.velocities[self._of]).all(axis=1)
+        piece = np.flatnonzero(present)
+        of = self._of[piece]
+        poses = world.poses[of].copy()
+        poses[:, 0] += self._shift[piece] * np.cos(poses[:, 2])
+        poses[:, 1] += self._shift[piece] * np.sin(poses[:, 2])
+        return Bodies(poses, world.velocities[of], self._length[piece], self._width[piece],
+                      -1 - of, self._time[piece], np.full(len(of), NOBODY))
+
+    def standing(self, world: WorldView) -> NDArray[np.bool_]:
+        """Tell which others (O) are there and stand for good, as far as one can tell."""
+        speed = np.hypot(world.velocities[:, 0], world.velocities[:, 1])
+        still = speed < STANDING_SPEED
+        self._still = np.where(still, self._still + 1, 0)
+        return np.asarray(still & (self._parked | (self._still > self._long_enough)))
+
+
+def agent_bodies(agents: Agents) -> Bodies:
+    """Give the bodies of the agents on the road; those changing lanes claim the new one."""
+    slots = np.flatnonzero(agents.active)
+    claim = np.where(agents.source[slots] != NOBODY, agents.lane[slots], NOBODY)
+    return Bodies(agents.centers()[slots], agents.velocities()[slots], agents.length[slots],
+                  agents.width[slots], slots, np.zeros(len(slots)), claim)

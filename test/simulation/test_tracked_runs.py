@@ -1,0 +1,177 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whole offline runs whose AV executes its plans with a controller on a vehicle (FS II-C)."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+import yaml
+
+from crgame_ros.driver.command import DriverCommand
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.game_file import dump_game, parse_game
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.vehicle.state import StateColumn
+
+LIMIT = 11.5
+BIAS = 0.4
+
+
+def tracked(name: str, **changes: Any) -> Setup:
+    """Load a game and change what its AV is like."""
+    values = yaml.safe_load((scenarios_directory() / f'{name}.yaml').read_text())
+    values['avs'][0].update({'execution': 'tracked'} | changes)
+    return build_setup(parse_game(values, name, scenarios_directory()))
+
+
+def errors_to(truth: OfflineResult, other: OfflineResult) -> NDArray[np.float64]:
+    """Give the distance (n + 1) of each state of an AV to another run's whole path."""
+    points = truth.states_of('av0')[:, :2]
+    path = other.states_of('av0')[:, :2]
+    return np.array([np.hypot(*(path - point).T).min() for point in points])
+
+
+@pytest.mark.parametrize('tracker', ['lqr', 'pure-pursuit'])
+@pytest.mark.parametrize('dynamics', ['dynamic-bicycle', 'ks'])
+def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str) -> None:
+    """In a winding street every plan is accepted, and the wheels stay within 0.2 m of the path."""
+    result = run_offline(tracked('parked_cars', tracker=tracker, dynamics=dynamics))
+    perfect = run_offline(tracked('parked_cars', execution='perfect'))
+    record = result.planners['av0']
+    assert record.counters.refused == record.counters.steps_without_plan == 0
+    assert record.tracking is not None and perfect.planners['av0'].tracking is None
+    assert abs(record.tracking.lateral) < 0.1 and abs(record.tracking.along) < 0.5
+    driven = np.hypot(*np.diff(result.states_of('av0')[:, :2], axis=0).T).sum()
+    assert driven > 60.0
+    assert errors_to(result, perfect).max() < 0.2
+    assert [item for item in result.violations if not item.is_valid] == []
+    # It is no perfect execution: the model's lags show.
+    assert result.state_hash != perfect.state_hash
+
+
+def test_same_inputs_same_bits() -> None:
+    """Tracker and model hold nothing that a second run would find."""
+    setup = tracked('cut_in')
+    assert run_offline(setup).state_hash == run_offline(setup).state_hash
+
+
+def test_yaw_rate_follows_the_slip() -> None:
+    """FS 2 in the run itself: the yaw rate of the states is G_s v / L tan(delta)."""
+    slip = 0.8
+    setup = tracked('parked_cars', dynamics={'name': 'dynamic-bicycle', 'slip': slip})
+    states = run_offline(setup).states_of('av0')
+    turning = np.abs(states[:, StateColumn.STEERING_ANGLE]) > 0.01
+    assert turning.sum() > 100
+    wheelbase = setup.avs[0].vehicle.wheelbase
+    expected = slip * states[:, StateColumn.SPEED] * np.tan(
+        states[:, StateColumn.STEERING_ANGLE]) / wheelbase
+    np.testing.assert_allclose(states[turning, StateColumn.YAW_RATE], expected[turning],
+                               rtol=1e-9)
+    # And the heading turns at that rate.
+    turned = wrap_pi_array(np.diff(states[:, StateColumn.YAW])) / 0.01
+    np.testing.assert_allclose(turned[turning[1:]], expected[1:][turning[1:]], atol=0.01)
+
+
+@pytest.mark.parametrize('pose', ['true', 'estimated'])
+def test_a_biased_estimate_puts_the_car_beside_the_lane(pose: str) -> None:
+    """Its planner believes to be in the middle of the lane: the car is beside it by the bias."""
+    perception = {'localisation': {
+        'position_noise': 0.001, 'yaw_noise': 1e-4, 'speed_noise': 1e-3,
+        'position_bias': [0.0, BIAS]}, 'sensors': []}
+    biased, sure = (run_offline(tracked(
+        'cut_in', tracker={'name': 'lqr', 'pose': pose}, perception=seen), duration_s=12.0)
+        for seen in (perception, perception | {'localisation': {
+            'position_noise': 0.001, 'yaw_noise': 1e-4, 'speed_noise': 1e-3}}))
+    for result, expected in ((biased, -BIAS), (sure, 0.0)):
+        assert result.planners['av0'].counters.refused == 0
+        start, end = result.states_of('av0')[[0, -1]]
+        # The road of the cut-in runs along x, the bias lies across it.
+        assert abs(np.sin(start[StateColumn.YAW])) < 1e-6
+        assert end[StateColumn.Y] - start[StateColumn.Y] == pytest.approx(expected, abs=0.05)
+
+
+def test_estimated_pose_needs_an_estimate() -> None:
+    """Nothing estimates the pose of an AV without localisation."""
+    for perception in (None, {'localisation': None}):
+        setup = tracked('cut_in', tracker={'name': 'lqr', 'pose': 'estimated'},
+                        perception=perception)
+        with pytest.raises(InputError, match='av0: tracker: "pose" is estimated, but nothing'):
+            run_offline(setup, duration_s=1.0)
+
+
+class Hands(DriverSource):
+    """A person who brakes the AV for two seconds."""
+
+    @property
+    def finished(self) -> bool:
+        """Never let go for good."""
+        return False
+
+    def drives(self, n: int) -> bool:
+        """Hold the wheel from 2 s to 4 s."""
+        return 200 <= n < 400
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Brake."""
+        return DriverCommand(0.0, 0.3, 0.0)
+
+
+def test_a_person_takes_over_and_gives_back() -> None:
+    """Without a jump at either moment, and the controller drives on from where it was left."""
+    result = run_offline(tracked('cut_in'), drivers={'av0': Hands()}, duration_s=8.0)
+    states = result.states_of('av0')
+    moved = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    np.testing.assert_allclose(moved, states[1:, StateColumn.SPEED] * 0.01, atol=0.002)
+    braked = states[400, StateColumn.SPEED]
+    assert braked < states[200, StateColumn.SPEED] - 1.0
+    assert np.abs(np.diff(states[:, StateColumn.SPEED])).max() < 0.12
+    assert result.planners['av0'].counters.refused == 0
+
+
+def test_the_human_can_have_lags_too() -> None:
+    """With FS 2 the same pedals move the human's car later; without it nothing changes."""
+    values = yaml.safe_load((scenarios_directory() / 'cut_in.yaml').read_text())
+    plain = run_offline(build_setup(parse_game(values, 'plain', scenarios_directory())))
+    values['humans'][0]['dynamics'] = {'name': 'dynamic-bicycle', 'acceleration_lag': 0.5}
+    lagging = run_offline(build_setup(parse_game(values, 'lag', scenarios_directory())))
+    speeds = [run.states_of('hv0')[:, StateColumn.SPEED] for run in (plain, lagging)]
+    assert np.abs(speeds[0] - speeds[1]).max() > 0.2
+    braking = [int(np.argmax(np.diff(speed) < -0.03)) for speed in speeds]
+    assert 0 < braking[0] < braking[1] - 10
+
+
+@pytest.mark.parametrize(('changes', 'message'), [
+    ({'tracker': 'lqrr'}, 'there is no .*"lqrr".*lqr'),
+    ({'tracker': {'name': 'lqr', 'gains': 3}}, '"gains" is unknown'),
+    ({'dynamics': {'name': 'dynamic-bicycle', 'slip': 'x'}}, '"slip" is \'x\''),
+    ({'execution': 'magic'}, '"execution" is \'magic\'.*perfect, tracked'),
+    ({'tracker': {'pose': 'guessed'}}, '"pose" is \'guessed\'.*true, estimated'),
+], ids=['tracker', 'option', 'value', 'execution', 'pose'])
+def test_wrong_models_are_refused(changes: dict[str, Any], message: str) -> None:
+    """In one line that says what there is."""
+    with pytest.raises(InputError, match=message):
+        run_offline(tracked('cut_in', **changes), duration_s=0.1)
+
+
+@pytest.fixture(scope='module')
+def everything() -> Iterator[Setup]:
+    """Load a game that says everything about its AV."""
+    yield tracked('cut_in', tracker={'name': 'pure-pursuit', 'pose': 'estimated'},
+                  dynamics={'name': 'dynamic-bicycle', 'slip': 0.9}, perception={})
+
+
+def test_the_written_game_is_the_same(everything: Setup) -> None:
+    """What a run writes beside its recording reads back as the same AV."""
+    game = everything.game
+    written = parse_game(yaml.safe_load(dump_game(game)), 'written', scenarios_directory())
+    assert game.avs is not None and written.avs is not None
+    assert [replace(av, vehicle='') for av in written.avs] \
+        == [replace(av, vehicle='') for av in game.avs]

@@ -1,0 +1,246 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The elastic band (FS M1) against its closed form and against boxes moved along it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from scipy.optimize import lsq_linear
+from shapely import affinity
+from shapely.geometry import box, Polygon
+
+from crgame_ros.errors import InputError
+from crgame_ros.traffic.elastic_band import _band, Bands, ElasticBand
+from crgame_ros.traffic.passage import Obstacles
+
+Array = NDArray[np.float64]
+S = 301
+WIDTH, LENGTH = 2.0, 5.0
+
+
+def obstacles(*rows: tuple[int, float, float, float, float]) -> Obstacles:
+    """Collect (lane, s, d, half length, half width)."""
+    columns = np.array(rows, dtype=float).reshape(-1, 5).T
+    return Obstacles(columns[0].astype(np.intp), *columns[1:])
+
+
+def one_lane(band: ElasticBand, found: Obstacles, left: float = 5.25, right: float = 1.75,
+             speed: float = 14.0) -> Bands:
+    """Relax one lane that may borrow the space of its left neighbour."""
+    return band.relax(np.full((1, S), left), np.full((1, S), right), np.array([speed]), found)
+
+
+def least_distance(bands: Bands, found: Obstacles, step: float = 1.0) -> float:
+    """Move a car's box along the reference of lane 0 and measure its distance to the boxes."""
+    others = [box(s - length, d - width, s + length, d + width)
+              for lane, s, d, length, width in zip(*found, strict=True) if lane == 0]
+    car = box(-0.5 * LENGTH, -0.5 * WIDTH, 0.5 * LENGTH, 0.5 * WIDTH)
+    grid = step * np.arange(bands.d.shape[1])
+    least = math.inf
+    for s in np.arange(0.0, grid[-1], 0.25):
+        d, slope = np.interp(s, grid, bands.d[0]), np.interp(s, grid, bands.slope[0])
+        turned: Polygon = affinity.translate(
+            affinity.rotate(car, math.atan(slope), origin=(0.0, 0.0), use_radians=True), s, d)
+        least = min(least, *(turned.distance(other) for other in others))
+    return least
+
+
+def test_one_narrow_obstacle_has_the_closed_form() -> None:
+    """D (1 + x / m) exp(-x / m), with the curvature -D / m^2 at the obstacle."""
+    band = ElasticBand(step=0.25, half_length=1e-3)
+    found = obstacles((0, 150.0, 0.0, 1e-3, 0.5))
+    bands = band.relax(np.full((1, 1201), 6.0), np.full((1, 1201), 0.5), np.array([10.0]), found)
+    offset, m = 2.0, 12.0
+    x = np.abs(0.25 * np.arange(1201) - 150.0)
+    expected = offset * (1.0 + x / m) * np.exp(-x / m)
+    np.testing.assert_allclose(bands.d[0], expected, atol=0.015 * offset)
+    assert bands.d.max() == pytest.approx(offset, abs=2e-3)
+    assert bands.curvature.min() == pytest.approx(-offset / m ** 2, rel=0.03)
+    inflection = offset / m ** 2 * math.exp(-2.0)
+    assert bands.curvature.max() == pytest.approx(inflection, rel=0.03)
+
+
+def test_lanes_without_anything_in_the_way_are_exactly_straight() -> None:
+    """An obstacle beside the lane, and none at all."""
+    band = ElasticBand()
+    beside = obstacles((0, 100.0, -2.6, 2.5, 1.0), (1, 100.0, 4.0, 2.5, 1.0))
+    for found in (obstacles(), beside):
+        bands = band.relax(np.full((3, S), 5.25), np.full((3, S), 1.75), np.full(3, 14.0), found)
+        for values in (bands.d, bands.slope, bands.curvature):
+            assert (values == 0.0).all()
+        assert len(bands.blocked_lane) == 0
+        assert (bands.blocked_from() == math.inf).all()
+
+
+@pytest.mark.parametrize('found', [
+    obstacles((0, 150.0, 0.0, 2.25, 0.9)),
+    obstacles((0, 150.0, -1.4, 2.25, 0.9)),
+    obstacles((0, 150.0, -0.8, 12.0, 0.6)),
+    obstacles((0, 120.0, -1.2, 2.0, 0.8), (0, 150.0, -1.6, 6.0, 1.0), (0, 190.0, -1.0, 1.0, 0.4)),
+    obstacles((0, 120.0, -1.0, 1.0, 0.8), (0, 165.0, 4.4, 1.0, 1.2)),
+    obstacles((0, 120.0, -1.0, 1.0, 0.8), (0, 200.0, 2.0, 1.0, 1.2)),
+], ids=['middle', 'edge', 'long', 'row', 'narrows', 'slalom'])
+@pytest.mark.parametrize('speed', [5.0, 14.0, 25.0])
+def test_the_clearance_is_kept(found: Obstacles, speed: float) -> None:
+    """Measured with boxes moved along the reference, not with its own constraints."""
+    bands = one_lane(ElasticBand(), found, speed=speed)
+    assert len(bands.blocked_s) == 0
+    assert np.abs(bands.d).max() > 0.3
+    assert least_distance(bands, found) >= 0.49
+    # It stays in the space it may use, and on the centre line where nothing is near.
+    assert bands.d.max() <= 5.25 - 0.5 * WIDTH + 0.02
+    assert bands.d.min() >= -(1.75 - 0.5 * WIDTH) - 0.02
+    if speed == 5.0:
+        assert np.abs(bands.d[0, :60]).max() < 0.02
+        assert np.abs(bands.d[0, 250:]).max() < 0.02
+
+
+def test_swerves_are_comfortable_at_the_speed_of_the_lane() -> None:
+    """The greatest curvature is about D / (t v)^2: the lateral acceleration D / t^2 at v."""
+    for speed in (5.0, 10.0, 20.0, 30.0):
+        bands = one_lane(ElasticBand(), obstacles((0, 150.0, 0.0, 2.25, 0.9)), speed=speed)
+        assert np.abs(bands.curvature).max() * speed ** 2 <= 1.1 * 2.4 / 1.2 ** 2
+        np.testing.assert_allclose(
+            bands.slope[0, 1:-1], (bands.d[0, 2:] - bands.d[0, :-2]) / 2.0, atol=1e-12)
+        # Summed up twice the curvature is the offset again.
+        again = np.cumsum(np.cumsum(bands.curvature[0])) + bands.d[0, 0] * np.arange(2, S + 2)
+        np.testing.assert_allclose(again[:-1], bands.d[0, 1:], atol=1e-9)
+
+
+def test_a_lane_without_room_is_blocked_at_the_near_edge() -> None:
+    """Of four lanes one is blocked; behind the blockage a second obstacle is still avoided."""
+    band = ElasticBand()
+    found = obstacles((1, 100.0, 0.2, 2.5, 1.0), (3, 100.0, 0.0, 2.5, 1.0),
+                      (1, 220.0, -1.4, 2.5, 0.8))
+    left = np.full((4, S), 1.75)
+    left[3] = 5.25
+    bands = band.relax(left, np.full((4, S), 1.75), np.full(4, 14.0), found)
+    np.testing.assert_array_equal(bands.blocked_lane, [1])
+    np.testing.assert_array_equal(bands.blocked_s, [97.5])
+    np.testing.assert_array_equal(bands.blocked_from(), [np.inf, 97.5, np.inf, np.inf])
+    assert np.abs(bands.d[1, 90:110]).max() < 0.2
+    assert bands.d[1, 220] >= 0.7
+    assert (bands.d[[0, 2]] == 0.0).all()
+    assert bands.d[3].max() > 2.4
+
+
+def test_less_than_the_wanted_clearance_is_taken_before_the_lane_is_blocked() -> None:
+    """Room for 0.3 m: passed with 0.3 m; room for 0.1 m: blocked; unless 0.5 m is a must."""
+    for room, blocked in ((0.3, False), (0.1, True)):
+        # Between the right edge of the way at 2 m and an obstacle that begins at 2 - 2 - room.
+        found = obstacles((0, 150.0, -0.5 - room, 2.5, 0.5))
+        bands = one_lane(ElasticBand(), found, left=2.0, right=1.75)
+        assert (len(bands.blocked_s) == 1) == blocked
+        if not blocked:
+            assert least_distance(bands, found) == pytest.approx(room, abs=0.01)
+    strict = ElasticBand(min_clearance=0.5)
+    assert one_lane(strict, obstacles((0, 150.0, -0.8, 2.5, 0.5)), left=2.0).blocked_s == [147.5]
+
+
+@pytest.mark.parametrize(('d', 'left', 'right', 'side'), [
+    (0.3, 5.0, 5.0, -1.0), (-0.3, 5.0, 5.0, 1.0), (0.0, 5.0, 5.0, 1.0), (0.0, 4.0, 5.0, -1.0),
+    (0.0, 5.0, 4.0, 1.0), (1.6, 9.0, 1.75, -1.0)])
+def test_the_nearer_side_is_taken_then_the_one_with_more_room(d: float, left: float,
+                                                             right: float, side: float) -> None:
+    """A tie of both goes to the left."""
+    bands = one_lane(ElasticBand(), obstacles((0, 150.0, d, 2.0, 0.5)), left=left, right=right)
+    assert np.sign(bands.d[0, 150]) == side
+    # The band bulges a little between the points where it touches.
+    assert abs(bands.d[0, 150]) == pytest.approx(0.5 + 1.5 - abs(d), abs=0.06)
+
+
+def test_the_band_has_the_least_energy() -> None:
+    """Let scipy solve the bounded least squares min |d - m^2 d''| with low <= d <= high."""
+    rng = np.random.default_rng(7)
+    n = 160
+    for _ in range(12):
+        stiffness = float(rng.uniform(16.0, 600.0))
+        low, high = np.full(n, -0.75), np.full(n, 4.25)
+        for first in rng.integers(40, 110, 3):
+            part = slice(int(first), int(first + rng.integers(4, 16)))
+            edge = rng.uniform(0.2, 2.5)
+            low[part] = np.maximum(low[part], edge)
+        bend = np.zeros((n + 2, n))
+        for i in range(n):
+            bend[i:i + 3, i] = (-stiffness, 1.0 + 2.0 * stiffness, -stiffness)
+        exact = lsq_linear(bend, np.zeros(n + 2), (low, high), method='bvls', tol=1e-12)
+        got = _band(low, high, stiffness)
+        assert 0.5 * np.sum((bend @ got) ** 2) <= exact.cost * (1.0 + 1e-3) + 1e-6
+        np.testing.assert_allclose(got, exact.x, atol=5e-3)
+        assert (got - low).min() > -2e-3
+
+
+def test_a_slalom_too_tight_for_a_car_is_blocked_where_it_is() -> None:
+    """Over 30 m it is driven; over 9 m it bends more than a turning circle: one blocks."""
+    for distance, blocked in ((30.0, False), (9.0, True)):
+        found = obstacles((0, 100.0, -1.0, 0.2, 0.8), (0, 100.0 + distance, 3.0, 0.2, 2.2))
+        bands = one_lane(ElasticBand(), found, speed=8.0)
+        assert (len(bands.blocked_s) == 1) == blocked
+        assert np.abs(bands.curvature).max() <= 0.15
+        if blocked:
+            assert bands.blocked_s[0] in (99.8, 108.8)
+        else:
+            assert least_distance(bands, found) >= 0.49
+
+
+def test_between_two_obstacles_the_middle_is_taken_where_it_is_nearest() -> None:
+    """Parked cars on both sides leave 3.4 m: the lane goes through, not around both."""
+    found = obstacles((0, 150.0, 2.9, 2.5, 1.0), (0, 150.0, -2.5, 2.5, 1.0))
+    bands = one_lane(ElasticBand(), found, left=8.0, right=8.0)
+    assert np.abs(bands.d).max() < 0.5
+    assert least_distance(bands, found) >= 0.49
+
+
+def test_ends_stay_on_the_centre_line_and_what_cannot_be_bent_is_blocked() -> None:
+    """An obstacle at the very start of a lane leaves no distance to swerve."""
+    near, far = obstacles((0, 3.0, 0.0, 1.0, 0.8)), obstacles((0, 40.0, 0.0, 1.0, 0.8))
+    assert one_lane(ElasticBand(), near).blocked_s == [2.0]
+    bands = one_lane(ElasticBand(), far)
+    assert len(bands.blocked_s) == 0
+    assert np.abs(bands.curvature).max() <= 0.15
+    assert abs(bands.d[0, 0]) < 0.1
+
+
+def test_random_obstacles_are_avoided_or_the_lane_is_blocked() -> None:
+    """300 cases of up to 6 boxes: bends and clearances of whatever is not blocked hold."""
+    rng = np.random.default_rng(11)
+    band = ElasticBand()
+    passed = 0
+    for _ in range(300):
+        count = int(rng.integers(1, 7))
+        found = obstacles(*((0, *row) for row in zip(
+            rng.uniform(30.0, 270.0, count), rng.uniform(-3.0, 5.0, count),
+            rng.uniform(0.2, 6.0, count), rng.uniform(0.2, 1.2, count), strict=True)))
+        bands = one_lane(band, found, speed=float(rng.uniform(3.0, 30.0)))
+        assert np.abs(bands.curvature).max() <= 0.15 + 1e-9
+        if len(bands.blocked_s):
+            continue
+        passed += 1
+        nodes = np.arange(S)
+        for s, d, length, width in zip(*found[1:], strict=True):
+            beside = np.abs(nodes - s) <= length + 0.5 * LENGTH
+            sides = np.abs(bands.d[0, beside] - d) - width - 0.5 * WIDTH
+            assert sides.min() >= 0.17
+    assert passed > 200
+
+
+def test_the_same_question_has_the_same_answer() -> None:
+    """Bit for bit, asked again, by a new band, and after another question in between."""
+    first, second = obstacles((0, 150.0, 0.0, 2.0, 0.8)), obstacles((0, 160.0, 0.0, 2.0, 0.8))
+    band = ElasticBand()
+    answers = [one_lane(band, found).d for found in (first, first, second, first)]
+    np.testing.assert_array_equal(answers[0], answers[1])
+    np.testing.assert_array_equal(answers[0], answers[3])
+    assert not np.array_equal(answers[0], answers[2])
+    np.testing.assert_array_equal(answers[0], one_lane(ElasticBand(), first).d)
+    wider = one_lane(band, first, left=2.6)
+    assert wider.d.max() < 0.0 or len(wider.blocked_s) == 1
+
+
+@pytest.mark.parametrize('options', [{'step': 0.0}, {'min_clearance': 0.6}, {'band_time': -1.0}],
+                         ids=['step', 'clearance', 'time'])
+def test_impossible_options_are_refused(options: dict[str, float]) -> None:
+    with pytest.raises(InputError, match='elastic band'):
+        ElasticBand(**options)
