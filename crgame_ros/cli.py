@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The `crgame` command: run, offline, convert, recover, info, rasterize, doctor."""
+"""The `crgame` command: run, offline, convert, recover, info, rasterize, roads, doctor."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -20,6 +20,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
   crgame rasterize draw curbs and obstacles of a scenario as an occupancy map
+  crgame roads     turn way-points (CSV) into a scenario to drive on, or back
   crgame doctor    what is missing on this machine, and the remedy
 
 `crgame COMMAND --help` tells more."""
@@ -71,6 +72,7 @@ def _build_parser() -> argparse.ArgumentParser:
     info.add_argument('bag', type=Path, help='folder or file of the recording')
     info.set_defaults(command=_info)
     _add_rasterize(commands.add_parser('rasterize', help='scenario to occupancy map'))
+    _add_roads(commands.add_parser('roads', help='way-points to scenario, or back'))
     doctor = commands.add_parser('doctor', help='what is missing on this machine')
     doctor.set_defaults(command=_doctor)
     return parser
@@ -78,6 +80,11 @@ def _build_parser() -> argparse.ArgumentParser:
 
 def _add_rasterize(parser: argparse.ArgumentParser) -> None:
     from crgame_ros.scenario.occupancy_command import add_arguments
+    add_arguments(parser)
+
+
+def _add_roads(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.scenario.waypoint_command import add_arguments
     add_arguments(parser)
 
 

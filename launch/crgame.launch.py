@@ -4,8 +4,9 @@
 The graph for `ros2 launch crgame_ros crgame.launch.py`.
 
 `game:=FILE` names a game file; `humans:=hv0` and `avs:=av0,av1` say which drivers and planners to
-start (those of the game), `perceiving:=av0` which AVs have perception, `traffic:=true` and `map:=true`
-whether the game has reactive traffic and a map of permanent obstacles, `bag:=FOLDER` where to record.
+start (those of the game), `perceiving:=av0` which AVs have perception, `traffic:=true` and
+`map:=true` whether the game has reactive traffic and a map of permanent obstacles, `bag:=FOLDER`
+where to record.
 """
 
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler

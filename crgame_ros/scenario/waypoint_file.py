@@ -5,7 +5,9 @@
 from collections.abc import Mapping
 import csv
 from dataclasses import dataclass, field
+import io
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -146,18 +148,33 @@ def write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
 
     :raises InputError: if the file cannot be written.
     """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator='\n')
+    writer.writerow(('lane', *_NUMBERS, *_LISTS, *_SINGLE))
+    for lane, entry in lanes.items():
+        links = [' '.join(map(str, entry.links[name])) for name in _LISTS]
+        links += ['' if entry.links[name] is None else str(entry.links[name])
+                  for name in _SINGLE]
+        for row in entry.points.tolist():
+            limit = row[3] if math.isfinite(row[3]) else ''
+            writer.writerow((lane, *row[:3], limit, *links))
+            links = [''] * len(links)
+    write_whole(path, text.getvalue())
+
+
+def write_whole(path: Path, text: str) -> None:
+    """
+    Write a file that is there whole or not at all.
+
+    :raises InputError: if it cannot be written.
+    """
+    part = path.with_name(f'.{path.name}.{os.getpid()}.part')
     try:
-        with path.open('w', encoding='utf-8', newline='') as file:
-            writer = csv.writer(file, lineterminator='\n')
-            writer.writerow(('lane', *_NUMBERS, *_LISTS, *_SINGLE))
-            for lane, entry in lanes.items():
-                links = [' '.join(map(str, entry.links[name])) for name in _LISTS]
-                links += ['' if entry.links[name] is None else str(entry.links[name])
-                          for name in _SINGLE]
-                for row in entry.points.tolist():
-                    limit = row[3] if math.isfinite(row[3]) else ''
-                    writer.writerow((lane, *row[:3], limit, *links))
-                    links = [''] * len(links)
+        try:
+            part.write_text(text, encoding='utf-8', newline='')
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
     except OSError as error:
-        raise InputError(f'cannot write the way-points ({error.strerror})', str(path),
+        raise InputError(f'cannot write it ({error.strerror})', str(path),
                          'choose another place') from error

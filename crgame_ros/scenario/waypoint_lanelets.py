@@ -36,7 +36,7 @@ def lanelet_waypoints(network: RoadNetwork, lanelet_id: int) -> FloatArray:
     """
     line = network.line(lanelet_id)
     limit = network.speed_limit(lanelet_id)
-    stations = graded(_thinned(line.s), MAX_RATIO)
+    stations = graded(thinned(line.s, MIN_SPACING), MAX_RATIO)
     x, y = (np.interp(stations, line.s, column) for column in line.points.T)
     width = np.array([network.width_at(lanelet_id, s) for s in stations.tolist()])
     return np.stack((x, y, width, np.full(len(stations), np.inf if limit is None else limit)),
@@ -75,11 +75,16 @@ def lane_of_chain(network: RoadNetwork, chain: Sequence[int]) -> WaypointLane:
     return WaypointLane.of_rows(np.concatenate(parts))
 
 
-def _thinned(s: FloatArray) -> FloatArray:
-    """Leave out stations closer than `MIN_SPACING` to the last one kept, but not the ends."""
+def thinned(s: FloatArray, spacing: float) -> FloatArray:
+    """
+    Leave out stations that are close to the last one kept, but not the ends.
+
+    :param s: (n,) stations, increasing [m]
+    :param spacing: least distance [m]
+    """
     kept = [float(s[0])]
     for station in s[1:-1].tolist():
-        if min(station - kept[-1], float(s[-1]) - station) >= MIN_SPACING:
+        if min(station - kept[-1], float(s[-1]) - station) >= spacing:
             kept.append(station)
     return np.array([*kept, float(s[-1])])
 

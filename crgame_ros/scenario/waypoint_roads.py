@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A road network of way-point lanes (FS II-A1)."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -49,6 +49,14 @@ class LaneLinks:
         """Every lane that is named."""
         beside = (self.left, self.right, self.oncoming_left, self.oncoming_right)
         return (*self.successors, *self.predecessors, *(x for x in beside if x is not None))
+
+    def only(self, lane_ids: Collection[int]) -> 'LaneLinks':
+        """Leave out the other lanes."""
+        return LaneLinks(
+            tuple(x for x in self.successors if x in lane_ids),
+            tuple(x for x in self.predecessors if x in lane_ids),
+            *(x if x in lane_ids else None for x in (
+                self.left, self.right, self.oncoming_left, self.oncoming_right)))
 
 
 class NearestLanes(NamedTuple):
@@ -131,6 +139,16 @@ class WaypointRoads:
         write_lane_rows(path, {
             lane: LaneRows(0, road.rows, vars(self._links[lane]))
             for lane, road in self._lanes.items()})
+
+    def only(self, lane_ids: Collection[int]) -> 'WaypointRoads':
+        """
+        Give some of the lanes, with the links between these.
+
+        :raises InputError: if there is none.
+        """
+        kept = {lane: None for lane in self._lanes if lane in lane_ids}
+        return WaypointRoads({lane: self._lanes[lane] for lane in kept},
+                             {lane: self._links[lane].only(kept) for lane in kept})
 
     @property
     def lane_ids(self) -> tuple[int, ...]:
