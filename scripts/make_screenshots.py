@@ -36,6 +36,7 @@ SETTLES_S = 1.0
 PULSES_S = 2.5
 HAS_BEGUN = 'window.crgame?.ready && crgame.world.shown && crgame.store.status'
 ALARMS = 'return crgame.alarms.kinds()'
+HIDDEN = Path(__file__).with_name('hidden_pedestrian.yaml')
 PAUSE = 'document.querySelector(\'[data-action="pause"]:enabled\')?.click()'
 
 
@@ -232,10 +233,26 @@ def take_alarm(folder: Path) -> None:
         shoot(person.browser, 'replay')
 
 
+def take_perception(folder: Path) -> None:
+    """Follow an AV that does not see the pedestrian behind a van."""
+    with page(folder, 'dark', str(HIDDEN), '--out', str(folder / 'run')) as person:
+        person.browser.run("crgame.world.follow('av0', true);"
+                           "crgame.perception.set('rays', true);"
+                           "crgame.perception.set('estimate', true);")
+        person.wait_until(6.5)
+        person.click('[data-action="pause"]')
+        person.browser.wait("crgame.perception.hollow.includes('o201')"
+                            ' && crgame.perception.fans === 2', 'what the AV perceives')
+        person.browser.run('crgame.world.camera.zoom(1.5)')
+        time.sleep(SETTLES_S)
+        shoot(person.browser, 'perception')
+
+
 SESSIONS = (
     Session(('driving',), take_driving), Session(('light',), take_light),
     Session(('4k',), take_4k), Session(('history', 'timing'), take_figures),
     Session(('events', 'scenario'), take_events), Session(('alarm', 'replay'), take_alarm),
+    Session(('perception',), take_perception),
 )
 
 

@@ -75,6 +75,9 @@ class Client:
         # Set by the backend: whether the client holds a seat.
         self.drives = False
         self.wants_predictions = False
+        # Whose perception the page shows, empty for nobody's; and whether with its scans.
+        self.perceives_as = ''
+        self.wants_scans = False
         # Least time between two frames of the slot 'state' [s]; 0 sends each.
         self.state_period_s = 0.0
         self.dropped = ''

@@ -14,6 +14,10 @@ STATE_COLUMNS = 12
 OBJECT_COLUMNS = 6
 PLAN_COLUMNS = 5
 PREDICTION_COLUMNS = 3
+# Of an estimate: x, y, yaw, speed, yaw rate, and the variances xx, xy, yy.
+ESTIMATE_WIDTH = 8
+# Of a scan before its ranges: x, y, yaw, first angle, increment, longest range, period.
+SCAN_WIDTH = 7
 
 _FLOAT = np.dtype('<f8')
 
@@ -25,6 +29,10 @@ class FrameKind(IntEnum):
     OBJECTS = 2
     PLAN = 3
     PREDICTION = 4
+    SCAN = 5
+    ESTIMATE = 6
+    SEEN = 7
+    OCCUPANCY = 8
 
 
 def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> bytes:
@@ -98,6 +106,91 @@ def encode_prediction(epoch: int, n: int, k: int, t: float, av: int, columns: Se
     body[:, 0] = columns
     body[:, 1:] = futures.reshape(count, length * PREDICTION_COLUMNS)
     return frame.tobytes()
+
+
+def encode_scan(epoch: int, n: int, k: int, t: float, av: int, sensor: int, fan: ArrayLike,
+                ranges: ArrayLike) -> bytes:
+    """
+    Write what a sensor's rays have hit.
+
+    :param epoch: counts resets.
+    :param n: simulation step at which the sensor looked.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param av: index of its AV among the scene's vehicles.
+    :param sensor: its index among the AV's sensors.
+    :param fan: (7) where the sensor was, x, y [m], yaw [rad] in map; angle of the first ray from
+        there, angle from ray to ray [rad], longest range [m], time between two scans [s].
+    :param ranges: (R) [m]; inf where nothing was hit.
+    :raises InputError: if the arrays do not fit.
+    """
+    distances = np.asarray(ranges, dtype=_FLOAT)
+    if np.shape(fan) != (SCAN_WIDTH,) or distances.ndim != 1:
+        raise InputError(f'a scan of shapes {np.shape(fan)} and {distances.shape}',
+                         'cockpit frame', f'give ({SCAN_WIDTH},) and (R,)')
+    return _flat((FrameKind.SCAN, epoch, n, k, t, av, sensor), fan, (len(distances),), distances)
+
+
+def encode_estimate(epoch: int, n: int, k: int, t: float, av: int, estimate: ArrayLike) -> bytes:
+    """
+    Write where an AV takes itself to be.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param av: index of the AV among the scene's vehicles.
+    :param estimate: (8) rear-axle x, y [m], yaw [rad] in map, speed [m/s], yaw rate [rad/s], and
+        the covariance of x and y: xx, xy, yy [m^2].
+    :raises InputError: if the array has another width.
+    """
+    if np.shape(estimate) != (ESTIMATE_WIDTH,):
+        raise InputError(f'an estimate of shape {np.shape(estimate)}', 'cockpit frame',
+                         f'give ({ESTIMATE_WIDTH},)')
+    return _flat((FrameKind.ESTIMATE, epoch, n, k, t, av), estimate)
+
+
+def encode_seen(epoch: int, n: int, k: int, t: float, av: int, columns: Sequence[int]) -> bytes:
+    """
+    Write of whom the planner of an AV with perception is told.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param av: index of the AV among the scene's vehicles.
+    :param columns: (Q) who is seen or remembered: 0 to V - 1 are vehicles, objects follow from V.
+    """
+    return _flat((FrameKind.SEEN, epoch, n, k, t, av, len(columns)), columns)
+
+
+def encode_occupancy(epoch: int, n: int, k: int, t: float, origin: tuple[float, float],
+                     resolution: float, occupied: NDArray[np.bool_]) -> bytes:
+    """
+    Write where permanent obstacles are.
+
+    After origin, resolution, rows and columns follow bytes, padded to a whole number of values:
+    bit 0 of byte 0 is cell [0, 0], and cells go on by columns.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param origin: x, y of the lower left corner in map [m]
+    :param resolution: edge of a cell [m]
+    :param occupied: (rows, columns); rows grow with y, columns with x.
+    :raises InputError: if the grid has no two dimensions or no size.
+    """
+    if occupied.ndim != 2 or not (0.0 < resolution < np.inf and np.isfinite(origin).all()):
+        raise InputError(f'a grid of shape {occupied.shape} with cells of {resolution} m',
+                         'cockpit frame', 'give (rows, columns) and finite lengths')
+    bits = np.packbits(occupied, axis=None, bitorder='little').tobytes()
+    return _flat((FrameKind.OCCUPANCY, epoch, n, k, t, *origin, resolution,
+                  *occupied.shape)) + bits + bytes(-len(bits) % _FLOAT.itemsize)
+
+
+def _flat(*parts: ArrayLike) -> bytes:
+    return b''.join(np.asarray(part, dtype=_FLOAT).tobytes() for part in parts)
 
 
 def _rows(kind: FrameKind, epoch: int, n: int, k: int, t: float, extra: tuple[int, ...],

@@ -80,13 +80,20 @@ class Hub:
         """
         Send a binary frame; an older one of the same slot that is still unsent is replaced.
 
-        :param slot: state, objects, plan:<i> or prediction:<i>.
+        :param slot: state, objects, occupancy, or plan:<i>, prediction:<i>, seen:<i>,
+            estimate:<i>, scan:<i>:<sensor> of vehicle i.
         :param only_if: chooses the clients.
         """
         self._frames[slot] = _Frame(frame, only_if)
         for client in self._clients.values():
             if only_if is None or only_if(client):
                 client.put_frame(slot, frame)
+
+    def send_wanted(self, client: Client) -> None:
+        """Give a client the newest of what not everybody gets: it has chosen anew."""
+        for slot, frame in self._frames.items():
+            if frame.only_if is not None and frame.only_if(client):
+                client.put_frame(slot, frame.data)
 
     def add(self, abort: Callable[[], None], unsent: Callable[[], int]) -> Client:
         """

@@ -128,7 +128,15 @@ def _name(message: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _layers(message: Mapping[str, Any]) -> dict[str, Any]:
-    return {'predictions': _flag(message, 'predictions')}
+    """Read those of the layers that are named: the others stay as they are."""
+    named: dict[str, Any] = {
+        field: _flag(message, field) for field in ('predictions', 'scans') if field in message}
+    if 'perception' in message:
+        named['perception'] = '' if message['perception'] == '' \
+            else _matching(message, 'perception', _AV)
+    if not named:
+        raise _wrong('layers', 'names none of predictions, perception and scans')
+    return named
 
 
 def _ping(message: Mapping[str, Any]) -> dict[str, Any]:

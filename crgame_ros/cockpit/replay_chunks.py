@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.cockpit import frames
+from crgame_ros.cockpit.perception_frames import Place
 from crgame_ros.cockpit.replay_index import RunIndex
 from crgame_ros.cockpit.replay_outline import commands_of, pack, state_rows
+from crgame_ros.cockpit.replay_perception import CARRIED_NS, OCCUPANCY_TOPIC, ReplayPerception
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.planner.joints import (
@@ -76,6 +78,7 @@ class ChunkBuilder:
             VEHICLES_TOPIC: [name for item in vehicles for name in vehicle_joint_names(item)],
             OBJECT_STATES_TOPIC: [name for item in objects for name in object_joint_names(item)]}
         avs = [str(entry['id']) for entry in run.game.avs]
+        self._perception = ReplayPerception(run.game, self._columns)
         self._requests = {f'/{av}/plan_request': vehicles.index(av) for av in avs}
         self._plans = {f'/{av}/plan': vehicles.index(av) for av in avs}
         self._transforms = {vehicles.index(str(entry['id'])): RigidTransform(*entry['transform'])
@@ -99,14 +102,43 @@ class ChunkBuilder:
 
     def _carried(self, low: int) -> Iterator[_Entry]:
         """Give what was in force before step `low`."""
-        for topic in (OBJECT_STATES_TOPIC, *self._requests, *self._plans):
+        self._perception.forget()
+        for topic in (OBJECT_STATES_TOPIC, *self._requests, *self._plans,
+                      *self._perception.topics):
             log_ns = self._index.places[topic].before(low)
             if log_ns is None:
                 continue
+            if topic in self._perception.scans:
+                yield from self._carried_scans(topic, log_ns, low)
+                continue
             for message in self._reader.decoded([topic], log_ns, log_ns + 1):
-                frame = self._frame(message)
-                if frame is not None and self._index.run.holds(stamp_of(message.message), log_ns):
-                    yield _Entry(low, _BEFORE, -1, frame)
+                if topic == OCCUPANCY_TOPIC \
+                        or self._index.run.holds(stamp_of(message.message), log_ns):
+                    for frame in self._frames(message, low):
+                        yield _Entry(low, _BEFORE, -1, frame)
+
+    def _carried_scans(self, topic: str, last_ns: int, low: int) -> Iterator[_Entry]:
+        """Give the last scan of each sensor of a topic; they share it."""
+        newest: dict[str, bytes] = {}
+        for message in self._reader.decoded([VEHICLES_TOPIC, topic], last_ns - CARRIED_NS,
+                                            last_ns + 1):
+            content = message.message
+            if not self._index.run.holds(stamp_of(content), message.log_time_ns):
+                continue
+            if message.topic == VEHICLES_TOPIC:
+                self._note_states(content)
+            else:
+                for frame in self._frames(message, low):
+                    newest[str(content.header.frame_id)] = frame
+        for frame in newest.values():
+            yield _Entry(low, _BEFORE, -1, frame)
+
+    def _note_states(self, content: Any) -> None:
+        """Remember where the vehicles were, for scans."""
+        if self._perception.scans:
+            self._perception.add_states(
+                self._scheduler.step_of_stamp(stamp_of(content)),
+                state_rows(self._point(VEHICLES_TOPIC, content), None))
 
     def _within(self, low: int, high: int) -> list[_Entry]:
         """Read what was seen from step `low` until before step `high`."""
@@ -123,6 +155,11 @@ class ChunkBuilder:
             if topic == CYCLE_TOPIC:
                 self._take_commands(content, commands)
                 continue
+            if topic == OCCUPANCY_TOPIC:
+                if low <= newest < high:
+                    found += [_Entry(newest, _AFTER, len(found), frame)
+                              for frame in self._frames(message, newest)]
+                continue
             stamp_ns = stamp_of(content)
             if not run.holds(stamp_ns, log_ns):
                 continue
@@ -131,12 +168,12 @@ class ChunkBuilder:
                 if n <= newest:
                     continue
                 newest = n
+                self._note_states(content)
                 if low <= n < high:
                     states.append((n, len(states), content))
             else:
                 seen = max(n, newest) if topic in self._plans else n
-                frame = self._frame(message) if low <= seen < high else None
-                if frame is not None:
+                for frame in self._frames(message, n) if low <= seen < high else ():
                     found.append(_Entry(seen, _AFTER if topic in self._plans else _BEFORE,
                                         len(found), frame))
         found += [_Entry(n, _STATE, place, self._state(n, content, commands.get(n)))
@@ -158,24 +195,35 @@ class ChunkBuilder:
             commands.update(zip(table.column('n').astype(int).tolist(),
                                 commands_of(table, self._vehicles), strict=True))
 
-    def _frame(self, message: DecodedMessage) -> bytes | None:
-        """Encode objects, a prediction or a plan at its stamp; None if malformed."""
+    def _frames(self, message: DecodedMessage, n: int) -> list[bytes]:
+        """
+        Encode objects, a request, a plan or what was perceived; nothing if malformed.
+
+        :param n: the step from which a map is seen; all else is at its stamp.
+        """
         topic, content = message.topic, message.message
-        n = self._scheduler.step_of_stamp(stamp_of(content))
-        head = (self._epoch, n, self._scheduler.k(n), n * self._scheduler.dt_s)
+        if topic != OCCUPANCY_TOPIC:
+            n = self._scheduler.step_of_stamp(stamp_of(content))
+        place = Place(self._epoch, n, self._scheduler.k(n), n * self._scheduler.dt_s)
+        if topic in self._perception.topics:
+            frame = self._perception.frame(topic, place, content)
+            return [] if frame is None else [frame]
         if topic == OBJECT_STATES_TOPIC:
             point = self._point(topic, content)
-            return frames.encode_objects(*head, np.concatenate(
-                (point[0].reshape(-1, 3), point[1].reshape(-1, 3)), axis=1))
+            return [frames.encode_objects(*place, np.concatenate(
+                (point[0].reshape(-1, 3), point[1].reshape(-1, 3)), axis=1))]
         if topic in self._plans:
             index = self._plans[topic]
             points = _plan_points(content)
             if points is None:
-                return None
+                return []
             points[:, :3] = self._transforms[index].to_simulation(points[:, :3])
-            return frames.encode_plan(*head, index, points)
+            return [frames.encode_plan(*place, index, points)]
         index = self._requests[topic]
-        return frames.encode_prediction(*head, index, *self._prediction(content, index))
+        seen = self._perception.seen(self._vehicles[index], place, content.joint_names,
+                                     content.points[0].positions)
+        prediction = frames.encode_prediction(*place, index, *self._prediction(content, index))
+        return [prediction] if seen is None else [prediction, seen]
 
     def _state(self, n: int, content: Any, commands: FloatArray | None) -> bytes:
         rows = state_rows(self._point(VEHICLES_TOPIC, content), commands)

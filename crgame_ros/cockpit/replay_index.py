@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.cockpit.replay_outline import Outline
+from crgame_ros.cockpit.replay_perception import OCCUPANCY_TOPIC, perception_topics
 from crgame_ros.cockpit.replay_tracks import RunTracks, TrackCollector
 from crgame_ros.errors import InputError
 from crgame_ros.recording.epochs import Epoch
@@ -123,8 +124,10 @@ class _Indexer:
         self._reader = reader
         self._run = run
         avs = [str(entry['id']) for entry in run.game.avs]
-        self._stamped = {OBJECT_STATES_TOPIC, *(f'/{av}/plan_request' for av in avs)}
+        perceived = perception_topics(run.game)
+        self._stamped = {OBJECT_STATES_TOPIC, *(f'/{av}/plan_request' for av in avs), *perceived}
         self._plans = {f'/{av}/plan' for av in avs}
+        self._types = perceived
         self._states = Places()
         self._places = {topic: Places() for topic in (CYCLE_TOPIC, *self._stamped, *self._plans)}
         self._places[VEHICLES_TOPIC] = self._states
@@ -141,9 +144,14 @@ class _Indexer:
             if not self._after:
                 self._collector.take(self._reader.decode(message),
                                      self._states.newest if self._inside else None)
-        elif type_name != _TRAJECTORY:
+        elif type_name != self._types.get(topic, _TRAJECTORY):
             raise InputError(f'{topic} is a {type_name}', str(self._reader.path),
                              'give a recording of crgame_ros')
+        elif topic == OCCUPANCY_TOPIC:
+            # Its stamp is none of simulation time: it is seen from when it came.
+            from_ns = self._run.from_log_ns
+            if not self._after and (from_ns is None or log_ns >= from_ns):
+                self._places[topic].add(log_ns, self._states.newest)
         else:
             self._take_stamped(message, header_stamp_ns(data))
 

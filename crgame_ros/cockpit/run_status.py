@@ -8,6 +8,10 @@ import math
 from typing import Any
 
 OK, ERROR = 0, 2
+# Late traffic is told at each late tick, and never that it is in time again [s].
+LATE_TRAFFIC_S = 2.0
+TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')
+                 for name in ('lateral', 'along', 'heading', 'speed'))
 
 
 @dataclass(frozen=True)
@@ -15,7 +19,7 @@ class Alarm:
     """
     Something that nobody should miss.
 
-    :param kind: collision, off_road, stale_plan, lost_device, recording or late.
+    :param kind: collision, off_road, stale_plan, lost_device, recording, late or late_traffic.
     :param subject: vehicle or node that it is about.
     :param text: a few words.
     :param since_t: when it began, time of the run [s].
@@ -42,9 +46,11 @@ class RunStatus:
                                           'text': 'nothing is recorded'}
         self.seats_lost: dict[str, bool] = {}
         self._vehicles: tuple[str, ...] = ()
+        self._traffic_late_t = -math.inf
         self._alarms: dict[str, Alarm] = {}
         self._rules: list[tuple[str, Callable[..., None]]] = [
-            ('sim_node: run', self._take_run), ('timesync_node: table I', self._take_timing),
+            ('sim_node: run', self._take_run), ('sim_node: traffic', self._take_traffic),
+            ('timesync_node: table I', self._take_timing),
             ('recorder_node: recording', self._take_recording)]
         self.begin(())
 
@@ -55,6 +61,7 @@ class RunStatus:
         self.planners: dict[str, dict[str, Any]] = {}
         self.drivability: dict[str, dict[str, Any]] = {}
         self.seats_lost = {}
+        self._traffic_late_t = -math.inf
         self._alarms = {key: alarm for key, alarm in self._alarms.items()
                         if alarm.kind == 'recording'}
 
@@ -74,6 +81,8 @@ class RunStatus:
         :param values: of its keys.
         :param t: time of the run [s]
         """
+        if t > self._traffic_late_t + LATE_TRAFFIC_S:
+            self._alarm('late_traffic', 'traffic', False, '', t)
         for known, rule in self._rules:
             if name == known:
                 rule(level, text, values, t)
@@ -122,11 +131,16 @@ class RunStatus:
         return self.planners.setdefault(vehicle, {
             'running': True, 'stale': False, 'latency_ms': None, 'age_ms': None, 'accepted': 0,
             'refused': 0, 'plan_time_ms': None, 'fallbacks': 0, 'planner': '',
-            'last_refusal': ''})
+            'last_refusal': '', 'tracking': None})
 
     def _take_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
         self.run = text
         self.real_time_factor = _number(values.get('real_time_factor')) or 1.0
+
+    def _take_traffic(self, level: int, text: str, _: Mapping[str, str], t: float) -> None:
+        if level != OK:
+            self._traffic_late_t = t
+            self._alarm('late_traffic', 'traffic', True, text, t)
 
     def _take_timing(self, _: int, __: str, values: Mapping[str, str], t: float) -> None:
         self.timing = {key: _number(value) for key, value in values.items()
@@ -160,8 +174,15 @@ class RunStatus:
             accepted=int(_number(values.get('accepted')) or 0),
             refused=int(_number(values.get('refused')) or 0),
             planner=self._planner(vehicle)['planner'] or values.get('planner', ''),
-            last_refusal=values.get('last_refusal', ''))
+            last_refusal=values.get('last_refusal', ''), tracking=_tracking(values))
         self._alarm('stale_plan', vehicle, level == ERROR, text, t)
+
+
+def _tracking(values: Mapping[str, str]) -> dict[str, float | None] | None:
+    """Give how far an AV is from its plan, now and at worst; None unless it tracks plans."""
+    if TRACKING[0] not in values:
+        return None
+    return {name: _number(values.get(name)) for name in TRACKING}
 
 
 def _number(text: str | None) -> float | None:

@@ -4,6 +4,7 @@
 
 from collections.abc import Iterable, Sequence
 import math
+from pathlib import Path
 from typing import Any
 
 from commonroad.geometry.shape import Circle, ShapeGroup
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 import shapely
 
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.perception.spec import parse_perception
 from crgame_ros.scenario.loading import group_outline, LoadedScenario
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.scenario.road_network import RoadNetwork
@@ -66,6 +68,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
             'duration_s': content.get('duration')},
         'drivers': {entry['id']: str(entry['driver']) for entry in game.humans},
         'planners': {entry['id']: str(entry['planner']) for entry in game.avs},
+        'occupancy': content.get('occupancy') is not None,
         'events': list(content.get('events', ()))}
     finite: Document = _finite(document)
     return finite
@@ -164,10 +167,20 @@ def _signs(network: LaneletNetwork) -> list[Document]:
 
 def _vehicle(entry: Document, role: str) -> Document:
     vehicle = entry['vehicle']
+    perception = entry.get('perception')
     return {'id': str(entry['id']), 'role': role,
             'shape': _shape(Shape.rectangle(vehicle['length'], vehicle['width'])),
             'rear_to_center': vehicle['rear_to_center'], 'wheelbase': vehicle['wheelbase'],
-            'max_steering_angle': vehicle['max_steering_angle']}
+            'max_steering_angle': vehicle['max_steering_angle'],
+            'perception': None if perception is None else _perception(perception)}
+
+
+def _perception(values: Document) -> Document:
+    """Name the sensors of an AV, and say how far the farthest reaches [m]; null sees all."""
+    spec = parse_perception(values, '/scenario/game: perception', Path())
+    return {'localisation': spec.localisation is not None,
+            'sensors': [sensor.name for sensor in spec.sensors],
+            'range': max((sensor.horizon for sensor in spec.sensors), default=None)}
 
 
 def _shape(shape: Shape) -> Document:

@@ -153,7 +153,10 @@ class Session:
             case 'name':
                 client.name = message['name']
             case 'layers':
-                client.wants_predictions = message['predictions']
+                client.wants_predictions = message.get('predictions', client.wants_predictions)
+                client.perceives_as = message.get('perception', client.perceives_as)
+                client.wants_scans = message.get('scans', client.wants_scans)
+                self._hub.send_wanted(client)
             case 'ping':
                 self._hub.send_event('pong', {'t': message['t']}, only=client)
             case _:

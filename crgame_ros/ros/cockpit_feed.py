@@ -15,21 +15,18 @@ from trajectory_msgs.msg import JointTrajectory
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.frames import (
     encode_objects,
-    encode_plan,
-    encode_prediction,
     encode_state,
     OBJECT_COLUMNS,
     STATE_COLUMNS,
 )
 from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.perception_frames import Place
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError
-from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.planner.joints import vehicles_from_joints
+from crgame_ros.ros.av_feed import AvFeed, place_of
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.messages import from_time
-from crgame_ros.ros.plan_frames import plan_rows, predicted
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.simulation.documents import MALFORMED, parse_events_document
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, TIMING_COLUMNS
@@ -60,6 +57,7 @@ class CockpitFeed:
         self._hub = hub
         self.status = RunStatus()
         self._documents = ScenarioDocuments(endpoints)
+        self._avs = AvFeed(endpoints, hub)
         # Of what moves the newest is enough.
         self._states = endpoints.polled('/vehicles/state', depth=1)
         self._objects = endpoints.polled('/traffic/objects', depth=1)
@@ -68,8 +66,7 @@ class CockpitFeed:
         self._fired = endpoints.polled('/scenario/events')
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._diagnostics = endpoints.polled('/diagnostics', depth=QUEUE)
-        # By contract name and vehicle.
-        self._slots: dict[tuple[str, str], PolledSubscription] = {}
+        self._verdicts: dict[str, PolledSubscription] = {}
         self.scenario: ScenarioSet | None = None
         self.frames_skipped = False
         self._vehicle_ids: list[str] = []
@@ -97,8 +94,8 @@ class CockpitFeed:
         now_s = time.monotonic()
         if now_s - self._slow_s >= SLOW_PERIOD_S:
             self._slow_s = now_s
-            for work in (self._poll_documents, self._poll_plans, self._poll_texts,
-                         self._poll_diagnostics):
+            for work in (self._poll_documents, self._poll_plans, self._poll_perception,
+                         self._poll_texts, self._poll_diagnostics):
                 _read(work, problems)
         for work in (self._poll_commands, self._poll_states, self._poll_objects):
             _read(work, problems)
@@ -126,27 +123,28 @@ class CockpitFeed:
         """Show another scenario, game or epoch."""
         game = scenario.game
         scene = scene_document(scenario.loaded, scenario.objects, game)
-        transforms = {entry['id']: RigidTransform(*entry['transform']) for entry in game.avs}
+        self._avs.begin(scenario)
         self.scenario = scenario
-        self._transforms = transforms
         self._vehicle_ids = [item.id for item in scenario.driven]
         self._object_count = len(scenario.others)
-        self._columns = {item.id: index for index, item in enumerate(
-            (*scenario.driven, *scenario.others))}
         self._rows = np.full((len(self._vehicle_ids), STATE_COLUMNS), np.nan)
         self.n = 0
         self._run_heard_s = time.monotonic()
         self.status.begin(self._vehicle_ids)
-        wanted = [('/<v>/drivability', vehicle) for vehicle in self._vehicle_ids]
-        wanted += [(name, av) for name in ('/<av>/plan', '/<av>/plan_request')
-                   for av in transforms]
-        for key in self._slots.keys() - set(wanted):
-            self._endpoints.release(self._slots.pop(key))
-        for key in wanted:
-            if key not in self._slots:
-                self._slots[key] = self._endpoints.polled(*key)
+        for vehicle in self._verdicts.keys() - set(self._vehicle_ids):
+            self._endpoints.release(self._verdicts.pop(vehicle))
+        for vehicle in self._vehicle_ids:
+            if vehicle not in self._verdicts:
+                self._verdicts[vehicle] = self._endpoints.polled('/<v>/drivability', vehicle)
         self._hub.set_document('scene', scene)
         self._hub.set_document('events', {'fired': []})
+        self._avs.show_map()
+
+    def _poll_plans(self) -> None:
+        self._avs.poll_plans(self.frames_skipped)
+
+    def _poll_perception(self) -> None:
+        self._avs.poll_perception(self.frames_skipped)
 
     def _poll_commands(self) -> None:
         cycle: Float64MultiArray | None = self._cycles.latest()
@@ -183,7 +181,8 @@ class CockpitFeed:
         joints = [np.frombuffer(values).reshape(-1, 4) for values in (
             point.positions, point.velocities, point.accelerations)]
         self._rows[:, :STATE_WIDTH] = vehicles_from_joints(*joints)
-        self.n = place[1]
+        self.n = place.n
+        self._avs.add_states(place.n, self._rows)
         self._hub.send_frame('state', encode_state(*place, self._rows))
 
     def _send_objects(self, message: JointTrajectory) -> None:
@@ -196,51 +195,12 @@ class CockpitFeed:
         rows[:, 3:] = np.frombuffer(point.velocities).reshape(-1, 3)
         self._hub.send_frame('objects', encode_objects(*place, rows))
 
-    def _place(self, message: JointTrajectory,
-               joints: int | None = None) -> tuple[int, int, int, float] | None:
-        """
-        Give epoch, n, k and t of a message; None if it belongs to another run.
-
-        :param joints: how many its first point has to give; None for any number.
-        """
-        if self.scenario is None or not message.points:
+    def _place(self, message: JointTrajectory, joints: int) -> Place | None:
+        """Give where a state belongs; None if it is of another run or has other joints."""
+        if self.scenario is None or not message.points \
+                or len(message.points[0].positions) != joints:
             return None
-        game = self.scenario.game
-        n = game.scheduler.step_of_stamp(from_time(message.header.stamp))
-        if n < 0 or (joints is not None and len(message.points[0].positions) != joints):
-            return None
-        return game.epoch, n, game.scheduler.k(n), n * game.scheduler.dt_s
-
-    def _poll_plans(self) -> None:
-        if self.scenario is None:
-            return
-        anybody = any(client.wants_predictions for client in self._hub.clients.values())
-        for av, transform in self._transforms.items():
-            plan = self._slots['/<av>/plan', av].latest()
-            if plan is not None and not self.frames_skipped:
-                self._send_plan(plan, av, transform)
-            if anybody and not self.frames_skipped:
-                request = self._slots['/<av>/plan_request', av].latest()
-                if request is not None:
-                    self._send_prediction(request, av, transform)
-
-    def _send_plan(self, message: JointTrajectory, av: str, transform: RigidTransform) -> None:
-        place = self._place(message)
-        if place is not None:
-            index = self._columns[av]
-            self._hub.send_frame(
-                f'plan:{index}', encode_plan(*place, index, plan_rows(message, transform)))
-
-    def _send_prediction(self, message: JointTrajectory, av: str,
-                         transform: RigidTransform) -> None:
-        place = self._place(message)
-        if place is not None:
-            index = self._columns[av]
-            columns, futures = predicted(message, self._columns, av, len(self._vehicle_ids),
-                                         transform)
-            self._hub.send_frame(
-                f'prediction:{index}', encode_prediction(*place, index, columns, futures),
-                only_if=lambda client: client.wants_predictions)
+        return place_of(self.scenario, message.header.stamp)
 
     def _poll_texts(self) -> None:
         if self.scenario is None:
@@ -257,8 +217,7 @@ class CockpitFeed:
                                                    in content['states'].items()}})
 
     def _poll_diagnostics(self) -> None:
-        slots = [slot for (name, _), slot in self._slots.items() if name == '/<v>/drivability']
-        for slot in (self._diagnostics, *slots):
+        for slot in (self._diagnostics, *self._verdicts.values()):
             # A flood waits its turn.
             for _ in range(QUEUE):
                 message = slot.take()

@@ -12,14 +12,14 @@ from visualization_msgs.msg import Marker
 from crgame_ros.ros.messages import MAP
 from crgame_ros.scenario.objects import ObjectDescription, Role
 
-# The palette of Okabe and Ito, with greys.
+# The palette of Okabe and Ito, with greys and a lavender.
 ORANGE, SKY_BLUE, GREEN, YELLOW = '#E69F00', '#56B4E9', '#009E73', '#F0E442'
-VERMILLION, PURPLE = '#D55E00', '#CC79A7'
+VERMILLION, PURPLE, LAVENDER = '#D55E00', '#CC79A7', '#B3A2E8'
 WHITE, LIGHT_GREY, GREY, DARK_GREY = '#FFFFFF', '#C8C8C8', '#999999', '#666666'
 ROAD, PATHS, INK = '#3A3D42', '#5A5D63', '#101010'
 BRAKE_ON, BRAKE_OFF = '#FF1010', '#500000'
 ROLE_COLOURS = {Role.HUMAN: ORANGE, Role.AUTONOMOUS: SKY_BLUE, Role.RECORDED: LIGHT_GREY,
-                Role.STATIC: GREY, Role.TRAFFIC: GREEN}
+                Role.STATIC: GREY, Role.TRAFFIC: GREEN, Role.SCRIPTED: LAVENDER}
 LIGHT_COLOURS = {'red': VERMILLION, 'redYellow': ORANGE, 'yellow': YELLOW, 'green': GREEN,
                  'inactive': DARK_GREY}
 SOFT_TYPES = frozenset({'pedestrian', 'bicycle'})

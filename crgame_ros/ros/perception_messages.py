@@ -68,10 +68,10 @@ class ScanMessages:
             if self._sent.get(spec.name) == n:
                 continue
             self._sent[spec.name] = n
-            step = spec.field_of_view / max(1, len(scan.angles) - 1)
+            first, last = float(scan.angles[0]), float(scan.angles[-1])
             message = LaserScan(
-                angle_min=float(scan.angles[0]), angle_max=float(scan.angles[-1]),
-                angle_increment=step, scan_time=1.0 / spec.rate, range_max=spec.horizon,
+                angle_min=first, angle_max=last,
+                angle_increment=(last - first) / max(1, len(scan.angles) - 1), scan_time=1.0 / spec.rate, range_max=spec.horizon,
                 ranges=array('f', scan.ranges.astype(np.float32).tobytes()))
             message.header.frame_id = f'{self._av_id}/{spec.name}'
             set_time(message.header.stamp, scheduler.stamp_ns(n))

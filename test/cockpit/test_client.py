@@ -181,6 +181,9 @@ GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({'type': 'name', 'name': ' Ada\n<b>Lovelace</b>\u202e '},
      {'type': 'name', 'name': 'Ada bLovelace/b'}),
     ({'type': 'layers', 'predictions': True}, {'type': 'layers', 'predictions': True}),
+    ({'type': 'layers', 'perception': 'av0', 'scans': 1},
+     {'type': 'layers', 'perception': 'av0', 'scans': True}),
+    ({'type': 'layers', 'perception': ''}, {'type': 'layers', 'perception': ''}),
     ({'type': 'ping', 't': 12}, {'type': 'ping', 't': 12.0}),
 ]
 
@@ -224,6 +227,9 @@ BAD = {
     'name of spaces': '{"type": "name", "name": " \\u200b "}',
     'name is a number': '{"type": "name", "name": 4}',
     'layers without': '{"type": "layers"}',
+    'perception of a human': '{"type": "layers", "perception": "hv0"}',
+    'perception of nobody': '{"type": "layers", "perception": null}',
+    'scans are text': '{"type": "layers", "scans": "yes"}',
     'ping without': '{"type": "ping"}',
 }
 

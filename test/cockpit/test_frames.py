@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 from crgame_ros.cockpit.frames import (
+    encode_estimate,
     encode_objects,
+    encode_occupancy,
     encode_plan,
     encode_prediction,
+    encode_scan,
+    encode_seen,
     encode_state,
 )
 from crgame_ros.errors import InputError
@@ -85,3 +89,36 @@ def test_a_prediction_of_nobody() -> None:
     """An AV that is alone is told of nobody: eight numbers, and no more."""
     frame = np.frombuffer(encode_prediction(0, 10, 1, 0.1, 1, (), np.empty((0, 31, 3))))
     assert frame.tolist() == [4.0, 0.0, 10.0, 1.0, 0.1, 1.0, 31.0, 0.0]
+
+
+def test_a_scan_has_its_fan_before_its_ranges() -> None:
+    fan = (1.0, 2.0, 0.5, -1.0, 0.25, 80.0, 0.1)
+    assert numbers(encode_scan(2, 15, 1, 0.15, 3, 1, fan, [4.0, math.inf])) == [
+        5, 2, 15, 1, 0.15, 3, 1, *fan, 2, 4.0, math.inf]
+    with pytest.raises(InputError, match='give .7,. and .R,.'):
+        encode_scan(2, 15, 1, 0.15, 3, 1, fan[1:], [4.0])
+
+
+def test_an_estimate_has_pose_rates_and_covariance() -> None:
+    row = [1.0, 2.0, 0.5, 12.0, 0.1, 0.04, -0.01, 0.09]
+    assert numbers(encode_estimate(2, 15, 1, 0.15, 3, row)) == [6, 2, 15, 1, 0.15, 3, *row]
+    with pytest.raises(InputError, match='give .8,.'):
+        encode_estimate(2, 15, 1, 0.15, 3, row[1:])
+
+
+def test_seen_lists_columns_and_may_list_nobody() -> None:
+    assert numbers(encode_seen(0, 10, 1, 0.1, 1, [0, 1, 7])) == [7, 0, 10, 1, 0.1, 1, 3, 0, 1, 7]
+    assert numbers(encode_seen(0, 10, 1, 0.1, 1, ())) == [7, 0, 10, 1, 0.1, 1, 0]
+
+
+def test_occupied_cells_are_bits_from_the_lower_left_corner() -> None:
+    occupied = np.zeros((7, 11), dtype=bool)
+    occupied[0, 0] = occupied[0, 9] = occupied[6, 10] = True
+    frame = encode_occupancy(1, 0, 0, 0.0, (-5.0, 8.0), 0.25, occupied)
+    assert len(frame) % 8 == 0
+    assert np.frombuffer(frame[:80]).tolist() == [8, 1, 0, 0, 0.0, -5.0, 8.0, 0.25, 7, 11]
+    # Bit i of the number is cell i; 77 cells take 10 bytes, padded to 16.
+    bits = int.from_bytes(frame[80:], 'little')
+    assert len(frame) == 96 and bits == 1 | 1 << 9 | 1 << (6 * 11 + 10)
+    with pytest.raises(InputError, match='cells of nan m'):
+        encode_occupancy(1, 0, 0, 0.0, (0.0, 0.0), math.nan, occupied)

@@ -55,8 +55,41 @@ def test_plans_and_planner() -> None:
     assert status.document()['planners']['av0'] == {
         'running': True, 'stale': True, 'latency_ms': 10.0, 'age_ms': None, 'accepted': 7,
         'refused': 1, 'plan_time_ms': 4.5, 'fallbacks': 2.0, 'planner': 'reactive',
-        'last_refusal': 'late'}
+        'last_refusal': 'late', 'tracking': None}
     assert _kinds(status) == ['stale_plan:av0']
+
+
+def test_tracking_errors_of_tracked_avs() -> None:
+    """Now and at worst, by their names; an AV that follows perfectly has none."""
+    status = _begun()
+    errors = {f'{when}{name}_error': str(value) for value, (when, name) in enumerate(
+        (when, name) for when in ('', 'worst_') for name in ('lateral', 'along', 'heading',
+                                                             'speed'))}
+    status.take('sim_node: av0 plans', 0, 'following its plan', errors, 1.0)
+    assert status.document()['planners']['av0']['tracking'] == {
+        'lateral_error': 0.0, 'along_error': 1.0, 'heading_error': 2.0, 'speed_error': 3.0,
+        'worst_lateral_error': 4.0, 'worst_along_error': 5.0, 'worst_heading_error': 6.0,
+        'worst_speed_error': 7.0}
+    status.take('sim_node: av0 plans', 0, 'following its plan', {'accepted': '1'}, 2.0)
+    assert status.document()['planners']['av0']['tracking'] is None
+
+
+def test_late_traffic_is_an_alarm_until_it_is_not_told_for_two_seconds() -> None:
+    """Nobody tells that agents are in time again."""
+    status = _begun()
+    for t in (1.0, 2.5):
+        status.take('sim_node: traffic', 1, 'agents are 2 scenario steps late',
+                    {'n': '100', 'k': '10', 'agents_k': '8'}, t)
+    assert status.alarms_document()['active'] == [
+        {'id': 'late_traffic:traffic', 'kind': 'late_traffic', 'subject': 'traffic',
+         'text': 'agents are 2 scenario steps late', 'since_t': 1.0}]
+    status.take('sim_node: run', 0, 'running', {}, 4.4)
+    assert _kinds(status) == ['late_traffic:traffic']
+    status.take('sim_node: run', 0, 'running', {}, 4.6)
+    assert _kinds(status) == []
+    status.take('sim_node: traffic', 1, 'agents are 1 scenario steps late', {}, 5.0)
+    status.begin(('hv0', 'av0'))
+    assert _kinds(status) == []
 
 
 def test_lost_driver_and_lost_device() -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene document: true to the files, valid JSON for every scenario."""
 
+from dataclasses import replace
 import json
 import math
 from pathlib import Path
@@ -15,6 +16,7 @@ from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.documents import game_document, parse_game_document
 from crgame_ros.simulation.setup import build_setup, Setup
@@ -88,7 +90,7 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
     assert [item['role'] for item in document['vehicles']] == ['human', 'autonomous', 'autonomous']
     # BMW 320i, CommonRoad vehicle 2.
     assert document['vehicles'][0] == {
-        'id': 'hv0', 'role': 'human', 'max_steering_angle': 0.91,
+        'id': 'hv0', 'role': 'human', 'max_steering_angle': 0.91, 'perception': None,
         'rear_to_center': pytest.approx(1.4227, abs=5e-5),
         'wheelbase': pytest.approx(2.5789, abs=5e-5),
         'shape': {'kind': 'rectangle', 'length': 4.508, 'width': 1.61, 'vertices': []}}
@@ -97,6 +99,19 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
         'duration_s': setup.game.duration}
     assert document['planners'] == {'av0': 'idm', 'av1': 'idm'}
     assert document['drivers'] == {'hv0': setup.humans[0].driver}
+
+
+def test_the_reach_of_an_avs_sensors_is_told() -> None:
+    game = load_game(scenarios_directory() / 'two_avs.yaml')
+    sensors = (SensorSpec('front', horizon=120.0), SensorSpec('rear', yaw=3.14, horizon=40.0))
+    perceiving = (PerceptionSpec(sensors=sensors), PerceptionSpec(None, ()))
+    game = replace(game, avs=tuple(replace(av, perception=perception) for av, perception in zip(
+        game.avs, perceiving, strict=True)))
+    vehicles = document_of(build_setup(game))['vehicles']
+    assert vehicles[1]['perception'] == {
+        'localisation': True, 'sensors': ['front', 'rear'], 'range': 120.0}
+    # One that sees everything has no reach.
+    assert vehicles[2]['perception'] == {'localisation': False, 'sensors': [], 'range': None}
 
 
 def test_speed_limits_markings_and_neighbours() -> None:

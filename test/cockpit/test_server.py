@@ -189,6 +189,14 @@ async def test_names_and_layers_are_kept() -> None:
         client = running.hub.clients['c1']
         await wait_until(lambda: client.wants_predictions, 'the layers')
         assert client.name == 'Ada' and not running.backend.commands
+        # What was not named stays; who wants more gets the newest of it, also in a pause.
+        wanted = running.hub.send_frame
+        wanted('seen:1', b'12345678', only_if=lambda other: other.perceives_as == 'av0')
+        await socket.send_json({'type': 'layers', 'perception': 'av0', 'scans': True})
+        await wait_until(lambda: client.wants_scans, 'the layers')
+        assert client.wants_predictions and client.perceives_as == 'av0'
+        while (message := await socket.receive(timeout=5.0)).data != b'12345678':
+            assert message.type in (WSMsgType.TEXT, WSMsgType.BINARY)
         await socket.close()
 
 

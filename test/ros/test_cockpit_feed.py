@@ -9,9 +9,12 @@ from typing import Any
 
 from cockpit_graph import Graph, lived, OFFSET_NS
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from live_support import CUT_IN, SCENARIOS
+from live_support import SCENARIOS
+from nav_msgs.msg import OccupancyGrid, Odometry
 import numpy as np
+from perception_samples import estimate, grid, perceiving_setup, scan
 import pytest
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -27,8 +30,8 @@ FULL = {'keys': [1, 0, 0, 0], 'reverse': 0}
 
 @pytest.fixture(scope='module')
 def setup() -> Setup:
-    """Load the cut-in game."""
-    return build_setup(load_game(CUT_IN))
+    """Load the cut-in game, with an AV that perceives."""
+    return perceiving_setup()
 
 
 def _trajectory(*points: int, names: tuple[str, ...] = ()) -> JointTrajectory:
@@ -53,6 +56,11 @@ MALFORMED = [
     ('/<av>/plan_request', 'av0', [
         _trajectory(), _trajectory(4, 3, names=('hv0/x',)), _trajectory(0, names=('hv0/x',)),
         _trajectory(1, names=('hv0/x',)), _trajectory(*[1] * 2000, names=('hv0/x',))]),
+    ('/<av>/scan', 'av0', [LaserScan(), scan('front', 10, ranges=array('f', [])),
+                           scan('front', 10, range_max=float('nan')), scan('none', 10),
+                           scan('front', 10, ranges=array('f', [1.0] * 20_000))]),
+    ('/<av>/localization', 'av0', [Odometry(), estimate(10, float('nan'))]),
+    ('/occupancy', '', [OccupancyGrid(), grid(3, 3, [0] * 8), grid(0, 0, [])]),
     ('/timing/cycle', '', [Float64MultiArray(), _cycle(20, 0), _cycle(20, 19), _cycle(7, 700)]),
     *((name, '', [String(data=text) for text in (
         '', '{', '[]', '{}', '[' * 100_000, '{"hv0": 3}', '{"hv0": {}}', '{"k": "x"}',
@@ -74,7 +82,8 @@ def test_no_message_stops_the_pump(setup: Setup, name: str, vehicle: str,
     """Whatever peers send: the next good state is shown, and a driver drives."""
     async def check(graph: Graph) -> None:
         page = graph.page()
-        page.wants_predictions = True
+        page.wants_predictions = page.wants_scans = True
+        page.perceives_as = 'av0'
         await graph.begin(setup)
         await graph.seats('cockpit')
         for message in messages:

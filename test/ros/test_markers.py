@@ -218,8 +218,8 @@ def test_objects_stand_at_their_centres(setup: Setup, scene: SceneMarkers) -> No
     ('car', Role.HUMAN, '#E69F00'), ('car', Role.AUTONOMOUS, '#56B4E9'),
     ('car', Role.RECORDED, '#C8C8C8'), ('truck', Role.TRAFFIC, '#009E73'),
     ('parkedVehicle', Role.STATIC, '#999999'), ('bicycle', Role.RECORDED, '#CC79A7'),
-    ('pedestrian', Role.TRAFFIC, '#CC79A7')],
-    ids=['human', 'av', 'recorded', 'traffic', 'static', 'cyclist', 'pedestrian'])
+    ('pedestrian', Role.TRAFFIC, '#CC79A7'), ('car', Role.SCRIPTED, '#B3A2E8')],
+    ids=['human', 'av', 'recorded', 'traffic', 'static', 'cyclist', 'pedestrian', 'scripted'])
 def test_colour_tells_the_role(kind: str, role: Role, code: str) -> None:
     """The palette of Okabe and Ito: people outside cars by what they are, others by role."""
     body = Body(style.map_header(), 0, ObjectDescription('o1', kind, role,

@@ -3,7 +3,9 @@
 /** Binary frames of the cockpit: little-endian Float64 values, five of them the header. */
 
 /** Frame kinds, the first value of a frame. */
-export const KIND = Object.freeze({ STATE: 1, OBJECTS: 2, PLAN: 3, PREDICTION: 4 });
+export const KIND = Object.freeze({
+  STATE: 1, OBJECTS: 2, PLAN: 3, PREDICTION: 4, SCAN: 5, ESTIMATE: 6, SEEN: 7, OCCUPANCY: 8,
+});
 
 /** Columns of a vehicle's row in a STATE frame. */
 export const VEHICLE = Object.freeze({
@@ -23,7 +25,10 @@ const HEADER = 5;
  *
  * @param {ArrayBuffer} buffer the frame
  * @returns {object|null} kind, epoch, n, k, t [s] and by kind: vehicles | objects (rows) |
- *   index and points | index, steps and entries of {column, points}; null for an unknown kind
+ *   index and points | index, steps and entries of {column, points} | index, sensor, x, y [m],
+ *   yaw, first, increment [rad], longest [m], period_s and ranges | index, x, y, yaw, speed,
+ *   yaw_rate and the covariance xx, xy, yy | index and columns | x, y, resolution [m], rows,
+ *   columns and bits; null for an unknown kind
  * @throws {RangeError} when the frame is shorter than it says
  */
 export function decodeFrame(buffer) {
@@ -47,9 +52,37 @@ export function decodeFrame(buffer) {
       };
     case KIND.PREDICTION:
       return { ...head, index: values[HEADER], ...predictions(values, rows) };
+    case KIND.SCAN:
+      return { ...head, ...scan(values, rows) };
+    case KIND.ESTIMATE: {
+      const [x, y, yaw, speed, yaw_rate, xx, xy, yy] = rows(HEADER + 1, 1, 8);
+      return { ...head, index: values[HEADER], x, y, yaw, speed, yaw_rate, xx, xy, yy };
+    }
+    case KIND.SEEN:
+      return { ...head, index: values[HEADER], columns: rows(HEADER + 2, values[HEADER + 1], 1) };
+    case KIND.OCCUPANCY:
+      return { ...head, ...occupancy(buffer, rows) };
     default:
       return null;
   }
+}
+
+function scan(values, rows) {
+  const [index, sensor, x, y, yaw, first, increment, longest, period_s] = rows(HEADER, 1, 9);
+  return {
+    index, sensor, x, y, yaw, first, increment, longest, period_s,
+    ranges: rows(HEADER + 10, values[HEADER + 9], 1),
+  };
+}
+
+function occupancy(buffer, rows) {
+  const [x, y, resolution, height, width] = rows(HEADER, 1, 5);
+  const words = Math.ceil(height * width / 64);
+  rows(HEADER + 5, words, 1);
+  return {
+    x, y, resolution, rows: height, columns: width,
+    bits: new Uint8Array(buffer, 8 * (HEADER + 5), 8 * words),
+  };
 }
 
 function predictions(values, rows) {

@@ -21,6 +21,7 @@ const PARTS = [
   ['./panels/planners.js', 'createPlanners', '#planners', 'planners'],
   ['./panels/timing.js', 'createTiming', '#timekeeping', 'timing'],
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
+  ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
 

@@ -5,6 +5,7 @@
 import { DisplayClock } from './display_clock.js';
 import { decodeFrame, KIND, VEHICLE, VEHICLE_WIDTH } from './frames.js';
 import { extrapolateVehicles, interpolateVehicles, moveObjects } from './interpolation.js';
+import { Perceived } from './perceived.js';
 import { SampleRing } from './samples.js';
 
 // At 100 Hz the ring of raw samples holds 5 s, that of scenario steps at 10 Hz 10 s.
@@ -36,6 +37,8 @@ export class Store {
   plans = new Map();
   /** Index of the asking AV -> {epoch, n, k, t, index, steps, entries}. */
   predictions = new Map();
+  /** What AVs perceive, and the map of permanent obstacles. */
+  perceived = new Perceived();
   /** Received raw samples, a few seconds: states and scenario steps. */
   samples = new SampleRing(RAW_SAMPLES);
   steps = new SampleRing(RAW_STEPS);
@@ -54,7 +57,7 @@ export class Store {
 
   /**
    * Listen to an event: hello, scene, seats, signals, events, status, alarms, notice, connection,
-   * state, objects, plan, prediction, epoch. The listener gets what came.
+   * state, objects, plan, prediction, perception, epoch. The listener gets what came.
    *
    * @param {string} name of the event
    * @param {function(any): void} listener called after the store has taken the content in
@@ -81,6 +84,7 @@ export class Store {
         break;
       case 'scene':
         this.scene = message;
+        this.perceived.occupancy = null;
         if ((message.time?.epoch ?? -1) > this.epoch
             || (this.#fresh && message.time?.epoch < this.epoch)) {
           this.restart(message.time.epoch);
@@ -118,19 +122,15 @@ export class Store {
     this.#shownFor_ms = NaN;
     switch (frame.kind) {
       case KIND.STATE: this.#takeState(frame, now_ms); break;
-      case KIND.OBJECTS:
-        this.steps.push(frame);
-        this.#emit('objects', frame);
-        break;
-      case KIND.PLAN:
-        this.plans.set(frame.index, frame);
-        this.#emit('plan', frame);
-        break;
+      case KIND.OBJECTS: this.steps.push(frame); this.#emit('objects', frame); break;
+      case KIND.PLAN: this.plans.set(frame.index, frame); this.#emit('plan', frame); break;
       case KIND.PREDICTION:
         this.predictions.set(frame.index, frame);
         this.#emit('prediction', frame);
         break;
       default:
+        this.perceived.take(frame);
+        this.#emit('perception', frame);
     }
   }
 
@@ -146,6 +146,7 @@ export class Store {
     this.#history.clear();
     this.plans.clear();
     this.predictions.clear();
+    this.perceived.clear();
     this.clock.reset();
     this.#shownFor_ms = NaN;
     this.#emit('epoch', epoch);

@@ -195,7 +195,8 @@ export class Driving {
       return 'Driven in a cockpit';
     }
     const role = scene?.vehicles[this.#store.vehicleIndex(id)]?.role;
-    return connected && seats[id] ? describeSeat(seats[id], role, scene?.planners?.[id], me.id) : '';
+    return connected && seats[id]
+      ? describeSeat(seats[id], role, scene?.planners?.[id], me.id) : '';
   }
 }
 

@@ -173,6 +173,7 @@ function buildParts() {
   const parts = {
     kmh: span('kmh', 'Speed'), ms: span('ms', 'Signed speed'), gear: span('gear', 'Gear'),
     acceleration: span('acceleration', 'Acceleration'), who: span('who'), device: span('device'),
+    seen: span('seen', 'Of those within reach of its sensors: whom its planner is told of'),
     angle: span('angle', 'Angle of the front wheels, positive to the left'),
     command: span('command', 'Steering command, positive to the left'),
     limit: element('span', { class: 'hud-limit', role: 'img', title: 'Speed limit' }),
@@ -181,7 +182,7 @@ function buildParts() {
     banner: element('div', { class: 'hud-banner', role: 'status', 'aria-live': 'polite' }),
   };
   parts.board = element('div', { class: 'hud-board' },
-    element('div', { class: 'hud-title' }, parts.who, parts.device),
+    element('div', { class: 'hud-title' }, parts.who, parts.device, parts.seen),
     element('div', { class: 'hud-row' },
       element('div', { class: 'hud-pedals' }, parts.brake.node, parts.throttle.node),
       speedBlock(parts),

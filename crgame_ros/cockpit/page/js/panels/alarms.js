@@ -15,6 +15,7 @@ const KINDS = {
   stale_plan: ['Plan stale', false],
   recording: ['Recording failed', false],
   late: ['Running late', false],
+  late_traffic: ['Traffic late', false],
 };
 // So long an alarm stays to be seen after it has ended [ms].
 const LINGERS_MS = 4000;

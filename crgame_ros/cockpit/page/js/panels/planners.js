@@ -4,6 +4,7 @@
 
 import { element, setAttribute, setText } from '../driving/dom.js';
 import { baseName } from './event_words.js';
+import { countText } from '../perception/unseen.js';
 import { count, fixed, oneLine } from './format.js';
 import { icon } from './icons.js';
 
@@ -13,6 +14,14 @@ const COLUMNS = [
   ['Accepted', 'plans taken', (p) => count(p.accepted), ''],
   ['Refused', 'plans that broke a rule', (p) => count(p.refused), ''],
   ['Fallbacks', 'brakings where the planner found no plan', (p) => count(p.fallbacks), ''],
+];
+
+const TRACKING_TITLE = 'Where the vehicle is, against where its plan wanted it to be now; '
+  + 'in parentheses the worst of the run';
+// Of a tracked AV: name of the error, factor to the unit, unit, digits.
+const ERRORS = [
+  ['lateral', 1, 'm', 2], ['along', 1, 'm', 2], ['heading', 180 / Math.PI, '°', 1],
+  ['speed', 1, 'm/s', 2],
 ];
 
 /**
@@ -68,6 +77,8 @@ function makeRow(av, connection) {
   const state = element('span', { class: 'tag' });
   const error = element('p', { class: 'field-error', role: 'alert' });
   const refusal = element('p', { class: 'dim refusal' });
+  const tracking = element('p', { class: 'dim tracking', title: TRACKING_TITLE });
+  const seen = element('p', { class: 'dim seen' });
   const cells = COLUMNS.map(() => element('td', {}));
   const wanted = { run: true };
   const button = element('button', {
@@ -85,7 +96,7 @@ function makeRow(av, connection) {
     root: element('tbody', { 'data-av': av },
       element('tr', { class: 'planner-head' }, element('td', { colspan: COLUMNS.length + 1 },
         element('div', {}, element('strong', { class: 'av', text: av }), name, state, button),
-        refusal, error)),
+        refusal, seen, tracking, error)),
       element('tr', {}, element('td', {}), ...cells)),
     update(planner, store) {
       const stopped = planner.running === false;
@@ -110,6 +121,23 @@ function makeRow(av, connection) {
         planner.plan_time_ms > 0 ? `plans in ${fixed(planner.plan_time_ms, 1)} ms` : '',
         why ? `last refused: ${why}` : '',
       ].filter(Boolean).join(', '));
+      setText(tracking, trackingText(planner.tracking));
+      const { perception, world } = window.crgame;
+      const counted = world.followed === av ? perception?.count ?? null : null;
+      setText(seen, counted === null ? '' : countText(counted));
     },
   };
+}
+
+/** How far a tracked AV is from its plan: now, and at worst so far. */
+function trackingText(tracking) {
+  if (!tracking) {
+    return '';
+  }
+  const parts = ERRORS.map(([name, factor, unit, digits]) => {
+    const [now, worst] = ['', 'worst_'].map((when) => fixed(
+      factor * (tracking[`${when}${name}_error`] ?? NaN), digits));
+    return `${name} ${now} ${unit} (${worst})`;
+  });
+  return `off its plan: ${parts.join(', ')}`;
 }

@@ -191,7 +191,7 @@ function objectColour(object) {
   if (VULNERABLE.has(object.type)) {
     return 'vulnerable';
   }
-  return ['static', 'traffic'].includes(object.role) ? object.role : 'recorded';
+  return ['static', 'traffic', 'scripted'].includes(object.role) ? object.role : 'recorded';
 }
 
 function drawBody(context, { shape, pose: [x, y, yaw], ahead, fill, scale, edge = null }) {

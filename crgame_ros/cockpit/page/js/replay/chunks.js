@@ -136,12 +136,20 @@ export class Chunks {
   #entries(frames, number) {
     let at = this.#info.start_s + number * this.#info.chunk_s - 1e-9;
     return frames.map((buffer) => {
-      const [kind, , , , t, index] = new Float64Array(buffer, 0, 6);
+      const [kind, , , , t, index, sensor] = new Float64Array(buffer);
       if (kind !== KIND.PLAN) {
         at = Math.max(at, t);
       }
-      const single = kind === KIND.STATE || kind === KIND.OBJECTS;
-      return { at, kind, slot: single ? `${kind}` : `${kind}:${index}`, buffer };
+      return { at, kind, slot: slotOf(kind, index, sensor), buffer };
     });
+  }
+}
+
+/** What a later frame takes the place of: of vehicles and sensors each has its own. */
+function slotOf(kind, index, sensor) {
+  switch (kind) {
+    case KIND.STATE: case KIND.OBJECTS: case KIND.OCCUPANCY: return `${kind}`;
+    case KIND.SCAN: return `${kind}:${index}:${sensor}`;
+    default: return `${kind}:${index}`;
   }
 }

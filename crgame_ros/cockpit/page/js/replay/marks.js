@@ -15,6 +15,7 @@ const KINDS = {
   trigger: ['M6 0L12 6 6 12 0 6Z', 'Event'],
   stop: ['M3.5 0H8.5L12 3.5V8.5L8.5 12H3.5L0 8.5V3.5Z', 'Stopped'],
   late: ['M1 0H11L7 6 11 12H1L5 6Z', 'Late'],
+  late_traffic: ['M0 7L3 2H9L12 7V10H0Z', 'Traffic late'],
   reset: ['M6 0A6 6 0 1 1 5.9 0ZM6 3A3 3 0 1 0 6.1 3Z', 'Clock reset'],
   recording: ['M6 0A6 6 0 1 1 5.9 0Z', 'Recording failed'],
   gap: ['M1 0H4.5V12H1ZM7.5 0H11V12H7.5Z', 'Not recorded'],

@@ -27,8 +27,10 @@ export class Painter {
     }
   }
 
-  /** Add a layer of somebody else's; see World.addLayer. */
+  /** Add a layer of somebody else's, in place of one of the same name; see World.addLayer. */
   add(name, draw, where) {
+    this.#extra.below.delete(name);
+    this.#extra.above.delete(name);
     this.#extra[where].set(name, { draw, on: true });
   }
 

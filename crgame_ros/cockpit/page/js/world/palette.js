@@ -3,10 +3,11 @@
 /** The colours of the theme in force, read from the style sheets' custom properties. */
 
 const NAMES = [
-  'human', 'av', 'recorded', 'vulnerable', 'static', 'traffic', 'alarm', 'accent',
+  'human', 'av', 'recorded', 'vulnerable', 'static', 'traffic', 'scripted', 'alarm', 'accent',
   'map-ground', 'map-grid', 'map-road', 'map-junction', 'map-walk', 'map-cycle', 'map-parking',
   'map-kerb', 'map-mark', 'map-seam', 'map-arrow', 'map-stop', 'map-outline', 'map-glass',
   'map-lamp', 'map-brake', 'map-shadow', 'map-label', 'map-label-ground', 'map-overlay',
+  'map-ray', 'map-estimate', 'map-occupied',
 ];
 
 /**

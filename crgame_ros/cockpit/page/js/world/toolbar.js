@@ -37,23 +37,26 @@ export function createToolbar(root, actions) {
     return element;
   };
   const view = group();
-  button(view, 'plus', 'Zoom in (+)', () => actions.zoomBy(1.4));
-  button(view, 'minus', 'Zoom out (-)', () => actions.zoomBy(1 / 1.4));
-  button(view, 'fit', 'Show the whole map (0)', actions.fit);
+  toolButton(view, ICONS.plus, 'Zoom in (+)', () => actions.zoomBy(1.4));
+  toolButton(view, ICONS.minus, 'Zoom out (-)', () => actions.zoomBy(1 / 1.4));
+  toolButton(view, ICONS.fit, 'Show the whole map (0)', actions.fit);
   const camera = group();
-  const follow = button(camera, 'follow', 'Follow the next vehicle (F)', actions.followNext);
+  const follow = toolButton(camera, ICONS.follow, 'Follow the next vehicle (F)',
+    actions.followNext);
   const name = document.createElement('button');
   name.type = 'button';
   name.className = 'followed';
   name.title = 'Centre on the followed vehicle';
   name.addEventListener('click', actions.recenter);
   camera.append(name);
-  const heading = button(camera, 'heading', 'Heading or north up (H)', actions.toggleHeading);
+  const heading = toolButton(camera, ICONS.heading, 'Heading or north up (H)',
+    actions.toggleHeading);
   const layers = group();
-  const plans = button(layers, 'plan', 'Plans of the AVs', actions.togglePlans);
-  const predictions = button(layers, 'prediction', 'What the planners expect of others',
+  const plans = toolButton(layers, ICONS.plan, 'Plans of the AVs', actions.togglePlans);
+  const predictions = toolButton(layers, ICONS.prediction, 'What the planners expect of others',
     actions.togglePredictions);
-  const labels = button(layers, 'labels', 'Ids: vehicles, all, none (L)', actions.toggleLabels);
+  const labels = toolButton(layers, ICONS.labels, 'Ids: vehicles, all, none (L)',
+    actions.toggleLabels);
   root.append(bar);
   return {
     update(state) {
@@ -67,7 +70,16 @@ export function createToolbar(root, actions) {
   };
 }
 
-function button(root, icon, title, action) {
+/**
+ * Make a button of the toolbar.
+ *
+ * @param {HTMLElement} root group that gets it
+ * @param {string} strokes SVG path of its picture in a square of 24
+ * @param {string} title what it does
+ * @param {function(): void} action called by a click
+ * @returns {HTMLButtonElement}
+ */
+export function toolButton(root, strokes, title, action) {
   const element = document.createElement('button');
   element.type = 'button';
   element.title = title;
@@ -75,7 +87,7 @@ function button(root, icon, title, action) {
   const svg = document.createElementNS(SVG, 'svg');
   svg.setAttribute('viewBox', '0 0 24 24');
   const path = document.createElementNS(SVG, 'path');
-  path.setAttribute('d', ICONS[icon]);
+  path.setAttribute('d', strokes);
   for (const [key, value] of Object.entries({
     fill: 'none', stroke: 'currentColor', 'stroke-width': '2', 'stroke-linecap': 'round',
     'stroke-linejoin': 'round' })) {
@@ -92,6 +104,12 @@ function button(root, icon, title, action) {
   return element;
 }
 
-function press(element, pressed) {
+/**
+ * Show whether what a button switches is on.
+ *
+ * @param {HTMLElement} element the button
+ * @param {boolean} pressed whether it is
+ */
+export function press(element, pressed) {
   element.setAttribute('aria-pressed', String(pressed));
 }

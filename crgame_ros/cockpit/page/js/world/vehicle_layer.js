@@ -3,6 +3,7 @@
 /** Humans' vehicles, AVs, obstacles and pedestrians, where they are shown at this moment. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { drawOutline } from './hollow.js';
 import { lookOf, TYRE } from './vehicle_shape.js';
 
 // Far out, things stay this long on the screen [px]: driven vehicles, people
@@ -22,6 +23,8 @@ export class VehicleLayer {
   /** In the order of STATE and OBJECTS: {id, look, color, radius, …}. */
   vehicles = [];
   objects = [];
+  /** Chooses in each frame what is drawn hollow; see World.drawHollow. */
+  hollow = () => null;
   #braking = new Uint8Array(0);
   #lastStep = null;
 
@@ -101,22 +104,28 @@ export class VehicleLayer {
   /** Draw objects, then the driven vehicles over them. */
   draw(context, view) {
     const { camera, shown } = view;
+    const hollow = this.hollow(view);
     for (let i = 0; i < this.objects.length; i += 1) {
       const row = i * OBJECT_WIDTH;
       const x = shown.objects[row];
       const y = shown.objects[row + 1];
       const object = this.objects[i];
       if (camera.sees(x, y, object.look.radius)) {
-        drawLook(context, view, object, x, y, shown.objects[row + 2], this.#braking[i] === 1,
-          LEAST_PX[object.color] ?? LEAST_PX.other);
+        const leastPx = LEAST_PX[object.color] ?? LEAST_PX.other;
+        if (hollow?.[this.vehicles.length + i]) {
+          drawOutline(context, view, object, x, y, shown.objects[row + 2], leastPx);
+        } else {
+          drawLook(context, view, object, x, y, shown.objects[row + 2], this.#braking[i] === 1,
+            leastPx);
+        }
       }
     }
     for (let i = 0; i < this.vehicles.length; i += 1) {
-      this.#drawVehicle(context, view, i);
+      this.#drawVehicle(context, view, i, Boolean(hollow?.[i]));
     }
   }
 
-  #drawVehicle(context, view, index) {
+  #drawVehicle(context, view, index, hollow) {
     const { camera, shown, ratio, palette, store } = view;
     const vehicle = this.vehicles[index];
     const row = index * VEHICLE_WIDTH;
@@ -126,9 +135,11 @@ export class VehicleLayer {
     if (!camera.sees(x, y, vehicle.look.radius)) {
       return;
     }
-    const factor = drawLook(context, view, vehicle, x, y, yaw, brakes(shown.vehicles, row),
-      LEAST_PX.driven);
-    if (vehicle.look.extent * camera.scale > 2 * DETAIL_PX) {
+    const factor = hollow
+      ? drawOutline(context, view, vehicle, x, y, yaw, LEAST_PX.driven)
+      : drawLook(context, view, vehicle, x, y, yaw, brakes(shown.vehicles, row),
+        LEAST_PX.driven);
+    if (!hollow && vehicle.look.extent * camera.scale > 2 * DETAIL_PX) {
       drawTyres(context, view, vehicle, x, y, yaw,
         shown.vehicles[row + VEHICLE.steering_angle]);
     }
@@ -220,5 +231,5 @@ function colorOf({ type, role }) {
   if (type === 'pedestrian' || type === 'bicycle') {
     return 'vulnerable';
   }
-  return { traffic: 'traffic', static: 'static' }[role] ?? 'recorded';
+  return ['traffic', 'scripted', 'static'].includes(role) ? role : 'recorded';
 }

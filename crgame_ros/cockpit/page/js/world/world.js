@@ -8,11 +8,12 @@ import { attachKeys } from './keys.js';
 import { Navigation } from './navigation.js';
 import { Painter } from './painter.js';
 import { onThemeChange, Palette } from './palette.js';
+import { keepShown } from './shown.js';
 import { createToolbar } from './toolbar.js';
 
 const FRAMES_KEPT = 600;
-const REDRAWN_ON = ['state', 'objects', 'plan', 'prediction', 'signals', 'status', 'seats',
-  'events', 'epoch', 'hello'];
+const REDRAWN_ON = ['state', 'objects', 'plan', 'prediction', 'perception', 'signals', 'status',
+  'seats', 'events', 'epoch', 'hello'];
 
 /** One canvas that shows what a store holds. */
 export class World {
@@ -72,6 +73,14 @@ export class World {
     this.#navigation.follow(id, headingUp);
   }
 
+  /**
+   * @param {number} index of a driven vehicle
+   * @returns {object|undefined} its scene entry with its look and color, undefined for none
+   */
+  vehicle(index) {
+    return this.#painter.vehicles.vehicles[index];
+  }
+
   /** Show a vehicle or object in the middle, without following it. */
   centerOn(id) {
     const pose = this.#poseOf(id);
@@ -112,6 +121,17 @@ export class World {
    */
   addLayer(name, draw, where = 'below') {
     this.#painter.add(name, draw, where);
+    this.redraw();
+  }
+
+  /**
+   * Let a function choose what is drawn as an outline only.
+   *
+   * @param {function(object): Uint8Array|null} choose called in each frame with what layers get;
+   *   gives 1 for each vehicle, then object, that is to be hollow, null for none
+   */
+  drawHollow(choose) {
+    this.#painter.vehicles.hollow = choose;
     this.redraw();
   }
 
@@ -248,7 +268,7 @@ export class World {
       return;
     }
     this.#dirty = false;
-    this.#take(shown);
+    this.shown = this.#view.shown = keepShown(this.shown, shown);
     this.#navigation.steer(this.#poseOf(this.followed), this.stats.frames > 1);
     this.camera.update(now_ms);
     this.#view.now_ms = now_ms;
@@ -256,28 +276,6 @@ export class World {
     this.stats.frame_ms[this.stats.frames % FRAMES_KEPT] = performance.now() - begin_ms;
     this.stats.frames += 1;
   }
-
-  /** Keep what is drawn: the store refills its own arrays for whoever asks next. */
-  #take(shown) {
-    if (shown === null) {
-      this.shown = null;
-    } else {
-      this.shown ??= { vehicles: new Float64Array(0), objects: new Float64Array(0) };
-      this.shown.vehicles = copied(this.shown.vehicles, shown.vehicles);
-      this.shown.objects = copied(this.shown.objects, shown.objects);
-      this.shown.t = shown.t;
-      this.shown.n = shown.n;
-      this.shown.k = shown.k;
-      this.shown.epoch = shown.epoch;
-    }
-    this.#view.shown = this.shown;
-  }
-}
-
-function copied(target, values) {
-  const result = target.length === values.length ? target : new Float64Array(values.length);
-  result.set(values);
-  return result;
 }
 
 /**

@@ -1,0 +1,105 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What AVs perceive, as far as this page asked for it, and the map of permanent obstacles. */
+
+import { KIND } from './frames.js';
+import { turn } from './interpolation.js';
+import { SampleRing } from './samples.js';
+
+// 3 s at the 30 Hz of a live run, 1 s at the 100 Hz of a recording.
+const ESTIMATES = 100;
+// A planner is told 10 times a second: what it was told so long ago it may have forgotten [s].
+const SEEN_LASTS_S = 1;
+// An estimate that is older says nothing; until then it is moved on [s].
+const ESTIMATE_LASTS_S = 0.5;
+// A scan stays for so many of its sensor's periods, and a moment longer [s].
+const SCAN_PERIODS = 2;
+const SCAN_LASTS_S = 0.3;
+// Frames may be ahead of what is shown by the delay of the display [s].
+const AHEAD_S = 0.5;
+
+/** Frames of perception by AV, and the newest map. */
+export class Perceived {
+  /** {x, y, resolution, rows, columns, bits} of the permanent obstacles, null for none. */
+  occupancy = null;
+  #seen = new Map();
+  #estimates = new Map();
+  #scans = new Map();
+
+  /**
+   * Take in a frame of one of these kinds.
+   *
+   * @param {object} frame as decodeFrame gives it
+   */
+  take(frame) {
+    switch (frame.kind) {
+      case KIND.SEEN: this.#seen.set(frame.index, frame); break;
+      case KIND.SCAN: this.#scans.set(`${frame.index}:${frame.sensor}`, frame); break;
+      case KIND.OCCUPANCY: this.occupancy = frame; break;
+      case KIND.ESTIMATE: {
+        const ring = this.#estimates.get(frame.index) ?? new SampleRing(ESTIMATES);
+        this.#estimates.set(frame.index, ring);
+        ring.push(frame);
+        break;
+      }
+      default:
+    }
+  }
+
+  /** Forget what AVs perceived; the map stays as long as its scene. */
+  clear() {
+    this.#seen.clear();
+    this.#estimates.clear();
+    this.#scans.clear();
+  }
+
+  /**
+   * Give who an AV's planner has been told of.
+   *
+   * @param {number} av index of the AV
+   * @param {number} t time that is shown [s]
+   * @returns {Float64Array|null} columns: vehicles, then objects; null while it is not known
+   */
+  seenBy(av, t) {
+    const frame = this.#seen.get(av);
+    return frame !== undefined && t - frame.t < SEEN_LASTS_S && frame.t - t < AHEAD_S
+      ? frame.columns : null;
+  }
+
+  /**
+   * Give where an AV takes itself to be: the last estimate, moved on.
+   *
+   * @param {number} av index of the AV
+   * @param {number} t time that is shown [s]
+   * @returns {{n: number, x: number, y: number, yaw: number, xx: number, xy: number,
+   *   yy: number}|null} rear axle [m, rad] and covariance [m^2], n of the estimate
+   */
+  estimateOf(av, t) {
+    const ring = this.#estimates.get(av);
+    const sample = ring?.at(Math.max(ring.indexAt(t + 1e-9), 0));
+    if (sample === undefined || Math.abs(t - sample.t) > ESTIMATE_LASTS_S) {
+      return null;
+    }
+    const passed = t - sample.t;
+    const turned = sample.yaw_rate * passed;
+    const heading = sample.yaw + 0.5 * turned;
+    const { n, xx, xy, yy } = sample;
+    return {
+      n, xx, xy, yy, x: sample.x + sample.speed * passed * Math.cos(heading),
+      y: sample.y + sample.speed * passed * Math.sin(heading),
+      yaw: turn(0, sample.yaw + turned, 1),
+    };
+  }
+
+  /**
+   * Give the newest scan of each sensor of an AV that is not too old.
+   *
+   * @param {number} av index of the AV
+   * @param {number} t time that is shown [s]
+   * @returns {object[]} SCAN frames
+   */
+  scansOf(av, t) {
+    return [...this.#scans.values()].filter((scan) => scan.index === av
+      && t - scan.t < SCAN_PERIODS * scan.period_s + SCAN_LASTS_S && scan.t - t < AHEAD_S);
+  }
+}

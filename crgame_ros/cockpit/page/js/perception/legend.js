@@ -1,0 +1,52 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What the marks of perception stand for, beside the map while they are on it. */
+
+import { element, setAttribute, setText, svg } from '../driving/dom.js';
+
+// name: [strokes in a box of 28 x 16, words]; $ is the AV. The styles are in world.css.
+const ENTRIES = {
+  unseen: ['M14 2a6 6 0 1 0 .01 0z', 'not seen by $'],
+  rays: ['M2 14L26 2V14z', 'what the sensors of $ reach'],
+  estimate: ['M3 4h22v8H3z', 'where $ takes itself to be, 2σ'],
+  occupancy: ['M3 3h10v10H3zM15 3h10v10H15z', 'permanent obstacles'],
+};
+
+// Instead of the first while the planner has not been told of anybody for a while.
+const UNKNOWN = 'whom $ sees is not known now';
+
+/** A small table over the map. */
+export class Legend {
+  #root;
+  #rows = new Map();
+
+  /** @param {HTMLElement} stage that holds the canvas */
+  constructor(stage) {
+    this.#root = element('ul', { class: 'world-legend', 'aria-label': 'Legend', hidden: true });
+    for (const [name, [strokes]] of Object.entries(ENTRIES)) {
+      const text = element('span', {});
+      const row = element('li', { 'data-layer': name, hidden: true },
+        svg('svg', { viewBox: '0 0 28 16', 'aria-hidden': 'true' },
+          svg('path', { d: strokes })), text);
+      this.#rows.set(name, { row, text });
+      this.#root.append(row);
+    }
+    stage.append(this.#root);
+  }
+
+  /**
+   * Show the entries of what is on the map.
+   *
+   * @param {string[]} names of the layers
+   * @param {string} av id of the AV that is followed
+   * @param {boolean} known whether it is known whom it sees
+   */
+  show(names, av, known) {
+    for (const [name, { row, text }] of this.#rows) {
+      const words = name === 'unseen' && !known ? UNKNOWN : ENTRIES[name][1];
+      setText(text, words.replace('$', av));
+      setAttribute(row, 'hidden', !names.includes(name));
+    }
+    setAttribute(this.#root, 'hidden', names.length === 0);
+  }
+}

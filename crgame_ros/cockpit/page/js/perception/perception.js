@@ -1,0 +1,210 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What the followed AV perceives, over the true world: layers, their buttons and a legend. */
+
+import { setAttribute, setText } from '../driving/dom.js';
+import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
+import { recall, remember } from '../panels/memory.js';
+import { press, toolButton } from '../world/toolbar.js';
+import { EstimateLayer } from './estimate_layer.js';
+import { Legend } from './legend.js';
+import { OccupancyLayer } from './occupancy_layer.js';
+import { RayLayer } from './ray_layer.js';
+import { countText, Unseen } from './unseen.js';
+
+// name: [strokes of its button, what it shows, whether it is on at first, needs a perceiving AV]
+const LAYERS = {
+  unseen: ['M3 3l18 18M10 6a9 9 0 0 1 11 6a12 12 0 0 1-3 4M6 8a12 12 0 0 0-3 4'
+    + 'a9 9 0 0 0 12 5', 'Whom the followed AV does not see, as outlines', true, true],
+  rays: ['M4 12L20 4M4 12h16M4 12l16 8M3 12h.01', 'Rays of its sensors', false, true],
+  estimate: ['M3 8h3M10 8h4M18 8h3v3M21 14v2h-3M14 16h-4M6 16H3v-2M3 11V8',
+    'Where it takes itself to be', false, true],
+  occupancy: ['M3 3h8v8H3zM13 13h8v8h-8zM13 3h8v8h-8z', 'Permanent obstacles', true, false],
+};
+// Of the names of the world's layers: anybody may have one called rays.
+const PREFIX = 'perception_';
+const COUNT_EVERY_MS = 200;
+
+/** The layers of perception of one world. */
+class Perception {
+  #store;
+  #connection;
+  #world;
+  #unseen = null;
+  #flags = null;
+  #on = {};
+  #buttons = new Map();
+  #group;
+  #rays = new RayLayer();
+  #estimate = new EstimateLayer();
+  #occupancy = new OccupancyLayer();
+  #legend;
+  #told = '';
+  #legended = '';
+
+  constructor(stage, store, connection, world) {
+    this.#store = store;
+    this.#connection = connection;
+    this.#world = world;
+    this.#legend = new Legend(stage);
+    this.#addLayers(world);
+    this.#addButtons(stage.querySelector('.world-toolbar'));
+    store.on('scene', () => this.#load());
+    store.on('hello', () => {
+      this.#told = '';
+      this.#tell();
+    });
+    setInterval(() => this.#showCount(stage), COUNT_EVERY_MS);
+    this.#load();
+  }
+
+  /** Ids of those that are there and drawn as outlines. */
+  get hollow() {
+    const { shown } = this.#world;
+    const { vehicles, objects } = this.#store.scene ?? { vehicles: [], objects: [] };
+    return shown === null || this.#flags === null ? [] : [...vehicles, ...objects]
+      .filter((_, column) => this.#flags[column] === 1 && Number.isFinite(
+        column < vehicles.length ? shown.vehicles[column * VEHICLE_WIDTH]
+          : shown.objects[(column - vehicles.length) * OBJECT_WIDTH]))
+      .map(({ id }) => id);
+  }
+
+  /** How many fans of rays are drawn. */
+  get fans() {
+    return this.#on.rays ? this.#rays.drawn : 0;
+  }
+
+  /** The estimate as drawn last, null for none. */
+  get estimate() {
+    return this.#on.estimate ? this.#estimate.drawn : null;
+  }
+
+  /** How many occupied cells are on the map as drawn last. */
+  get occupied() {
+    return this.#on.occupancy ? this.#occupancy.drawn : 0;
+  }
+
+  /**
+   * Count whom the followed AV sees of those near it.
+   *
+   * @returns {{seen: number, near: number, range: number|null}|null} null unless it perceives
+   */
+  get count() {
+    const { shown } = this.#world;
+    const av = this.#av();
+    const columns = shown === null || av < 0 ? null
+      : this.#store.perceived.seenBy(av, shown.t);
+    return columns === null ? null : this.#unseen.count(av, columns, shown);
+  }
+
+  /**
+   * Show or hide a layer, and remember it.
+   *
+   * @param {string} name unseen, rays, estimate or occupancy
+   * @param {boolean} on whether it is shown
+   */
+  set(name, on) {
+    this.#on[name] = on;
+    remember(`layer.${name}`, on ? 'on' : 'off');
+    if (name !== 'unseen') {
+      this.#world.setLayer(PREFIX + name, on);
+    }
+    press(this.#buttons.get(name), on);
+    this.#tell();
+    this.#world.redraw();
+  }
+
+  #addLayers(world) {
+    world.drawHollow((view) => this.#choose(view));
+    world.addLayer(PREFIX + 'occupancy', (context, view) => this.#occupancy.draw(context, view));
+    world.addLayer(PREFIX + 'rays', (context, view) => this.#rays.draw(context, view, this.#av()));
+    world.addLayer(PREFIX + 'estimate', (context, view) => this.#estimate.draw(
+      context, view, world.vehicle(this.#av()), this.#av()), 'above');
+  }
+
+  #addButtons(bar) {
+    this.#group = document.createElement('div');
+    this.#group.className = 'world-group';
+    bar.append(this.#group);
+    for (const [name, [strokes, title, first]] of Object.entries(LAYERS)) {
+      const button = toolButton(this.#group, strokes, title,
+        () => this.set(name, !this.#on[name]));
+      button.dataset.layer = name;
+      this.#buttons.set(name, button);
+      const kept = recall(`layer.${name}`);
+      this.set(name, kept === '' ? first : kept === 'on');
+    }
+  }
+
+  #load() {
+    const { scene } = this.#store;
+    this.#unseen = scene === null ? null : new Unseen(scene);
+    const perceiving = scene?.vehicles.some(({ perception }) => perception) ?? false;
+    for (const [name, button] of this.#buttons) {
+      button.hidden = LAYERS[name][3] ? !perceiving : !scene?.occupancy;
+    }
+    this.#group.hidden = !perceiving && !scene?.occupancy;
+    this.#tell();
+  }
+
+  /** Index of the followed vehicle if it is an AV with perception, else -1. */
+  #av() {
+    return this.#unseen?.perceiving(this.#world.followed) ?? -1;
+  }
+
+  /** Tell the server what is wanted, if that has changed. */
+  #tell() {
+    const perception = this.#av() < 0 ? '' : this.#world.followed;
+    const scans = Boolean(this.#on.rays);
+    const told = `${perception} ${scans}`;
+    if (told !== this.#told
+        && this.#connection?.send({ type: 'layers', perception, scans })) {
+      this.#told = told;
+    }
+  }
+
+  #showLegend() {
+    const av = this.#av();
+    const names = Object.keys(LAYERS).filter((name) => this.#on[name]
+      && (name === 'occupancy' ? this.#store.scene?.occupancy : av >= 0));
+    const followed = this.#world.followed ?? '';
+    const known = this.#flags !== null;
+    const text = `${names.join()} ${followed} ${known}`;
+    if (text !== this.#legended) {
+      this.#legended = text;
+      this.#legend.show(names, followed, known);
+    }
+  }
+
+  /** In each frame: whom to draw as an outline. */
+  #choose({ store, shown }) {
+    this.#tell();
+    const av = this.#on.unseen ? this.#av() : -1;
+    const columns = av < 0 ? null : store.perceived.seenBy(av, shown.t);
+    this.#flags = columns === null ? null : this.#unseen.flags(av, columns);
+    this.#showLegend();
+    return this.#flags;
+  }
+
+  /** In the instruments: how much of what is near is seen. */
+  #showCount(stage) {
+    const line = stage.querySelector('.hud-seen');
+    if (line !== null) {
+      const { count } = this;
+      setText(line, count === null ? '' : countText(count));
+      setAttribute(line, 'hidden', count === null);
+    }
+  }
+}
+
+/**
+ * Put the layers of perception on the world.
+ *
+ * @param {HTMLElement} stage that holds the canvas
+ * @param {import('../store.js').Store} store
+ * @param {import('../connection.js').Connection} connection
+ * @returns {Perception}
+ */
+export function createPerception(stage, store, connection) {
+  return new Perception(stage, store, connection, window.crgame.world);
+}

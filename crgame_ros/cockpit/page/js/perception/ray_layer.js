@@ -1,0 +1,85 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The rays of an AV's sensors: a fan up to what they hit, and the line of the hits. */
+
+const FAN_ALPHA = 0.13;
+const HIT_ALPHA = 0.95;
+const HIT_PX = 2;
+// A full circle has no apex.
+const FULL = 2 * Math.PI - 0.05;
+// Hits of neighbouring rays belong together if they are this near, or nearer than four steps
+// across the rays [m].
+const TOGETHER_M = 0.6;
+const STEPS = 4;
+// What a single hit is drawn as [m].
+const DOT_M = 0.15;
+
+/** Builds the paths of each scan once; draws those of one AV. */
+export class RayLayer {
+  /** How many fans were drawn in the last frame. */
+  drawn = 0;
+  #paths = new WeakMap();
+
+  /**
+   * Draw the scans of an AV where their sensors were when they looked.
+   *
+   * @param {CanvasRenderingContext2D} context of the world
+   * @param {object} view as layers get it
+   * @param {number} av index of the AV; -1 draws nothing
+   */
+  draw(context, { camera, palette, ratio, store, shown }, av) {
+    const scans = av < 0 ? [] : store.perceived.scansOf(av, shown.t);
+    this.drawn = scans.length;
+    for (const scan of scans) {
+      const { fan, hits } = this.#pathsOf(scan);
+      camera.enterMap(context, ratio, scan.x, scan.y);
+      context.fillStyle = palette.ray;
+      context.globalAlpha = FAN_ALPHA;
+      context.fill(fan);
+      context.strokeStyle = palette.ray;
+      context.globalAlpha = HIT_ALPHA;
+      context.lineWidth = HIT_PX / camera.scale;
+      context.stroke(hits);
+    }
+  }
+
+  #pathsOf(scan) {
+    let paths = this.#paths.get(scan);
+    if (paths === undefined) {
+      paths = build(scan);
+      this.#paths.set(scan, paths);
+    }
+    return paths;
+  }
+}
+
+/** In metres around the sensor, along the axes of the map. */
+function build({ yaw, first, increment, longest, ranges }) {
+  const fan = new Path2D();
+  const hits = new Path2D();
+  const count = ranges.length;
+  if (Math.abs(increment) * count < FULL) {
+    fan.moveTo(0, 0);
+  }
+  let before = Infinity;
+  for (let i = 0; i < count; i += 1) {
+    const angle = yaw + first + i * increment;
+    const range = ranges[i];
+    const reach = Math.min(range, longest);
+    const x = reach * Math.cos(angle);
+    const y = reach * Math.sin(angle);
+    fan.lineTo(x, y);
+    if (range <= longest) {
+      if (Math.abs(range - before) < Math.max(TOGETHER_M, STEPS * increment * range)) {
+        hits.lineTo(x, y);
+      } else {
+        hits.moveTo(x, y);
+        hits.lineTo(x + DOT_M, y);
+        hits.moveTo(x, y);
+      }
+    }
+    before = range <= longest ? range : Infinity;
+  }
+  fan.closePath();
+  return { fan, hits };
+}

@@ -1,0 +1,45 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Things that somebody does not see: dashed outlines, and a ring around people. */
+
+const FILL_ALPHA = 0.1;
+const LINE_PX = 1.8;
+const DASH_PX = [4, 3];
+// A person is small: the ring is so far around [px].
+const RING_PX = 7;
+const RING_DASH_PX = [5, 4];
+
+/**
+ * Draw the outline of a thing.
+ *
+ * @param {CanvasRenderingContext2D} context of the world
+ * @param {object} view camera, palette and ratio
+ * @param {object} thing with its look and color
+ * @param {number} x of its centre [m]
+ * @param {number} y [m]
+ * @param {number} yaw [rad]
+ * @param {number} leastPx its least length on the screen [px]
+ * @returns {number} by how much it is enlarged
+ */
+export function drawOutline(context, { camera, palette, ratio }, thing, x, y, yaw, leastPx) {
+  const { look } = thing;
+  const factor = Math.max(1, leastPx / (look.extent * camera.scale));
+  const pixel = 1 / (camera.scale * factor);
+  camera.enterPose(context, ratio, x, y, yaw, factor);
+  context.fillStyle = palette[thing.color];
+  context.globalAlpha = FILL_ALPHA;
+  context.fill(look.body);
+  context.globalAlpha = 1;
+  context.strokeStyle = palette[thing.color];
+  context.lineWidth = LINE_PX * pixel;
+  context.setLineDash(DASH_PX.map((length) => length * pixel));
+  context.stroke(look.body);
+  if (thing.color === 'vulnerable') {
+    context.setLineDash(RING_DASH_PX.map((length) => length * pixel));
+    context.beginPath();
+    context.arc(0, 0, 0.5 * look.extent + RING_PX * pixel, 0, 2 * Math.PI);
+    context.stroke();
+  }
+  context.setLineDash([]);
+  return factor;
+}

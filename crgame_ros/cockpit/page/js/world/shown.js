@@ -1,0 +1,28 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What is drawn, kept: the store refills its own arrays for whoever asks next. */
+
+/**
+ * Copy what is to be seen into what was seen before.
+ *
+ * @param {object|null} kept of the frame before, refilled; null makes a new one
+ * @param {object|null} shown as Store.displayed gives it
+ * @returns {object|null} {t, n, k, epoch, vehicles, objects}
+ */
+export function keepShown(kept, shown) {
+  if (shown === null) {
+    return null;
+  }
+  const { t, n, k, epoch } = shown;
+  const target = kept ?? { vehicles: new Float64Array(0), objects: new Float64Array(0) };
+  return Object.assign(target, {
+    t, n, k, epoch, vehicles: copied(target.vehicles, shown.vehicles),
+    objects: copied(target.objects, shown.objects),
+  });
+}
+
+function copied(target, values) {
+  const result = target.length === values.length ? target : new Float64Array(values.length);
+  result.set(values);
+  return result;
+}

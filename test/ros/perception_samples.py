@@ -1,0 +1,59 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A game whose AV perceives, and messages of what it perceives."""
+
+from array import array
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from cockpit_graph import OFFSET_NS
+from live_support import CUT_IN
+from nav_msgs.msg import OccupancyGrid, Odometry
+import numpy as np
+from sensor_msgs.msg import LaserScan
+
+from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
+from crgame_ros.ros.messages import to_time
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.setup import build_setup, Setup
+
+
+def perceiving_setup() -> Setup:
+    """Load the cut-in game, with an AV that perceives by two sensors, and a map."""
+    game = load_game(CUT_IN)
+    perception = PerceptionSpec(sensors=(SensorSpec('front'), SensorSpec('rear', yaw=np.pi)))
+    return build_setup(replace(game, avs=(replace(game.avs[0], perception=perception),),
+                               occupancy=Path('map.yaml')))
+
+
+def scan(sensor: str, n: int, **fields: Any) -> LaserScan:
+    """Make a scan of av0 at step n: three rays over 120 degrees, the last of them into nothing."""
+    values = {'angle_min': -1.0, 'angle_max': 1.0, 'angle_increment': 1.0, 'range_max': 80.0,
+              'scan_time': 0.1, 'ranges': array('f', [4.0, 5.5, float('inf')])} | fields
+    message = LaserScan(**values)
+    message.header.frame_id = f'av0/{sensor}'
+    message.header.stamp = to_time(OFFSET_NS + n * 10_000_000)
+    return message
+
+
+def estimate(n: int, yaw: float) -> Odometry:
+    """Make an estimate at step n."""
+    message = Odometry()
+    message.header.stamp = to_time(OFFSET_NS + n * 10_000_000)
+    pose = message.pose.pose
+    pose.position.x, pose.position.y = 12.5, -1.25
+    pose.orientation.z, pose.orientation.w = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
+    message.twist.twist.linear.x, message.twist.twist.angular.z = 9.0, 0.05
+    message.pose.covariance = np.arange(36.0)
+    return message
+
+
+def grid(width: int, height: int, cells: list[int]) -> OccupancyGrid:
+    """Make a map of cells of half a metre."""
+    message = OccupancyGrid(data=array('b', cells))
+    message.info.resolution = 0.5
+    message.info.width, message.info.height = width, height
+    message.info.origin.position.x, message.info.origin.position.y = 10.0, -20.0
+    message.info.origin.orientation.w = 1.0
+    return message
