@@ -6,12 +6,13 @@ import argparse
 from pathlib import Path
 
 from scenario_crossing import crossing
+from scenario_engines import blocked_lane, dense_merge, fog, occluded_pedestrian
 from scenario_motorways import cut_in, lane_change, merge, traffic, two_avs
 from scenario_towns import intersection, parked_cars, roundabout_, t_junction
 from scenario_xml import write
 
 SCENARIOS = (cut_in, lane_change, merge, t_junction, intersection, roundabout_, parked_cars,
-             two_avs, traffic, crossing)
+             two_avs, traffic, crossing, occluded_pedestrian, dense_merge, blocked_lane, fog)
 
 
 def main() -> None:

@@ -36,23 +36,34 @@ SLOWEST = 3.0
 PREPARE = 400.0
 # Nobody begins to change lanes this shortly before or in a junction [m].
 NO_CHANGE = 15.0
+# Nor this near to an obstacle: the front would hit it; with less than that room the way out of the
+# lane is as short as this allows [m].
+TOO_NEAR = 4.0
+TIGHT = 10.0
+# Who has not got far in a change for so long gives it up [s].
+GIVE_UP = 5.0
+STARTED = 0.4
+# A lane that is blocked too is worth changing into if it goes on for so much longer [m].
+BEYOND = 25.0
 
 
 @dataclass(frozen=True)
 class Wish:
-    """Agents (N) that want into the lane beside them: slots, side, urgency, and what is there."""
+    """Agents (N) that want into the lane beside them: side, urgency, room before an obstacle."""
 
     slots: IntArray
     side: IntArray
     urgency: FloatArray
+    room: FloatArray
     beside: Beside
 
     def take(self, rows: NDArray[np.bool_]) -> 'Wish':
         """Pick some of them."""
         columns = {name: getattr(self.beside, name)[rows] for name in (
-            'lane', 's', 'd', 'turn', 'lead_gap', 'lead_speed', 'follow_gap', 'follow_speed',
-            'follower')}
-        return Wish(self.slots[rows], self.side[rows], self.urgency[rows], Beside(**columns))
+            'lane', 's', 'd', 'turn', 'lead_gap', 'lead_speed', 'leader', 'follow_gap',
+            'follow_speed', 'follower')}
+        return Wish(self.slots[rows], self.side[rows], self.urgency[rows], self.room[rows],
+                    Beside(**columns))
 
 
 class LaneChanges:
@@ -76,17 +87,28 @@ class LaneChanges:
         self._politeness = politeness
         self._cooperative = cooperative
         self._calm = max(1, round(CALM / time_step_s))
+        self._give_up = round(GIVE_UP / time_step_s)
         self._gaps = GapAcceptance()
         self._courtesy = CourtesyRules()
 
-    def finish(self, agents: Agents) -> None:
-        """End the changes that have come to their end."""
-        done = (agents.source != NOBODY) & (agents.s - agents.from_s >= agents.span)
-        agents.source[done] = NOBODY
+    def finish(self, k: int, agents: Agents) -> None:
+        """End the changes that have come to their end, and those that come to nothing."""
+        done = agents.s - agents.from_s
+        agents.source[done >= agents.span] = NOBODY
+        stuck = np.flatnonzero(
+            agents.active & (agents.source != NOBODY) & (agents.source != agents.lane)
+            & (agents.waits > self._give_up) & (done < STARTED * agents.span))
+        if len(stuck):
+            graph, lane, center = self._graph, agents.source[stuck], agents.centers()[stuck]
+            guess = agents.s[stuck] * graph.length[lane] / graph.length[agents.lane[stuck]]
+            agents.s[stuck], agents.d[stuck], _ = graph.project(
+                lane, center[:, 0], center[:, 1], guess)
+            agents.lane[stuck], agents.source[stuck] = lane, NOBODY
+            agents.calm_until[stuck] = k + self._give_up
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
-               acceleration: FloatArray, blocked: FloatArray, entries: Entries,
-               order: LaneOrder) -> FloatArray:
+               acceleration: FloatArray, blocked: FloatArray, standing: BoolArray,
+               entries: Entries, order: LaneOrder) -> FloatArray:
         """
         Begin lane changes, and say how those brake who make room.
 
@@ -94,12 +116,14 @@ class LaneChanges:
         :param desired: (A) desired speeds [m/s]
         :param acceleration: (A) that they want in their own lanes [m/s^2]
         :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
+        :param standing: (E) which entries are such obstacles.
         :return: (A) accelerations that courtesy allows, inf where it asks for nothing.
         """
         yielding = np.full(agents.count, np.inf)
         wish = self._wishes(k, agents, slots, blocked, entries, order)
         if wish is None:
             return yielding[slots]
+        wish = wish.take(~_blocked(wish, standing))
         want, now = np.zeros(agents.count), np.zeros(agents.count)
         want[slots], now[slots] = desired, acceleration
         ok, gain = self._judge(agents, wish, want, now)
@@ -121,7 +145,8 @@ class LaneChanges:
         remaining = routes.remaining[destination, lane] - agents.s[slots]
         stuck = blocked < PREPARE
         hurry = urgency(np.minimum(remaining, blocked), agents.speed[slots])
-        free = (agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k)
+        free = (agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k) & (
+            blocked > TOO_NEAR)
         to_junction = np.where(self._conflicts.count[lane] > 0, 0.0, np.inf)
         onto = routes.next[destination, lane]
         to_junction = np.where(
@@ -140,12 +165,13 @@ class LaneChanges:
                 agents.speed[slots] > SLOWEST)
             row = np.flatnonzero(must | may)
             found.append((slots[row], np.full(len(row), side), aside[row],
-                          np.where(must[row], hurry[row], -1.0)))
-        who, sides, lanes, hurries = (np.concatenate([f[i] for f in found]) for i in range(4))
+                          np.where(must[row], hurry[row], -1.0), blocked[row]))
+        who, sides, lanes, hurries, room = (
+            np.concatenate([f[i] for f in found]) for i in range(5))
         if not len(who):
             return None
         beside = look_beside(graph, routes, agents, who, lanes, entries, order)
-        return Wish(who, sides, hurries, beside)
+        return Wish(who, sides, hurries, room, beside)
 
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
                acceleration: FloatArray) -> tuple[BoolArray, FloatArray]:
@@ -190,6 +216,8 @@ class LaneChanges:
         speed = agents.speed[slot:slot + 1]
         shift, slope = beside.d[i:i + 1], np.tan(beside.turn[i:i + 1])
         span = look_ahead(speed, np.abs(shift))
+        if wish.room[i] < TIGHT and speed[0] < SLOWEST:
+            span = np.minimum(span, np.maximum(wish.room[i] + 1.0, 1.5 * TOO_NEAR))
         agents.curve[slot] = quintic(shift, slope, np.zeros(1), np.zeros(1), span)[0]
         agents.span[slot], agents.from_s[slot] = span[0], beside.s[i]
         agents.source[slot], agents.side[slot] = agents.lane[slot], wish.side[i]
@@ -228,3 +256,13 @@ class LaneChanges:
             np.zeros(len(slots)))
         falls = np.isfinite(beside.lead_gap) & willing & (speed > 2.0)
         np.minimum.at(yielding, slots[falls], -back[falls])
+
+
+def _blocked(wish: Wish, standing: BoolArray) -> BoolArray:
+    """Tell whose way in the lane beside is blocked by something that stands there."""
+    leader = wish.beside.leader
+    blocked = np.zeros(len(leader), dtype=bool)
+    known = leader >= 0
+    blocked[known] = standing[leader[known]]
+    # Side by side obstacles of which this one is farther are still a way forward.
+    return blocked & (wish.beside.lead_gap < wish.room + BEYOND)

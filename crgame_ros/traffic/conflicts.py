@@ -20,6 +20,8 @@ TURN = 0.45
 SIGN_REACH = 80.0
 # With less room than this before a conflict nobody waits inside the junction [m].
 WAITING_ROOM = 15.0
+# Neighbours whose centres come as near as this join [m].
+JOINING = 1.2
 _YIELDING = {'YIELD', 'STOP', 'ROUNDABOUT'}
 _PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
 
@@ -42,6 +44,7 @@ class Conflicts:
         rows: list[tuple[int, int, float, float]] = []
         for i, j in _candidates(graph):
             here, there = _stretch(graph, i, j), _stretch(graph, j, i)
+            # Neighbours share a border; where one ends they may run into each other all the same.
             if here is None or there is None or _is_fork(graph, i, j, here, there):
                 continue
             rows += [(i, j, *here), (j, i, *there)]
@@ -86,9 +89,13 @@ def _candidates(graph: LaneGraph) -> list[tuple[int, int]]:
     following = [{int(j) for j in row if j >= 0} for row in graph.successors]
     before = [{int(j) for j in row if j >= 0} for row in graph.predecessors]
     return sorted((int(i), int(j)) for i, j in zip(left, right, strict=True)
-                  if i < j and j not in graph.beside[i] and i not in graph.beside[j]
-                  and j not in following[i] and i not in following[j]
+                  if i < j and not (_beside(graph, int(i), int(j)) and lines[i].distance(
+                      lines[j]) > JOINING) and j not in following[i] and i not in following[j]
                   and not before[i] & before[j])
+
+
+def _beside(graph: LaneGraph, i: int, j: int) -> bool:
+    return j in graph.beside[i] or i in graph.beside[j]
 
 
 def _stretch(graph: LaneGraph, i: int, j: int) -> tuple[float, float] | None:
@@ -98,9 +105,9 @@ def _stretch(graph: LaneGraph, i: int, j: int) -> tuple[float, float] | None:
     there = cKDTree(np.stack((graph.x[b], graph.y[b]), axis=-1))
     distance, nearest = there.query(np.stack((graph.x[a], graph.y[a]), axis=-1))
     turn = np.abs(np.angle(np.exp(1j * (graph.yaw[a] - graph.yaw[b][nearest]))))
-    close = np.flatnonzero((distance < WIDTH) & (turn < ONCOMING))
+    close = np.flatnonzero(distance < WIDTH)
     # Touching ends are those of consecutive ways, of which nobody gets into the other's.
-    if len(close) == 0 or (distance.min() > 0.5 * WIDTH and len(close) < 4):
+    if not (turn[close] < ONCOMING).any() or (distance.min() > 0.5 * WIDTH and len(close) < 4):
         return None
     return float(close[0] * graph.step[i]), float(close[-1] * graph.step[i])
 

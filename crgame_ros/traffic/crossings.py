@@ -16,6 +16,8 @@ from crgame_ros.traffic.leaders import Ways
 
 BoolArray = NDArray[np.bool_]
 
+STANDING = 0.05
+
 
 @dataclass(frozen=True)
 class CrossingRules:
@@ -105,7 +107,8 @@ class Crossings:
         near = passage.hold < 10.0 + 4.2 * speed
         full = rear_stop < passage.end + 0.5 * length + self._rules.room
         ready = (passage.first >= 0) & near & ~stopped & ~full & (
-            ~stop_sign | ((agents.waits[slots] >= self._second) & (passage.hold < 4.0)))
+            ~stop_sign | ((agents.waits[slots] >= self._second) & (speed < STANDING)
+                          & (passage.hold < 4.0)))
         inside = (passage.first >= 0) & ~granted & (passage.hold < -1.0)
         meeting = self._meet(agents, slots, way, passage, arrivals, others, desired,
                              stopped | full)

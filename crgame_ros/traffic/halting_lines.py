@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 
+from commonroad.scenario.lanelet import LaneletNetwork
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,14 +23,14 @@ class HaltingLines:
     The stop lines and traffic lights of all lanes.
 
     :param graph: the lanes.
+    :param roads: with the traffic lights and signs.
 
     Attributes of each lane: `line` (arc length of its stop line [m], infinite without one) and
     `stop_sign`.
     """
 
-    def __init__(self, graph: LaneGraph) -> None:
+    def __init__(self, graph: LaneGraph, roads: LaneletNetwork) -> None:
         self._graph = graph
-        roads = graph.network.lanelet_network
         count = len(graph)
         self.line: FloatArray = np.full(count, np.inf)
         self.stop_sign: NDArray[np.bool_] = np.zeros(count, dtype=bool)

@@ -42,15 +42,20 @@ class LaneGraph:
         self.index: dict[int, int] = {lanelet: i for i, lanelet in enumerate(self.ids)}
         self._tabulate(network)
         self._connect(network)
-        limits = [network.speed_limit(i) for i in self.ids]
-        self.limit: FloatArray = np.array(
-            [default_speed if limit is None else limit for limit in limits])
+        self._default_speed = default_speed
+        self.limit: FloatArray = np.zeros(len(self.ids))
+        self.read_speed_limits(network)
         curve = np.sqrt(lateral_acceleration / np.maximum(np.abs(self.curvature), 1e-4))
         # What a curve allows of itself; a limit is scaled by each driver's own factor.
         self.curve_speed: FloatArray = np.maximum(curve, 2.0)
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    def read_speed_limits(self, network: RoadNetwork) -> None:
+        """Take over the speed limits of a network with the same lanelets [m/s]."""
+        limits = [network.speed_limit(i) for i in self.ids]
+        self.limit[:] = [self._default_speed if limit is None else limit for limit in limits]
 
     def _tabulate(self, network: RoadNetwork) -> None:
         lines = [network.line(i) for i in self.ids]
@@ -107,34 +112,40 @@ class LaneGraph:
     def segments(self, lane: IntArray, s: FloatArray) -> tuple[IntArray, FloatArray]:
         """Give the table row at or before s (N), and the share of the step beyond it."""
         share = s / self.step[lane]
-        row = np.clip(share.astype(np.int64), 0, self.count[lane] - 2)
+        row = np.minimum(np.maximum(share.astype(np.int64), 0), self.count[lane] - 2)
         return self.first[lane] + row, share - row
 
     def poses(self, lane: IntArray, s: FloatArray, d: FloatArray) -> FloatArray:
         """Give the poses (N, 3) at arc length s and offset d to the left; straight beyond."""
+        x, y, yaw = self._points(lane, s)
+        result = np.empty((len(s), 3))
+        result[:, 0], result[:, 1], result[:, 2] = x - d * np.sin(yaw), y + d * np.cos(yaw), yaw
+        return result
+
+    def _points(self, lane: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Give x, y and heading of the centre lines at arc lengths (N)."""
         row, share = self.segments(lane, s)
-        inside = np.clip(share, 0.0, 1.0)
-        yaw = self.yaw[row] + inside * (self.yaw[row + 1] - self.yaw[row])
-        x = self.x[row] + share * (self.x[row + 1] - self.x[row]) - d * np.sin(yaw)
-        y = self.y[row] + share * (self.y[row + 1] - self.y[row]) + d * np.cos(yaw)
-        return np.stack((x, y, yaw), axis=-1)
+        after = row + 1
+        x, y, yaw = self.x[row], self.y[row], self.yaw[row]
+        inside = np.minimum(np.maximum(share, 0.0), 1.0)
+        return (x + share * (self.x[after] - x), y + share * (self.y[after] - y),
+                yaw + inside * (self.yaw[after] - yaw))
 
     def project(self, lane: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray,
                 rounds: int = 3) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
         Find positions (N) in the coordinates of lanes (N), near arc lengths that are guessed.
 
+        :param rounds: of correction; one is enough for a guess that is off by centimetres.
         :return: s [m], d [m] and the lane's heading there [rad]
         """
         s = guess
-        for number in range(rounds):
-            pose = self.poses(lane, s, np.zeros_like(s))
-            cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-            along = (x - pose[:, 0]) * cos + (y - pose[:, 1]) * sin
-            if number < rounds - 1:
-                s = s + along
-        d = (y - pose[:, 1]) * cos - (x - pose[:, 0]) * sin
-        return s + along, d, pose[:, 2]
+        for _ in range(rounds):
+            lane_x, lane_y, yaw = self._points(lane, s)
+            cos, sin = np.cos(yaw), np.sin(yaw)
+            east, north = x - lane_x, y - lane_y
+            s = s + east * cos + north * sin
+        return s, north * cos - east * sin, yaw
 
     def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Find points (N) in the coordinates of one lane, wherever on it; s, d [m]."""

@@ -5,7 +5,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.traffic.lane_cells import spans
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph

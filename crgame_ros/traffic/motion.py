@@ -55,7 +55,7 @@ class Motion:
             x, y, yaw, speed = tracking.move(x, y, yaw, speed, steering, acceleration, wheelbase,
                                              self._dt_s)
             center_x, center_y = tracking.centers(x, y, yaw, middle)
-            s, d, _ = self._graph.project(lane, center_x, center_y, s + speed * self._dt_s, 2)
+            s, d, _ = self._graph.project(lane, center_x, center_y, s + speed * self._dt_s, 1)
             lane, s, d = self._pass_ends(agents, slots, lane, s, d, center_x, center_y)
         for name, values in (('x', x), ('y', y), ('yaw', yaw), ('speed', speed), ('s', s),
                              ('d', d), ('steering', steering), ('lane', lane)):
@@ -76,13 +76,13 @@ class Motion:
             there = np.where(over, there - graph.length[lane], there)
             lane = np.where(over, following, lane)
         row, share = graph.segments(lane, there)
-        share = np.clip(share, 0.0, 1.0)
+        share = np.minimum(np.maximum(share, 0.0), 1.0)
         d = reference[row] + share * (reference[row + 1] - reference[row])
         # The corners of a vehicle whose front is f ahead of its rear axle stay equally far from
         # the middle of a curve if that axle runs f^2 / (4 R) inside.
         front = agents.rear_to_center[slots] + 0.5 * agents.length[slots]
         bend = graph.curvature[row] + share * (graph.curvature[row + 1] - graph.curvature[row])
-        d += np.clip(0.25 * bend * front**2, -MAX_CURVE_SHIFT, MAX_CURVE_SHIFT)
+        d += np.minimum(np.maximum(0.25 * bend * front**2, -MAX_CURVE_SHIFT), MAX_CURVE_SHIFT)
         changing = np.flatnonzero(agents.source[slots] != NOBODY)
         if len(changing):
             who = slots[changing]

@@ -30,6 +30,7 @@ class Beside:
     :param turn: (N) its heading against the lane's [rad]
     :param lead_gap: (N) bumper to bumper, inf where nobody is ahead [m]
     :param lead_speed: (N) [m/s]
+    :param leader: (N) row of `Entries` of who is ahead, -1 where nobody is.
     :param follow_gap: (N) bumper to bumper, inf where nobody is behind [m]
     :param follow_speed: (N) [m/s]
     :param follower: (N) the agent behind; -1 where there is none or it is no agent.
@@ -41,6 +42,7 @@ class Beside:
     turn: FloatArray
     lead_gap: FloatArray
     lead_speed: FloatArray
+    leader: IntArray
     follow_gap: FloatArray
     follow_speed: FloatArray
     follower: IntArray
@@ -62,16 +64,18 @@ def look_beside(graph: LaneGraph, routes: Routes, agents: Agents, slots: IntArra
     way = ways(graph, routes, lane, s, agents.destination[slots], horizon)
     pairs = ahead(entries, order, way, slots, agents.length[slots], -half, half)
     lead_gap, lead_speed = np.full(count, np.inf), np.zeros(count)
+    leader = np.full(count, -1, dtype=np.int64)
     for_row = np.lexsort((pairs.gap, pairs.agent))
     who, place = np.unique(pairs.agent[for_row], return_index=True)
     lead_gap[who] = pairs.gap[for_row[place]]
-    lead_speed[who] = entries.speed[pairs.entry[for_row[place]]]
+    leader[who] = pairs.entry[for_row[place]]
+    lead_speed[who] = entries.speed[leader[who]]
     gap, row = _behind(graph, agents, slots, lane, s, entries, order)
     known = row >= 0
     speed = np.where(known, entries.speed[np.maximum(row, 0)], 0.0) if len(entries) else gap * 0.0
     owner = entries.owner[np.maximum(row, 0)] if len(entries) else np.full(count, -1)
-    return Beside(lane, s, d, center[:, 2] - yaw, lead_gap, lead_speed, gap, speed,
-                  np.where(known & (owner >= 0), owner, -1))
+    return Beside(lane, s, d, center[:, 2] - yaw, lead_gap, lead_speed, leader, gap,
+                  speed, np.where(known & (owner >= 0), owner, -1))
 
 
 def _behind(graph: LaneGraph, agents: Agents, slots: IntArray, lane: IntArray, s: FloatArray,

@@ -168,6 +168,20 @@ class Spawner:
             elif self._appear(k, agents, slot, found, row, others):
                 self._waiting.remove(slot)
 
+    def resume(self, k: int, agents: Agents, poses: FloatArray, velocities: FloatArray) -> None:
+        """Put all agents (A) where they are at k, and take the others off the road."""
+        agents.remove(np.arange(agents.count), k)
+        self._waiting = [i for i in self._waiting if self._adopted[i].first_k > k]
+        for slot in np.flatnonzero(np.isfinite(poses).all(axis=1)).tolist():
+            x, y, yaw = (float(value) for value in poses[slot])
+            lane = self._graph.index.get(self._graph.network.nearest_lanelet(x, y, yaw))
+            if lane is not None:
+                s, d = self._graph.nearest(lane, poses[slot, :1], poses[slot, 1:2])
+                self._character(agents, slot)
+                agents.put(slot, lane, float(s[0]), float(d[0]), (x, y, yaw),
+                           float(np.hypot(velocities[slot, 0], velocities[slot, 1])))
+                agents.destination[slot] = self._routes.draw(lane, self._random)
+
     def _appear(self, k: int, agents: Agents, slot: int, found: Adopted, row: int,
                 others: Bodies) -> bool:
         graph, pose = self._graph, found.poses[row]
@@ -243,7 +257,8 @@ def _is_free(pose: FloatArray, speed: float, length: float, width: float, agents
     speeds = np.concatenate((agents.speed[here], np.hypot(*others.velocities[:, :2].T)))
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     east, north = poses[:, 0] - pose[0], poses[:, 1] - pose[1]
-    along, aside = np.abs(east * cos + north * sin), np.abs(north * cos - east * sin)
+    ahead = east * cos + north * sin
+    along, aside = np.abs(ahead), np.abs(north * cos - east * sin)
     turn = poses[:, 2] - pose[2]
     long = 0.5 * (length + lengths * np.abs(np.cos(turn)) + widths * np.abs(np.sin(turn)))
     wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
@@ -251,5 +266,9 @@ def _is_free(pose: FloatArray, speed: float, length: float, width: float, agents
     wide += np.concatenate((np.where(agents.source[here] != NOBODY, LANE, 0.0),
                             np.zeros(len(others.length))))
     gap = 0.5 if close else START_GAP + START_TIME * np.maximum(speeds, speed)
+    if not close:
+        # Whoever is faster and behind has to slow down.
+        faster = np.where(ahead > 0.0, speed**2 - speeds**2, speeds**2 - speed**2)
+        gap = gap + np.maximum(faster, 0.0) / (2.0 * EASY)
     side = 0.2 if close else SIDE_GAP
     return bool(((along > long + gap) | (aside > wide + side)).all())

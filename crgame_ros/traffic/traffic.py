@@ -40,6 +40,7 @@ STANDING = 0.3
 TAPER_COST = 250.0
 # Room before a standing obstacle from which one gets into the next lane [m].
 SWING_OUT = 10.0
+CLOSE = 1.3
 
 
 class Traffic:
@@ -71,8 +72,9 @@ class Traffic:
         self._graph = LaneGraph(network, spec.lateral_acceleration)
         self._conflicts = Conflicts(self._graph)
         self._cells = LaneCells(self._graph)
-        self._routes = Routes(self._graph, TAPER_COST * self._conflicts.tapers())
-        self._lines = HaltingLines(self._graph)
+        self._routes = Routes(
+            self._graph, np.where(self._conflicts.tapers(), TAPER_COST, 0.0))
+        self._lines = HaltingLines(self._graph, scenario.lanelet_network)
         self._model: CarFollowing = CAR_FOLLOWING.create(spec.model, spec.options, 'traffic')
         self._longitudinal = Longitudinal(self._graph, self._model)
         self._changes = LaneChanges(self._graph, self._routes, self._conflicts, self._model,
@@ -112,6 +114,20 @@ class Traffic:
         velocities[~agents.active] = np.nan
         return ObjectStates(poses, velocities)
 
+    def resume(self, k: int, states: ObjectStates) -> None:
+        """
+        Go on from what others have seen of the agents, after a restart.
+
+        What nobody saw is new: destinations, characters, who was let into which junction.
+
+        :param states: of all `descriptions` at k.
+        """
+        self._spawner.resume(k, self._agents, states.poses, states.velocities)
+
+    def read_speed_limits(self, network: RoadNetwork) -> None:
+        """Take over the speed limits of roads that differ from those so far in these alone."""
+        self._graph.read_speed_limits(network)
+
     def advance(self, others: WorldView) -> None:
         """
         Decide on the world at k and move on to k + 1.
@@ -132,7 +148,7 @@ class Traffic:
             slots = np.flatnonzero(agents.active)
             self._motion.move(agents, slots, acceleration, self._swerving.reference,
                               self._substeps)
-            self._changes.finish(agents)
+            self._changes.finish(others.k, agents)
             self._leave(others.k, slots)
         self._spawner.adopt(others.k + 1, agents, bodies)
         self._spawner.arrive(others.k + 1, agents, bodies)
@@ -155,6 +171,8 @@ class Traffic:
         row, leaving = changing_pairs(self._graph, self._routes, agents, slots, entries, order,
                                       horizon)
         if len(row):
+            # Whoever steers out from behind an obstacle gets nearer to it than s0.
+            leaving.gap[standing[leaving.entry]] += CLOSE
             acceleration[row] = np.minimum(acceleration[row], long.behind(
                 agents, slots[row], desired[row], leaving, entries))
         blocked = least(pairs.agent, np.where(standing[pairs.entry], pairs.gap, np.inf),
@@ -165,7 +183,7 @@ class Traffic:
         acceleration = np.minimum(acceleration, long.before_line(speed, desired, halt))
         if self._spec.lane_changes:
             acceleration = np.minimum(acceleration, self._changes.decide(
-                k, agents, slots, desired, acceleration, blocked, entries, order))
+                k, agents, slots, desired, acceleration, blocked, standing, entries, order))
         acceleration = np.maximum(acceleration, -model.max_deceleration)
         waits = (speed < STANDING) & (acceleration < 0.5)
         agents.waits[slots] = np.where(waits, agents.waits[slots] + 1, 0)

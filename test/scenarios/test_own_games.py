@@ -1,6 +1,10 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The package's own games: the scripted human makes the AV react, and nobody comes to harm."""
+"""
+The package's own games: the scripted human makes the AV react, and nobody comes to harm.
+
+Those with objects, traffic or perception of their own are in test_engine_games.py.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,8 +24,16 @@ from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import StateColumn
 
+
+def _is_plain(path: Path) -> bool:
+    """Tell whether a game has nothing but a scenario, humans, AVs that know everything, events."""
+    game = load_game(path)
+    return (game.traffic is None and not game.objects
+            and all(av.perception is None for av in game.avs or ()))
+
+
 GAMES = sorted(path for path in scenarios_directory().glob('*.yaml')
-               if path.suffixes == ['.yaml'])
+               if path.suffixes == ['.yaml'] and _is_plain(path))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,140 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Lane changes for the route, past slow leaders and where a lane ends; courtesy; swerving."""
+
+from pathlib import Path
+
+from commonroad.scenario.scenario import Scenario
+import numpy as np
+import traffic_support as support
+
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.spec import TrafficSpec
+
+NARROW = Shape.rectangle(1.0, 1.0)
+
+
+def two_lanes(end_of_right: float = 1200.0) -> Scenario:
+    """Make lane 1 (y = 0) and, to its right, lane 2 (y = -3.5) that may end before."""
+    beside = {'adjacent_right': 2, 'adjacent_right_same_direction': True}
+    left = support.straight_lane(1, 0.0, 0.0, end_of_right, **beside,
+                                 **({'successor': [3]} if end_of_right < 1200.0 else {}))
+    right = support.straight_lane(2, -3.5, 0.0, end_of_right, adjacent_left=1,
+                                  adjacent_left_same_direction=True)
+    if end_of_right >= 1200.0:
+        return support.roads(left, right)
+    return support.roads(left, right, support.straight_lane(3, 0.0, end_of_right, 1200.0,
+                                                            predecessor=[1]))
+
+
+def agent(number: int, x: float, y: float, speed: float, fastest: float = 0.0) -> Adopted:
+    made = support.driving(number, [(x, y, 0.0), (1100.0, y, 0.0)], speed)
+    made.velocities[-1, 0] = max(speed, fastest)
+    return made
+
+
+def test_a_slow_leader_is_overtaken() -> None:
+    human = support.human(120.0, -3.5, 0.0, 6.0)
+    ways = []
+    for changes in (True, False):
+        run = support.Run(two_lanes(), TrafficSpec(lane_changes=changes), 0, [human],
+                          [agent(1, 20.0, -3.5, 13.0)]).ticks(300)
+        assert run.overlaps() == []
+        ways.append(run.series(0))
+    poses, _ = ways[0]
+    assert np.nanmax(poses[:, 1]) > -0.3
+    assert poses[-1, 0] > human.at(300, 0.1)[0][0] + 20.0
+    # Without lane changes it stays behind.
+    poses, speeds = ways[1]
+    assert np.nanmax(poses[:, 1]) < -3.3
+    assert abs(speeds[-1] - 6.0) < 0.3
+
+
+def test_a_change_follows_a_quintic_without_haste() -> None:
+    human = support.human(120.0, -3.5, 0.0, 6.0)
+    run = support.Run(two_lanes(), TrafficSpec(), 0, [human],
+                      [agent(1, 20.0, -3.5, 13.0)]).ticks(200)
+    poses, speeds = run.series(0)
+    inside = np.flatnonzero((poses[:, 1] > -3.4) & (poses[:, 1] < -0.1))
+    took = (inside[-1] - inside[0]) * 0.1
+    assert 2.0 < took < 6.0
+    lateral = np.diff(poses[:, 1], 2) / 0.01
+    # 10 / sqrt(3) W v^2 / L^2 with W = 3.5 m and L = 4 s v is 1.3 m/s^2.
+    assert np.abs(lateral).max() < 2.0
+    assert np.nanmax(poses[:, 1]) < 0.35, 'no overshoot to speak of'
+
+
+def test_whoever_drives_on_a_lane_that_ends_merges() -> None:
+    run = support.Run(two_lanes(400.0), TrafficSpec(), 0, (),
+                      [agent(1, 20.0, -3.5, 13.0)]).ticks(400)
+    poses, speeds = run.series(0)
+    assert np.nanmax(poses[:, 0]) > 420.0
+    assert np.nanmin(speeds[:200]) > 10.0
+    run = support.Run(two_lanes(400.0), TrafficSpec(lane_changes=False), 0, (),
+                      [agent(1, 20.0, -3.5, 13.0)]).ticks(600)
+    poses, speeds = run.series(0)
+    assert speeds[-1] == 0.0 and poses[-1, 0] < 400.0
+
+
+def dense(cooperative: bool) -> support.Run:
+    """Let one merge from the end of a lane into a platoon with a time gap of 1.1 s."""
+    platoon = [agent(i + 2, 200.0 - 17.0 * i, 0.0, 11.0) for i in range(11)]
+    return support.Run(two_lanes(330.0), TrafficSpec(
+        cooperative=cooperative, options={'time_gap': 1.1}), 0, (),
+        [agent(1, 120.0, -3.5, 11.0), *platoon]).ticks(700)
+
+
+def test_others_make_room_for_who_has_to_merge() -> None:
+    with_courtesy, without = dense(True), dense(False)
+    assert with_courtesy.overlaps() == [] and without.overlaps() == []
+
+    def merged_at(run: support.Run) -> float:
+        inside = np.flatnonzero(run.series(0)[0][:, 1] > -1.0)
+        return 0.1 * inside[0] if len(inside) else np.inf
+
+    assert merged_at(with_courtesy) < merged_at(without) - 2.0
+    # No shock wave: nobody in the platoon brakes hard (Hidas 2005).
+    speeds = np.array(with_courtesy.speeds)[:, 1:]
+    assert np.nanmin(np.diff(speeds, axis=0)) / 0.1 > -2.6
+
+
+def test_an_obstacle_that_blocks_the_lane_is_passed_in_the_next() -> None:
+    wreck = support.human(250.0, -3.5, 0.3, kind='parkedVehicle')
+    run = support.Run(two_lanes(), TrafficSpec(), 0, [wreck],
+                      [agent(1, 20.0, -3.5, 13.0), agent(2, -0.0 + 4.0, -3.5, 11.0)]).ticks(500)
+    assert run.overlaps() == []
+    assert np.nanmax(run.series(0)[0][:, 0]) > 400.0
+    assert np.nanmax(run.series(1)[0][:, 0]) > 400.0
+
+
+def test_an_obstacle_at_the_edge_of_the_lane_is_swerved_around() -> None:
+    # Half a metre into the lane: 1.25 m to its middle, where a car's side is at 0.9 m.
+    box = support.human(150.0, -1.75, 0.0, kind='parkedVehicle', shape=NARROW)
+    lane = support.roads(support.straight_lane(1, 0.0, 0.0, 400.0))
+    paths = {}
+    for swerve in (True, False):
+        run = support.Run(lane, TrafficSpec(swerve=swerve), 0, [box],
+                          [agent(1, 20.0, 0.0, 11.0)]).ticks(250)
+        assert run.overlaps() == []
+        paths[swerve] = run.series(0)
+    poses, speeds = paths[True]
+    at = int(np.nanargmin(np.abs(poses[:, 0] - 150.0)))
+    # The clearance between the sides is 0.5 m for a band made for cars of 2 m width.
+    assert 0.2 < poses[at, 1] < 0.5
+    assert poses[at, 1] - 0.9 + 1.25 > 0.5
+    assert np.nanmax(poses[:, 0]) > 250.0
+    assert np.nanmax(np.abs(paths[False][0][:, 1])) < 0.05
+
+
+def test_swerves_are_shared_by_all_agents_of_a_lane(maps: Path) -> None:
+    box = support.human(150.0, -1.75, 0.0, kind='parkedVehicle', shape=NARROW)
+    lane = support.roads(support.straight_lane(1, 0.0, 0.0, 400.0))
+    run = support.Run(lane, TrafficSpec(), 0, [box],
+                      [agent(1, 60.0, 0.0, 11.0), agent(2, 20.0, 0.0, 11.0)]).ticks(300)
+    first, second = run.series(0)[0], run.series(1)[0]
+    x = np.linspace(120.0, 180.0, 61)
+    one, two = (np.interp(x, p[np.isfinite(p[:, 0]), 0], p[np.isfinite(p[:, 0]), 1])
+                for p in (first, second))
+    assert one.max() > 0.2
+    np.testing.assert_allclose(one, two, atol=0.03)

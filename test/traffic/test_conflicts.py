@@ -1,0 +1,88 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where lanes cross and who has the right of way, on maps with signs and without."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+import traffic_support as support
+
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.conflicts import Conflicts
+from crgame_ros.traffic.lane_graph import LaneGraph
+
+
+def built(path: Path) -> tuple[LaneGraph, Conflicts]:
+    graph = LaneGraph(RoadNetwork(load_scenario(path).scenario.lanelet_network))
+    return graph, Conflicts(graph)
+
+
+def row_of(graph: LaneGraph, conflicts: Conflicts, here: int, there: int) -> int:
+    rows = [i for i in range(len(conflicts)) if graph.ids[conflicts.lane[i]] == here
+            and graph.ids[conflicts.lane[conflicts.other[i]]] == there]
+    assert len(rows) == 1
+    return rows[0]
+
+
+# Lanelet 10 i + 2 + m leads from arm i to the m-th arm counter-clockwise after it; arms 1 and 3
+# have priority, 2 and 4 yield (scripts/scenario_junctions.py).
+@pytest.mark.parametrize(('first', 'second', 'why'), [
+    (14, 24, 'priority road before the yielding one'),
+    (14, 44, 'priority road before the yielding one'),
+    (34, 25, 'priority road before the left turn of the yielding one'),
+    (14, 35, 'straight on before the left turn that comes towards it'),
+    (13, 35, 'right turn before the left turn that comes towards it'),
+    (24, 45, 'the same between those who yield'),
+], ids=lambda value: str(value)[:12])
+def test_right_of_way_at_a_signed_intersection(maps: Path, first: int, second: int,
+                                               why: str) -> None:
+    graph, conflicts = built(maps / 'ZAM_Intersection-1_1_T-1.xml')
+    assert conflicts.priority[row_of(graph, conflicts, first, second)] == 1, why
+    assert conflicts.priority[row_of(graph, conflicts, second, first)] == -1, why
+
+
+def test_who_is_in_the_roundabout_goes_first(maps: Path) -> None:
+    graph, conflicts = built(maps / 'ZAM_Roundabout-1_1_T-1.xml')
+    assert len(conflicts) == 8
+    for arm in (10, 20, 30, 40):
+        assert conflicts.priority[row_of(graph, conflicts, arm + 5, arm + 3)] == 1
+
+
+def test_without_signs_who_comes_from_the_right_goes_first() -> None:
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, -100.0, 100.0),
+        support.lane_strip(2, [(0.0, y) for y in np.linspace(-100.0, 100.0, 60)]))
+    graph = LaneGraph(RoadNetwork(scenario.lanelet_network))
+    conflicts = Conflicts(graph)
+    # Lanelet 2 drives north, and comes from the right of whoever drives east.
+    assert conflicts.priority[row_of(graph, conflicts, 2, 1)] == 1
+    assert conflicts.priority[row_of(graph, conflicts, 1, 2)] == -1
+
+
+def test_conflicts_hold_every_pair_whose_vehicles_touch(maps: Path) -> None:
+    # Cars of 1.8 m width swept along the centre lines of lanelets that begin and end apart.
+    graph, conflicts = built(maps / 'ZAM_Intersection-1_1_T-1.xml')
+    inner = [i for i in graph.ids if i % 10 > 2]
+    swept = {i: shapely.LineString(
+        graph.network.line(i).points).buffer(0.9, cap_style='flat') for i in inner}
+    known = {(graph.ids[conflicts.lane[i]], graph.ids[conflicts.lane[conflicts.other[i]]])
+             for i in range(len(conflicts))}
+    for i in inner:
+        for j in inner:
+            if i // 10 == j // 10:
+                continue
+            area = swept[i].intersection(swept[j])
+            assert ((i, j) in known) == (area.area > 0.1), (i, j)
+            if area.area > 0.1:
+                row = row_of(graph, conflicts, i, j)
+                ends = [graph.network.locate(i, *p)[0] for p in shapely.get_coordinates(area)]
+                assert conflicts.start[row] <= min(ends) + 0.3
+                assert conflicts.end[row] >= max(ends) - 0.3
+
+
+def test_parallel_lanes_and_motorways_have_none(maps: Path) -> None:
+    assert len(built(maps / 'ZAM_Traffic-1_1_T-1.xml')[1]) == 0
+    assert len(built(maps / 'ZAM_ParkedCars-1_1_T-1.xml')[1]) == 0

@@ -1,0 +1,179 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Crossings: right of way, gaps, red lights, and nobody waits for ever."""
+
+from pathlib import Path
+
+from commonroad.scenario.lanelet import LineMarking, StopLine
+from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.traffic_light import (
+    TrafficLight,
+    TrafficLightCycle,
+    TrafficLightCycleElement,
+    TrafficLightState,
+)
+from commonroad.scenario.traffic_sign import TrafficSign, TrafficSignElement, TrafficSignIDGermany
+import numpy as np
+import pytest
+import traffic_support as support
+
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.spec import TrafficSpec
+
+NAME = 'ZAM_Intersection-1_1_T-1.xml'
+MOUTH = 18.0
+
+
+def network(maps: Path) -> RoadNetwork:
+    return RoadNetwork(load_scenario(maps / NAME).scenario.lanelet_network)
+
+
+def coming(roads: RoadNetwork, number: int, start: int, goal: int, away: float,
+           speed: float) -> Adopted:
+    """Make an agent that comes along a lanelet and is this far from its end."""
+    s = roads.line(start).length - away
+    return support.driving(number, [roads.pose_on(start, s), roads.pose_on(goal, 50.0)], speed)
+
+
+def passes_origin(poses: np.ndarray) -> int:
+    """Give the tick at which somebody is nearest to the middle of the junction."""
+    return int(np.nanargmin(np.hypot(poses[:, 0], poses[:, 1])))
+
+
+def test_the_yielding_road_waits_for_the_priority_road(maps: Path) -> None:
+    roads = network(maps)
+    # Both would be in the middle after 6 s.
+    run = support.Run(maps / NAME, TrafficSpec(), 0, (), [
+        coming(roads, 1, 11, 32, 65.0, 13.0), coming(roads, 2, 21, 42, 62.0, 12.0)]).ticks(300)
+    (major, fast), (minor, slow) = run.series(0), run.series(1)
+    assert run.overlaps() == []
+    assert np.nanmin(fast[:60]) > 11.0, 'who has the right of way just drives'
+    assert np.nanmin(slow[:120]) < 8.0
+    assert passes_origin(major) < passes_origin(minor)
+
+
+def test_it_goes_first_if_the_gap_is_long_enough(maps: Path) -> None:
+    roads = network(maps)
+    run = support.Run(maps / NAME, TrafficSpec(), 0, (), [
+        coming(roads, 1, 11, 32, 250.0, 13.0), coming(roads, 2, 21, 42, 30.0, 8.0)]).ticks(200)
+    major, minor = run.series(0)[0], run.series(1)[0]
+    assert passes_origin(minor) < passes_origin(major)
+    assert run.overlaps() == []
+    assert np.nanmin(run.series(0)[1]) > 11.0
+
+
+def test_agents_yield_to_a_human_on_the_priority_road(maps: Path) -> None:
+    roads = network(maps)
+    human = support.human(-90.0, -1.75, 0.0, 13.0)
+    run = support.Run(maps / NAME, TrafficSpec(), 0, [human], [
+        coming(roads, 2, 21, 42, 62.0, 12.0)]).ticks(250)
+    poses, speeds = run.series(0)
+    assert run.overlaps() == []
+    # The human is in the middle after 7 s.
+    assert passes_origin(poses) > 70
+    assert np.nanmin(speeds[:100]) < 8.0
+
+
+def test_agents_stop_for_a_human_who_ignores_the_right_of_way(maps: Path) -> None:
+    roads = network(maps)
+    human = support.human(1.75, -75.0, 0.5 * np.pi, 13.0)
+    run = support.Run(maps / NAME, TrafficSpec(), 0, [human], [
+        coming(roads, 1, 11, 32, 62.0, 13.0)]).ticks(150)
+    assert run.overlaps() == []
+    assert np.nanmin(run.series(0)[1][:90]) < 10.0
+
+
+@pytest.mark.parametrize('goal', [12, 22])
+def test_the_left_turn_waits_for_who_comes_towards_it(maps: Path, goal: int) -> None:
+    roads = network(maps)
+    # Lanelet 15 turns left from arm 1 to arm 4, against 34 to arm 1 and 33 (left) to arm 2.
+    run = support.Run(maps / NAME, TrafficSpec(), 0, (), [
+        coming(roads, 1, 11, 42, 60.0, 11.0), coming(roads, 2, 31, goal, 62.0, 12.0)]).ticks(300)
+    assert run.overlaps() == []
+    left, straight = run.series(0)[0], run.series(1)[0]
+    if goal == 12:
+        assert passes_origin(straight) < passes_origin(left)
+
+
+def test_four_who_arrive_at_once_without_signs_all_get_through() -> None:
+    lines = {i: [(-1.75 * np.sin(a) * 0.0 + np.cos(a) * r + 1.75 * np.sin(a),
+                  np.sin(a) * r - 1.75 * np.cos(a)) for r in np.linspace(-120.0, 120.0, 97)]
+             for i, a in enumerate(np.arange(4) * 0.5 * np.pi)}
+    scenario = support.roads(*(support.lane_strip(i + 1, line) for i, line in lines.items()))
+    agents = [support.driving(i, [(*line[20], i * 0.5 * np.pi), (*line[90], i * 0.5 * np.pi)],
+                              8.0) for i, line in lines.items()]
+    run = support.Run(scenario, TrafficSpec(), 0, (), agents).ticks(700)
+    assert run.overlaps() == []
+    assert np.isnan(run.poses[-1]).all(), 'all have left the map'
+
+
+def lane_with_a_light(cycle: tuple[tuple[TrafficLightState, int], ...]) -> Scenario:
+    line = StopLine(np.array([100.0, 1.75]), np.array([100.0, -1.75]), LineMarking.SOLID, set(),
+                    {50})
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 100.0, successor=[2], stop_line=line),
+        support.straight_lane(2, 0.0, 100.0, 300.0, predecessor=[1]))
+    light = TrafficLight(50, np.array([100.0, 3.0]), TrafficLightCycle(
+        [TrafficLightCycleElement(*part) for part in cycle]))
+    scenario.add_objects(light, {1})
+    return scenario
+
+
+def one(speed: float = 10.0) -> list[Adopted]:
+    return [support.driving(1, [(20.0, 0.0, 0.0), (290.0, 0.0, 0.0)], speed)]
+
+
+def test_a_red_light_holds_until_it_is_green() -> None:
+    scenario = lane_with_a_light(((TrafficLightState.RED, 250), (TrafficLightState.GREEN, 1000)))
+    run = support.Run(scenario, TrafficSpec(), 0, (), one()).ticks(400)
+    poses, speeds = run.series(0)
+    front = poses[249, 0] + 2.25
+    assert speeds[249] == 0.0 and 98.0 < front <= 100.0
+    assert np.isnan(poses[-1, 0]) or poses[-1, 0] > 150.0
+
+
+def test_a_green_light_holds_nobody() -> None:
+    run = support.Run(lane_with_a_light(((TrafficLightState.GREEN, 1000),)), TrafficSpec(), 0,
+                      (), one()).ticks(120)
+    assert np.nanmin(run.series(0)[1]) > 9.5
+
+
+def test_a_stop_sign_makes_everybody_stand_once() -> None:
+    line = StopLine(np.array([98.0, 1.75]), np.array([98.0, -1.75]), LineMarking.SOLID, {60},
+                    set())
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 100.0, successor=[2], stop_line=line),
+        support.straight_lane(2, 0.0, 100.0, 300.0, predecessor=[1]),
+        support.lane_strip(3, [(150.0, y) for y in np.linspace(-100.0, 100.0, 80)]))
+    sign = TrafficSign(60, [TrafficSignElement(TrafficSignIDGermany.STOP)], {1},
+                       np.array([98.0, -3.0]))
+    scenario.add_objects(sign, {1})
+    run = support.Run(scenario, TrafficSpec(), 0, (), one()).ticks(500)
+    poses, speeds = run.series(0)
+    stood = np.flatnonzero(speeds < 0.05)
+    assert len(stood) and (speeds < 0.3).sum() > 10
+    assert 95.0 < poses[stood[0], 0] + 2.25 <= 98.2
+    assert np.nanmax(poses[:, 0]) > 200.0
+
+
+def test_nobody_blocks_a_junction_behind_which_there_is_no_room() -> None:
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 200.0),
+        support.lane_strip(2, [(120.0, y) for y in np.linspace(-100.0, 100.0, 80)]))
+    human = support.human(128.0, 0.0, 0.0)
+    run = support.Run(scenario, TrafficSpec(), 0, [human], [
+        support.driving(1, [(20.0, 0.0, 0.0), (190.0, 0.0, 0.0)], 10.0)]).ticks(300)
+    poses, speeds = run.series(0)
+    # It would fit behind the human with its rear on the other lane.
+    assert speeds[-1] == 0.0 and poses[-1, 0] + 2.25 < 118.25
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', ['ZAM_Intersection-1_1_T-1.xml', 'ZAM_TJunction-1_1_T-1.xml'])
+def test_a_busy_junction_never_locks_up(maps: Path, name: str) -> None:
+    run = support.Run(maps / name, TrafficSpec(agents=20, flow=300.0), 0).ticks(1800)
+    speeds = np.array(run.speeds)
+    for begin in range(0, 1800, 300):
+        assert np.nanmean(speeds[begin:begin + 300]) > 3.0

@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Lane tables against the road network's own geometry."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import traffic_support as support
+
+from crgame_ros.errors import InputError
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.lane_cells import LaneCells
+from crgame_ros.traffic.lane_graph import LaneGraph
+
+
+def graph_of(path: Path) -> LaneGraph:
+    return LaneGraph(RoadNetwork(load_scenario(path).scenario.lanelet_network))
+
+
+def test_poses_lie_where_the_road_network_has_them(maps: Path) -> None:
+    graph = graph_of(maps / 'ZAM_Roundabout-1_1_T-1.xml')
+    for lane in range(len(graph)):
+        s = np.linspace(0.0, graph.length[lane], 17)
+        d = np.linspace(-1.5, 1.5, 17)
+        poses = graph.poses(np.full(17, lane), s, d)
+        for i in range(17):
+            x, y, yaw = graph.network.pose_on(graph.ids[lane], float(s[i]), float(d[i]))
+            # The tables cut a curve of 15 m radius by 0.5^2 / (8 * 15) = 2 mm; headings differ
+            # by what they are averaged over.
+            assert np.hypot(poses[i, 0] - x, poses[i, 1] - y) < 0.06
+            assert abs(np.angle(np.exp(1j * (poses[i, 2] - yaw)))) < 0.05
+
+
+def test_projection_inverts_poses(maps: Path) -> None:
+    graph = graph_of(maps / 'ZAM_Roundabout-1_1_T-1.xml')
+    lane = np.arange(len(graph))
+    s, d = 0.4 * graph.length, np.linspace(-1.7, 1.7, len(graph))
+    pose = graph.poses(lane, s, d)
+    found = graph.project(lane, pose[:, 0], pose[:, 1], s + 3.0, 5)
+    np.testing.assert_allclose(found[0], s, atol=0.02)
+    np.testing.assert_allclose(found[1], d, atol=0.01)
+
+
+def test_curvature_is_that_of_the_circle(maps: Path) -> None:
+    graph = graph_of(maps / 'ZAM_Roundabout-1_1_T-1.xml')
+    lane = graph.index[15]
+    rows = slice(int(graph.first[lane]) + 8, int(graph.first[lane] + graph.count[lane]) - 8)
+    x, y = graph.x[rows], graph.y[rows]
+    # The circle is around the origin.
+    np.testing.assert_allclose(1.0 / graph.curvature[rows], np.hypot(x, y), rtol=0.03)
+
+
+def test_lanes_near_a_point_hold_every_lane_that_contains_it(maps: Path) -> None:
+    graph = graph_of(maps / 'ZAM_Intersection-1_1_T-1.xml')
+    cells, random = LaneCells(graph), np.random.default_rng(3)
+    points = random.uniform(-25.0, 25.0, (400, 2))
+    row, lane, guess = cells.near(points)
+    found = set(zip(row.tolist(), lane.tolist(), strict=True))
+    lanelets = graph.network.lanelet_network.find_lanelet_by_position(list(points))
+    expected = {(i, graph.index[j]) for i, ids in enumerate(lanelets) for j in ids}
+    assert len(expected) > 200
+    assert expected <= found
+    # The guess is near enough for a projection to converge.
+    s, _, _ = graph.project(lane, *points[row].T, guess, 3)
+    for i in range(0, len(row), 7):
+        exact, d = graph.network.locate(graph.ids[lane[i]], *points[row[i]])
+        if 0.5 < exact < graph.length[lane[i]] - 0.5 and abs(d) < 5.0:
+            assert abs(s[i] - exact) < 0.3
+
+
+def test_refuses_a_map_without_lanes_for_cars() -> None:
+    from commonroad.common.common_lanelet import LaneletType
+    path = support.straight_lane(1, 0.0, 0.0, 50.0, lanelet_type={LaneletType.SIDEWALK})
+    with pytest.raises(InputError, match='no lanelet is for cars'):
+        LaneGraph(RoadNetwork(support.roads(path).lanelet_network))

@@ -1,0 +1,166 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How agents come onto the road and leave it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import traffic_support as support
+
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.spawning import adoptable, Adopted
+from crgame_ros.traffic.spec import TrafficSpec
+
+LANE = 300.0
+
+
+def one_lane() -> support.Scenario:
+    return support.roads(support.straight_lane(1, 0.0, 0.0, LANE))
+
+
+def test_agents_are_placed_in_lanes_with_gaps_away_from_others(maps: Path) -> None:
+    actor = support.human(0.0, 0.0, 0.0)
+    run = support.Run(maps / 'ZAM_Traffic-1_1_T-1.xml', TrafficSpec(agents=40), 5, [actor])
+    poses = run.poses[0]
+    here = np.isfinite(poses[:, 0])
+    assert here.sum() >= 38
+    assert run.overlaps() == []
+    lanes = run.network.lanelets_at(poses[here])
+    assert (lanes >= 0).all()
+    away = np.hypot(*(poses[here, :2]).T)
+    assert away[np.abs(poses[here, 1]) < 1.0].min() > 8.0
+    for lane in np.unique(lanes):
+        same = np.flatnonzero(here)[lanes == lane]
+        order = same[np.argsort([run.network.locate(run.network.lanelet_ids[lane],
+                                                    *poses[i, :2])[0] for i in same])]
+        for behind, ahead in zip(order[:-1], order[1:], strict=True):
+            gap = np.hypot(*(poses[ahead, :2] - poses[behind, :2])) - 0.5 * sum(
+                run.descriptions[i].shape.length for i in (behind, ahead))
+            assert gap > 3.0 + 1.2 * run.speeds[0][behind] - 0.2
+
+
+def test_the_seed_decides(maps: Path) -> None:
+    path = maps / 'ZAM_Intersection-1_1_T-1.xml'
+    first, again, other = (support.Run(path, TrafficSpec(agents=10), seed)
+                           for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first.poses[0], again.poses[0])
+    assert not np.array_equal(first.poses[0], other.poses[0])
+    own = support.Run(path, TrafficSpec(agents=10, seed=1), 99)
+    np.testing.assert_array_equal(first.poses[0], own.poses[0])
+
+
+def test_arrivals_come_at_the_given_flow() -> None:
+    run = support.Run(one_lane(), TrafficSpec(flow=900.0, truck_share=0.0), 3).ticks(1200)
+    present = np.isfinite(np.array(run.poses)[:, :, 0])
+    arrived = (present[1:] & ~present[:-1]).sum()
+    # Poisson: 30 in 120 s, with a standard deviation of 5.5; some may still wait for room.
+    assert 15 <= arrived <= 45
+    assert run.overlaps() == []
+
+
+def test_whoever_reaches_the_end_of_the_map_is_gone_for_a_tick_at_least() -> None:
+    run = support.Run(one_lane(), TrafficSpec(flow=1800.0, capacity=6, truck_share=0.0),
+                      1).ticks(700)
+    poses = np.array(run.poses)
+    present = np.isfinite(poses[:, :, 0])
+    assert poses[present][:, 0].max() <= LANE + 2.25 + 1.5
+    jumps = np.abs(np.diff(poses[:, :, 0], axis=0))
+    # Nobody jumps back to the start: a slot is absent in between.
+    assert np.nanmax(jumps) < 3.0
+    assert (present[1:] & ~present[:-1]).sum() > 6
+
+
+def test_an_adopted_recording_goes_on_from_its_first_pose_and_speed(maps: Path) -> None:
+    way = [(-100.0 + 1.2 * i, -1.75, 0.0) for i in range(40)]
+    found = support.driving(7, way, 12.0, first_k=5)
+    run = support.Run(maps / 'ZAM_Intersection-1_1_T-1.xml', TrafficSpec(recorded='reactive'),
+                      adopted=[found]).ticks(20)
+    assert run.descriptions[0].id == 'o7' and run.descriptions[0].role is Role.TRAFFIC
+    poses, speeds = run.series(0)
+    assert np.isnan(poses[:5]).all()
+    np.testing.assert_allclose(poses[5], way[0], atol=1e-9)
+    assert speeds[5] == pytest.approx(12.0)
+    assert poses[-1, 0] > poses[5, 0] + 14.0
+
+
+def test_an_adopted_recording_turns_where_it_turned(maps: Path) -> None:
+    roads = RoadNetwork(load_scenario(maps / 'ZAM_Intersection-1_1_T-1.xml')
+                        .scenario.lanelet_network)
+    for goal in (22, 32, 42):
+        way = [roads.pose_on(11, 280.0), roads.pose_on(goal, 30.0)]
+        run = support.Run(maps / 'ZAM_Intersection-1_1_T-1.xml', TrafficSpec(),
+                          adopted=[support.driving(1, way, 8.0)]).ticks(250)
+        poses, _ = run.series(0)
+        last = poses[np.isfinite(poses[:, 0])][-1]
+        assert roads.lanelet_at(*last) == goal
+
+
+def test_an_adopted_recording_waits_until_its_place_is_free(maps: Path) -> None:
+    actor = support.human(-100.0, -1.75, 0.0, until=30)
+    found = support.driving(7, [(-100.0, -1.75, 0.0)] * 60 + [(60.0, -1.75, 0.0)], 0.0)
+    run = support.Run(maps / 'ZAM_Intersection-1_1_T-1.xml', TrafficSpec(), 0, [actor],
+                      [found]).ticks(50)
+    present = np.isfinite(run.series(0)[0][:, 0])
+    assert not present[:30].any() and present[-1]
+    assert run.overlaps() == []
+
+
+def test_who_can_become_an_agent(maps: Path) -> None:
+    roads = RoadNetwork(load_scenario(maps / 'ZAM_Intersection-1_1_T-1.xml')
+                        .scenario.lanelet_network)
+    drive = np.array([(-100.0 + i, -1.75, 0.0) for i in range(50)])
+    stand = np.repeat(drive[:1], 50, axis=0)
+    beside = drive + (0.0, -30.0, 0.0)
+
+    def can(kind: str, poses: np.ndarray, role: Role = Role.RECORDED) -> bool:
+        return adoptable(ObjectDescription('o1', kind, role, Shape.rectangle(4.5, 1.8)), poses,
+                         roads)
+
+    for kind in ('car', 'truck', 'bus', 'motorcycle', 'bicycle'):
+        assert can(kind, drive)
+    assert not can('pedestrian', drive)
+    assert not can('parkedVehicle', drive)
+    assert not can('car', drive, Role.STATIC)
+    assert not can('car', stand)
+    assert not can('car', beside)
+    assert not can('car', drive + (0.0, 0.0, np.pi))
+    assert not can('car', np.full((5, 3), np.nan))
+
+
+def test_recorded_traffic_of_a_real_motorway_can_be_adopted(shared_scenarios: Path) -> None:
+    loaded = load_scenario(shared_scenarios / 'USA_US101-4_1_T-1.xml')
+    obstacles, roads = ScenarioObstacles(loaded), RoadNetwork(loaded.scenario.lanelet_network)
+    adopted = []
+    for column, description in enumerate(obstacles.descriptions):
+        poses, velocities = obstacles.track(column)
+        if adoptable(description, poses, roads):
+            first = int(np.flatnonzero(np.isfinite(obstacles.poses[:, column, 0]))[0])
+            adopted.append(Adopted(description, first + obstacles.first_k, poses, velocities))
+    assert len(adopted) >= 20
+    run = support.Run(loaded.scenario, TrafficSpec(recorded='reactive'), adopted=adopted)
+    assert np.isfinite(run.poses[0][:, 0]).sum() >= 15
+    run.ticks(100)
+    assert run.overlaps() == []
+
+
+def test_a_restart_goes_on_from_what_was_seen(maps: Path) -> None:
+    spec = TrafficSpec(agents=12, flow=400.0)
+    run = support.Run(maps / 'ZAM_Intersection-1_1_T-1.xml', spec, 2).ticks(100)
+    fresh = support.Run(maps / 'ZAM_Intersection-1_1_T-1.xml', spec, 2)
+    seen = run.traffic.states
+    fresh.traffic.resume(100, seen)
+    np.testing.assert_allclose(fresh.traffic.states.poses, seen.poses, atol=1e-9)
+    np.testing.assert_allclose(fresh.traffic.states.velocities[:, :2], seen.velocities[:, :2],
+                               atol=0.6)
+    fresh.k = 100
+    fresh.poses.clear()
+    fresh.note()
+    fresh.ticks(100)
+    assert fresh.overlaps() == []
+    steps = np.hypot(*np.diff(np.array(fresh.poses), axis=0)[:, :, :2].transpose(2, 0, 1))
+    assert np.nanmax(steps) < 3.0
