@@ -24,6 +24,8 @@ def pytest_configure() -> None:
         os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(ROOT), *paths]))
 
 
+# Before xdist reads the groups.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     Keep tests together that share fixtures, and graphs from each other's processors.
@@ -33,7 +35,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     for item in items:
         folder = item.path.relative_to(ROOT / 'test').parts[0]
-        group = 'graph' if folder in GRAPH_FOLDERS else str(item.path)
+        group = 'graph' if folder in GRAPH_FOLDERS else item.path.stem
         item.add_marker(pytest.mark.xdist_group(group))
 
 

@@ -18,10 +18,13 @@ from crgame_ros.ros.node_report import NodeReport
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.scenario.events import FiredEvent, SpeedLimit
 from crgame_ros.scenario.objects import ObjectStates, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.simulation.documents import parse_events_document
+from crgame_ros.simulation.traffic_limits import TrafficLimits
 from crgame_ros.simulation.traffic_setup import make_traffic
 from crgame_ros.simulation.world_reader import WorldReader
 from crgame_ros.traffic.spec import parse_traffic, TrafficSpec
@@ -43,6 +46,7 @@ class TrafficNode(Node):
         endpoints = Endpoints(self)
         self._documents = ScenarioDocuments(endpoints)
         self._world = WorldFollower(endpoints)
+        self._events = endpoints.polled('/scenario/events')
         self._agents = endpoints.publisher('/traffic/agents')
         self._report = NodeReport(endpoints, 'traffic_node: agents')
         self._scenario: ScenarioSet | None = None
@@ -50,6 +54,8 @@ class TrafficNode(Node):
         self._traffic: Traffic | None = None
         self._k = 0
         self._ticks = 0
+        self._fired: tuple[int, tuple[FiredEvent, ...]] = (-1, ())
+        self._obeyed: set[str] = set()
 
     def run(self, stop: StopFlag) -> None:
         """Follow the world until asked to stop."""
@@ -63,6 +69,9 @@ class TrafficNode(Node):
             ticks = [step for step in self._world.steps() if step.tick]
             # A little late, the agents catch up; after a standstill they go on from where they
             # are by now.
+            message = self._events.latest()
+            if message is not None:
+                self._fired = parse_events_document(message.data)
             for step in ticks if len(ticks) <= MAX_BEHIND else ticks[-1:]:
                 if self._spec is not None:
                     self._advance(step)
@@ -78,6 +87,8 @@ class TrafficNode(Node):
         if entry is None:
             return
         self._spec = parse_traffic(entry, '/scenario/game: traffic', Path())
+        self._limits = TrafficLimits(scenario.loaded, scenario.game.events)
+        self._obeyed = set()
         self._network = RoadNetwork(scenario.loaded.scenario.lanelet_network)
         self._obstacles = ScenarioObstacles(scenario.loaded)
         self._reader = WorldReader(scenario.objects, TrafficLights(scenario.loaded.scenario))
@@ -105,6 +116,7 @@ class TrafficNode(Node):
         traffic = self._traffic
         if traffic is None or k != self._k:
             traffic = self._made(view, k, step)
+        self._obey_limits(traffic, k)
         traffic.advance(view)
         self._traffic, self._k = traffic, k + 1
         states, message = traffic.states, self._message
@@ -118,6 +130,19 @@ class TrafficNode(Node):
         self._ticks += 1
         if self._ticks % COLLECT_EVERY == 0:
             gc.collect()
+
+    def _obey_limits(self, traffic: Traffic, k: int) -> None:
+        """Let agents know the speed limits that events have set by a tick."""
+        assert self._scenario is not None
+        epoch, fired = self._fired
+        game = self._scenario.game
+        actions = {event.name: event.action for event in game.events}
+        for event in fired if epoch == game.epoch else ():
+            action = actions.get(event.name)
+            if event.k <= k and event.name not in self._obeyed \
+                    and isinstance(action, SpeedLimit):
+                self._obeyed.add(event.name)
+                self._limits.change(action, traffic)
 
     def _made(self, view: WorldView, k: int, step: WorldStep) -> Traffic:
         """Make the agents of a new run, or go on with those that others have seen."""

@@ -71,7 +71,8 @@ class ScanMessages:
             first, last = float(scan.angles[0]), float(scan.angles[-1])
             message = LaserScan(
                 angle_min=first, angle_max=last,
-                angle_increment=(last - first) / max(1, len(scan.angles) - 1), scan_time=1.0 / spec.rate, range_max=spec.horizon,
+                angle_increment=(last - first) / max(1, len(scan.angles) - 1),
+                scan_time=1.0 / spec.rate, range_max=spec.horizon,
                 ranges=array('f', scan.ranges.astype(np.float32).tobytes()))
             message.header.frame_id = f'{self._av_id}/{spec.name}'
             set_time(message.header.stamp, scheduler.stamp_ns(n))

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from crgame_ros.planner.joints import JointSeries, object_joint_names
+from crgame_ros.scenario.events import SpeedLimit
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.traffic_setup import TrafficSetup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
@@ -56,6 +57,9 @@ class RemoteTraffic:
 
     def tell(self, view: WorldView) -> None:
         """Tell nothing: traffic_node reads the published world."""
+
+    def limit_speed(self, action: SpeedLimit) -> None:
+        """Tell nothing: traffic_node reads the published events."""
 
     def _keep(self, series: JointSeries, k: int) -> None:
         """Keep states for this tick or a later one; others are of no use any more."""

@@ -16,11 +16,14 @@ from crgame_ros.perception.perception import Perception
 from crgame_ros.perception.spec import PerceptionSpec
 from crgame_ros.planner.joints import JointSeries, vehicle_to_joints, vehicles_from_joints
 from crgame_ros.scenario.game import AvSpec, ModelSpec
-from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.vehicle.models import VEHICLE_MODELS, VehicleModel
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+
+# Of models that are made only to see whether they can be [s].
+CHECKING_STEP_S = 0.01
 
 
 def make_vehicle_model(spec: ModelSpec | None, vehicle: VehicleParameters,
@@ -55,6 +58,27 @@ def make_execution(spec: AvSpec, vehicle: VehicleParameters,
     tracker = TRACKERS.create(spec.tracker.model.name, spec.tracker.model.options,
                               f'{spec.id}: tracker', vehicle=vehicle, dt_s=dt_s)
     return TrackedExecution(vehicle, tracker, model, dt_s)
+
+
+def check_models(avs: Sequence[tuple[AvSpec, VehicleParameters]],
+                 humans: Sequence[tuple[str, ModelSpec | None, VehicleParameters]]) -> None:
+    """
+    Make every model of a game once, so that a wrong one is refused before anything starts.
+
+    :param humans: id, dynamics and vehicle of each.
+    :raises InputError: naming the vehicle, the model and what there is.
+    """
+    for spec, vehicle in avs:
+        make_vehicle_model(spec.dynamics, vehicle, f'{spec.id}: dynamics')
+        make_execution(spec, vehicle, CHECKING_STEP_S)
+        if spec.perception is not None:
+            me = ObjectDescription(spec.id, 'car', Role.AUTONOMOUS, vehicle.shape,
+                                   vehicle.rear_to_center)
+            make_perception(spec.id, spec.perception, [me], vehicle, RigidTransform(),
+                            VehicleState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0,
+                            CHECKING_STEP_S, None)
+    for human_id, dynamics, vehicle in humans:
+        make_vehicle_model(dynamics, vehicle, f'{human_id}: dynamics')
 
 
 def make_localisation(spec: AvSpec, initial: VehicleState, game_seed: int,

@@ -10,7 +10,7 @@ import numpy as np
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.planner.joints import JointSeries
-from crgame_ros.scenario.events import FiredEvent, PlannerRun
+from crgame_ros.scenario.events import FiredEvent, PlannerRun, SpeedLimit
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.av_models import (
@@ -199,6 +199,8 @@ class Simulation:
         for action in events.actions(fired):
             if isinstance(action, PlannerRun):
                 self.set_planner_running(action.av, action.run)
+            elif isinstance(action, SpeedLimit):
+                self._world.limit_speed(action)
         return fired
 
     def _localise(self) -> None:

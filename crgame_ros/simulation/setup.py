@@ -22,6 +22,7 @@ from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.scripted_objects import ScriptedObjects
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
+from crgame_ros.simulation.av_models import check_models
 from crgame_ros.simulation.event_check import check_events, held_obstacles, put_obstacles
 from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, TrafficSetup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
@@ -192,6 +193,9 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
     setup = Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler,
                   tuple(notices))
+    check_models([(av.spec, av.vehicle) for av in avs],
+                 [(human.id, human.dynamics, human.vehicle) for human in humans])
+    setup.open_occupancy()
     return _with_living(setup)
 
 

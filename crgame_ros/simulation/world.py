@@ -5,10 +5,12 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from crgame_ros.scenario.events import SpeedLimit
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.simulation.surroundings import Surroundings
+from crgame_ros.simulation.traffic_limits import TrafficLimits
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world import WorldView
 from crgame_ros.vehicle.state import VehicleState
@@ -27,6 +29,9 @@ class TrafficFeed(Protocol):
     def tell(self, view: WorldView) -> None:
         """Tell what the agents react to."""
 
+    def limit_speed(self, action: SpeedLimit) -> None:
+        """Change a speed limit by an event, before the world of its tick is told."""
+
 
 class LocalTraffic:
     """
@@ -34,10 +39,12 @@ class LocalTraffic:
 
     :param traffic: at the first tick.
     :param k: that tick.
+    :param limits: the roads as the agents know them.
     """
 
-    def __init__(self, traffic: Traffic, k: int) -> None:
+    def __init__(self, traffic: Traffic, k: int, limits: TrafficLimits) -> None:
         self._traffic = traffic
+        self._limits = limits
         self._k = k
         self._view: WorldView | None = None
 
@@ -51,6 +58,10 @@ class LocalTraffic:
     def tell(self, view: WorldView) -> None:
         """Keep what the agents will react to."""
         self._view = view
+
+    def limit_speed(self, action: SpeedLimit) -> None:
+        """Change a speed limit."""
+        self._limits.change(action, self._traffic)
 
 
 class World:
@@ -73,7 +84,8 @@ class World:
         self._scripted = setup.make_scripted()
         self._feed = feed
         if feed is None and setup.traffic is not None:
-            self._feed = LocalTraffic(setup.traffic.make(), self._k)
+            self._feed = LocalTraffic(setup.traffic.make(), self._k,
+                                      TrafficLimits(setup.loaded, setup.game.events))
         self._surroundings = Surroundings(setup)
         self.agents_k: int | None = None
         self._agents: ObjectStates | None = None
@@ -101,6 +113,11 @@ class World:
             self._k = k
         self.objects = self._at(k)
         return self.objects
+
+    def limit_speed(self, action: SpeedLimit) -> None:
+        """Let agents obey an event's speed limit."""
+        if self._feed is not None:
+            self._feed.limit_speed(action)
 
     def settle(self, states: Sequence[VehicleState]) -> ObjectStates:
         """
