@@ -147,7 +147,10 @@ def _offline(values: argparse.Namespace) -> int:
                     'requests': record.counters.requests, 'accepted': record.counters.accepted,
                     'refused': record.counters.refused,
                     'fallbacks': record.statistics.fallbacks,
-                    'reasons': dict(record.statistics.reasons)}
+                    'reasons': dict(record.statistics.reasons),
+                    **({} if record.tracking is None else {'worst_tracking_errors': {
+                        key: round(value, 4)
+                        for key, value in record.tracking._asdict().items()}})}
             for av_id, record in result.planners.items()},
         'events': [{'name': event.name, 'n': event.n, 'k': event.k, 'by': event.by}
                    for event in result.fired],

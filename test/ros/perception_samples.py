@@ -13,18 +13,24 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 import numpy as np
 from sensor_msgs.msg import LaserScan
 
+from crgame_ros.cli import main
 from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
 from crgame_ros.ros.messages import to_time
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.setup import build_setup, Setup
 
 
-def perceiving_setup() -> Setup:
-    """Load the cut-in game, with an AV that perceives by two sensors, and a map."""
+def perceiving_setup(folder: Path) -> Setup:
+    """
+    Load the cut-in game, with an AV that perceives by two sensors, and a map.
+
+    :param folder: where the map is made.
+    """
     game = load_game(CUT_IN)
+    assert main(['rasterize', str(game.scenario), str(folder / 'map')]) == 0
     perception = PerceptionSpec(sensors=(SensorSpec('front'), SensorSpec('rear', yaw=np.pi)))
     return build_setup(replace(game, avs=(replace(game.avs[0], perception=perception),),
-                               occupancy=Path('map.yaml')))
+                               occupancy=folder / 'map' / 'map.yaml'))
 
 
 def scan(sensor: str, n: int, **fields: Any) -> LaserScan:

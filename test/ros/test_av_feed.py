@@ -17,9 +17,9 @@ from crgame_ros.simulation.setup import Setup
 
 
 @pytest.fixture(scope='module')
-def setup() -> Setup:
+def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
     """Load a game with an AV that perceives."""
-    return perceiving_setup()
+    return perceiving_setup(tmp_path_factory.mktemp('perceiving'))
 
 
 def _frame(graph: Graph, slot: str) -> list[float]:

@@ -29,9 +29,9 @@ FULL = {'keys': [1, 0, 0, 0], 'reverse': 0}
 
 
 @pytest.fixture(scope='module')
-def setup() -> Setup:
+def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
     """Load the cut-in game, with an AV that perceives."""
-    return perceiving_setup()
+    return perceiving_setup(tmp_path_factory.mktemp('perceiving'))
 
 
 def _trajectory(*points: int, names: tuple[str, ...] = ()) -> JointTrajectory:
