@@ -30,6 +30,8 @@ SERVICE_SLACK_NS = 1_500_000
 # The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
 WAKE_UP_NS = 120_000
 SETTLE_NS = 200_000_000
+# Discovery is not the same on both sides for up to a second or two.
+NEWCOMERS_NS = 3 * NS_PER_S
 
 
 class Outcome(Enum):
@@ -79,6 +81,8 @@ class LiveRun:
         self._stepped = 0
         self._stop = StopFlag()
         self._state, self._state_ns = '', 0
+        self._listeners = 0
+        self._shown_ns = self._show_until_ns = 0
 
     def run(self, stop: StopFlag) -> Outcome:
         """Run until the game's end, a reset or a stop."""
@@ -131,6 +135,8 @@ class LiveRun:
                 or self._stands_still():
             self._executor.spin_once(timeout_sec=0.005)
             self._tell_state('paused' if is_open else 'waiting')
+            if is_open:
+                self._show_newcomers(time.monotonic_ns())
             self._take_orders(time.monotonic_ns())
             outcome = self._ordered_end()
             if outcome is not None:
@@ -143,6 +149,20 @@ class LiveRun:
         if state != self._state or now_ns - self._state_ns > NS_PER_S:
             self._state, self._state_ns = state, now_ns
             self._diagnostics.run_state(state, self._control.real_time_factor)
+
+    def _show_newcomers(self, now_ns: int) -> None:
+        """
+        Send the world that stands still to who has come since it was published.
+
+        Who has just come may not hear the first message yet: it is told again for a while.
+        """
+        listeners = self._outputs.listeners
+        if listeners > self._listeners:
+            self._show_until_ns = now_ns + NEWCOMERS_NS
+        self._listeners = listeners
+        if self._shown_ns + NS_PER_S < now_ns < self._show_until_ns:
+            self._shown_ns = now_ns
+            self._outputs.resend_world(self.simulation)
 
     def _ordered_end(self) -> Outcome | None:
         control = self._control
@@ -219,11 +239,13 @@ class LiveRun:
 
     def _stay_paused(self) -> None:
         """Serve orders while everything else stands still."""
+        self._listeners = self._outputs.listeners
         self._outputs.publish_rows()
         self._tell_state('paused')
         while self._stands_still() and self._ordered_end() is None:
             self._executor.spin_once(timeout_sec=0.02)
             self._tell_state('paused')
+            self._show_newcomers(time.monotonic_ns())
             self._take_orders(time.monotonic_ns())
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)

@@ -174,12 +174,17 @@ class SimOutputs:
                 if vehicle.wanted:
                     vehicle.publish(state, stamp_ns)
 
-    def resend_world(self, simulation: Simulation, result: StepResult) -> None:
-        """Publish the world of a tick again to those who may not have been there."""
-        stamp_ns = simulation.scheduler.stamp_ns(result.n)
-        if result.objects is not None:
-            self._publish_objects(result.objects, stamp_ns)
-        self._publish_states(simulation.states, stamp_ns)
+    @property
+    def listeners(self) -> int:
+        """How many have subscribed to the states."""
+        return int(self._state.get_subscription_count())
+
+    def resend_world(self, simulation: Simulation) -> None:
+        """Publish the present world again to those who may not have been there."""
+        scheduler, n = simulation.scheduler, simulation.n
+        self._publish_objects(simulation.objects,
+                              scheduler.stamp_ns(n - n % scheduler.steps_per_tick))
+        self._publish_states(simulation.states, scheduler.stamp_ns(n))
 
     def _publish_objects(self, objects: ObjectStates, stamp_ns: int) -> None:
         message = self._objects_message

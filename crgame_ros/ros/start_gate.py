@@ -87,7 +87,7 @@ class StartGate:
         if now_ns - self._asked_ns > ASK_AGAIN_NS:
             self._asked_ns = now_ns
             if self._traffic_answers is not None:
-                self._outputs.resend_world(self._simulation, self._result)
+                self._outputs.resend_world(self._simulation)
             for av_id in self._planners:
                 self._outputs.resend(av_id, self._result)
         if self._seats and now_ns - self._told_ns > CLOCK_AGAIN_NS:
