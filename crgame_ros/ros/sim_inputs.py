@@ -13,6 +13,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.planner.joints import JointSeries
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_joint_trajectory
+from crgame_ros.ros.request_head import request_head
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.setup import Setup
 
@@ -42,7 +43,7 @@ class SimInputs:
             for av in setup.avs]
         self._plans = {av.id: endpoints.polled('/<av>/plan', av.id) for av in setup.avs}
         # What planners are told instead of the truth; a plan is checked against it.
-        self._perceived = {av.id: endpoints.polled('/<av>/plan_request', av.id)
+        self._perceived = {av.id: endpoints.polled('/<av>/plan_request', av.id, raw=True)
                            for av in setup.avs if av.spec.perception is not None}
         self._agents = None if setup.traffic is None else endpoints.polled('/traffic/agents')
         self._frame_skip = endpoints.polled('/timing/frame_skip')
@@ -74,14 +75,13 @@ class SimInputs:
 
     def take_perceived(self, av_id: str) -> JointSeries | None:
         """
-        Take the request that perception has sent to an AV's planner, if one has come.
+        Take the head of the request that perception has sent to an AV's planner, if one has come.
 
         :raises InputError: if the message is malformed.
         """
         slot = self._perceived.get(av_id)
         message = None if slot is None else slot.take()
-        return None if message is None else from_joint_trajectory(
-            message, f'/{av_id}/plan_request')
+        return None if message is None else request_head(message, f'/{av_id}/plan_request')
 
     def take_agents(self) -> list[JointSeries]:
         """Take the agents' states that have come; bad ones are dropped."""

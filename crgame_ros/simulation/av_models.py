@@ -122,7 +122,11 @@ def published(state: VehicleState) -> VehicleState:
 
 
 def ego_of(request: JointSeries) -> VehicleState:
-    """Give the state of the AV that a plan request is for, in its scenario coordinates."""
+    """
+    Give the state of the AV that a plan request is for, in its scenario coordinates.
+
+    :param request: or its head: the AV's joints come first.
+    """
     state = vehicles_from_joints(request.positions[0, :4], request.velocities[0, :4],
                                  request.accelerations[0, :4])
     return VehicleState(*state.tolist())
