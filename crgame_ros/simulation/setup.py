@@ -210,11 +210,6 @@ def _with_living(setup: Setup) -> Setup:
     game, base = setup.game, setup.obstacles
     scripted = setup.make_scripted()
     described = () if scripted is None else scripted.descriptions
-    taken = {*base.ids, *setup.vehicle_ids}
-    for item in described:
-        if item.id in taken:
-            raise InputError(f'"{item.id}" is the id of something else', 'objects',
-                             'choose another one')
     kept = {name for event in game.events if (name := event.object_id) is not None}
     agents = adopted_columns(game.traffic, base, setup.network, kept)
     setup = replace(setup, obstacles=base.with_living(agents, described))

@@ -224,6 +224,21 @@ def test_malformed_scenario_leaves_the_present_game(graph: tuple[Launcher, Peer]
     broken.unlink()
 
 
+def test_who_comes_in_a_pause_sees_the_world(graph: tuple[Launcher, Peer], peer: Peer) -> None:
+    """The states are sent again to a newcomer, as they are; nobody's time passes."""
+    assert peer.call('/sim/pause').success
+    peer.listen_for(0.3)
+    paused_n, ticks = peer.n, len(peer.messages['/clock'])
+    with Peer(graph[0].domain, '/vehicles/state', '/traffic/objects') as newcomer:
+        newcomer.wait_until(
+            lambda: {'/vehicles/state', '/traffic/objects'} <= newcomer.messages.keys(),
+            'the world that stands still')
+        peer.listen()
+        last = peer.messages['/vehicles/state'][-1]
+        assert newcomer.messages['/vehicles/state'][0] == last
+    assert peer.n == paused_n and len(peer.messages['/clock']) == ticks
+
+
 def test_reset_in_a_pause_stays_paused_and_can_be_stepped(peer: Peer) -> None:
     """The new epoch waits at n = 0 for a step or the start."""
     assert peer.call('/sim/pause').success
