@@ -19,13 +19,8 @@ colcon=("$CRGAME_PYTHON" -m colcon --log-level error --log-base log)
 echo "== colcon build"
 "${colcon[@]}" build --base-paths . --packages-select crgame_ros
 
-# Two workers: one for tests that start processes and mostly wait, one for those that compute. A
-# selection of tests, and whoever debugs, wants one.
-workers=()
-(($# > 0)) || workers=(' -n 2' ' --dist=loadgroup')
-
 # colcon takes an argument that starts with a dash only behind a blank, which it removes.
-arguments=(' -v' "${workers[@]}")
+arguments=(' -v')
 for argument in "$@"; do
     [[ $argument != -* ]] || argument=" $argument"
     [[ $argument != ./* || $PWD == "$called_from" ]] || argument=$called_from/$argument

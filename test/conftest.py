@@ -10,9 +10,6 @@ import pytest
 from crgame_ros.ros.environment import free_domain_id, prepare_environment
 
 LONGEST_ID = 100
-# Of the tests that start processes, and hold their own against the clock.
-GRAPH_FOLDERS = ('live', 'browser', 'ros')
-YIELDING_NICE = 15
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -23,28 +20,6 @@ def pytest_configure() -> None:
     paths = os.environ.get('PYTHONPATH', '').split(os.pathsep)
     if str(ROOT) not in paths:
         os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(ROOT), *paths]))
-
-
-# Before xdist reads the groups.
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """
-    Keep tests together that share fixtures, and graphs from each other's processors.
-
-    With `-n 2 --dist loadgroup` one worker runs everything that starts a graph or a browser, which
-    mostly waits, and the other one computes.
-    """
-    for item in items:
-        folder = item.path.relative_to(ROOT / 'test').parts[0]
-        group = 'graph' if folder in GRAPH_FOLDERS else item.path.stem
-        item.add_marker(pytest.mark.xdist_group(group))
-
-
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let a worker that computes give way to the one whose graphs keep to the clock."""
-    mark = item.get_closest_marker('xdist_group')
-    if 'PYTEST_XDIST_WORKER' in os.environ and mark is not None and mark.args != ('graph',):
-        os.setpriority(os.PRIO_PROCESS, 0, max(os.getpriority(os.PRIO_PROCESS, 0), YIELDING_NICE))
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
