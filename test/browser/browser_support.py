@@ -16,7 +16,7 @@ import pytest
 if TYPE_CHECKING:
     from selenium.webdriver.chrome.webdriver import WebDriver
 
-PATIENCE_S = 15.0
+PATIENCE_S = 45.0
 _POLL_S = 0.05
 _BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 _FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
