@@ -31,10 +31,15 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     paused = any(human.driver == COCKPIT for human in setup.humans)
     drivers = [spec for spec in viewers if paused and spec.executable == 'cockpit_node']
     waiting = ', '.join(f'"{spec.name}"' for spec in (*companions, *drivers))
+    # Later games may come from the page, and from where the first one was.
+    folders = [plan.cockpit / 'games']
+    if request.game is not None:
+        folders.append(request.game.resolve().parent)
+    directories = ', '.join(f'"{folder}"' for folder in folders)
     simulation = NodeSpec('sim_node', 'sim_node', {
         'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
         'realtime_priority': str(request.realtime_priority).lower(),
-        'scenario_directories': f'["{plan.cockpit / "games"}"]', 'roster': f'"{plan.roster}"',
+        'scenario_directories': f'[{directories}]', 'roster': f'"{plan.roster}"',
         'start_paused': str(paused).lower(), 'wait_for': f'[{waiting}]'})
     return [simulation, *companions, *viewers]
 

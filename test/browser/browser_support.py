@@ -79,7 +79,7 @@ class Browser:
     def wait(self, condition: str, what: str = '', patience_s: float = PATIENCE_S,
              arguments: tuple[Any, ...] = ()) -> Any:
         """
-        Wait until an expression of the page is true.
+        Wait until an expression of the page is true; while it throws, it is not.
 
         :param condition: JavaScript expression; `arguments` holds what is given
         :param what: said when it stays false
@@ -87,12 +87,14 @@ class Browser:
         """
         end = time.monotonic() + patience_s
         while True:
-            value = self.run(f'return ({condition});', *arguments)
+            value, error = self.run(
+                f'try {{ return [({condition}), null]; }} '
+                'catch (error) { return [null, String(error)]; }', *arguments)
             if value:
                 return value
             if time.monotonic() > end:
-                pytest.fail(f'waited {patience_s:.0f} s in vain for {what or condition}; '
-                            f'console: {self.console_errors()}')
+                pytest.fail(f'waited {patience_s:.0f} s in vain for {what or condition}'
+                            f'{error and f" ({error})" or ""}; console: {self.console_errors()}')
             time.sleep(_POLL_S)
 
     def console_errors(self) -> list[str]:

@@ -78,6 +78,11 @@ def page(bag: Path, browser: Browser) -> Iterator[Browser]:
 def drawn(page: Browser) -> dict[str, Any]:
     """Take the frame in which the world has drawn the player's time."""
     page.wait(IS_DRAWN)
+    return last_frame(page)
+
+
+def last_frame(page: Browser) -> dict[str, Any]:
+    """Take the frame that the world has drawn last."""
     frame: dict[str, Any] = page.run(DRAWN)
     frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, 12)
     frame['objects'] = np.array(frame['objects'], dtype=float).reshape(-1, 6)
@@ -101,6 +106,28 @@ def test_poses_are_those_of_the_bag(page: Browser, log: RunLog,
     # The bag's poses are those that were driven.
     np.testing.assert_array_equal(log.vehicle_states[:, :, :3],
                                   first_run.vehicle_states[::10, :, :3])
+
+
+def test_until_its_data_has_come_a_time_is_not_shown(page: Browser, log: RunLog) -> None:
+    """The world stands as it was, instead of moving what it knows to where nobody was."""
+    before = seek(page, 1.0)
+    page.run("""
+      const { fetch } = window;
+      const held = new Promise((release) => { crgame.release = release; });
+      window.fetch = async (...asked) => { await held; return fetch(...asked); };
+      crgame.replay.seek(29.0);""")
+    page.run_async("""
+      for (let i = 0; i < 5; i += 1) { await new Promise(requestAnimationFrame); }
+      crgame.world.redraw();
+      await new Promise(requestAnimationFrame);""")
+    assert page.run('return [crgame.replay.loading, crgame.replay.t, crgame.world.shown.t]') \
+        == [True, 29.0, 1.0]
+    np.testing.assert_array_equal(last_frame(page)['vehicles'][:, :8],
+                                  before['vehicles'][:, :8])
+    page.run('crgame.release();')
+    after = drawn(page)
+    assert after['t'] == 29.0
+    np.testing.assert_array_equal(after['vehicles'][:, :8], log.vehicle_states[290])
 
 
 def test_states_between_the_ticks(page: Browser, first_run: OfflineResult) -> None:

@@ -21,6 +21,8 @@ class Player {
   #feed = null;
   #documents = null;
   #t = 0;
+  // What the world shows: the last time whose data was there.
+  #shown_t = 0;
   #speed = 1;
   #playing = false;
   #jumped = false;
@@ -59,7 +61,7 @@ class Player {
     return this.#feed?.info ?? null;
   }
 
-  /** Time that is shown [s]. */
+  /** Time that is shown [s], or is to be shown as soon as its data has come. */
   get t() {
     return this.#t;
   }
@@ -203,7 +205,7 @@ class Player {
       loaded: () => this.#update(performance.now()), refused: (error) => this.#refuse(error),
     });
     this.#documents = new ReplayDocuments(store, info);
-    store.useTimeSource(() => this.#t);
+    store.useTimeSource(() => this.#shown_t);
     store.useHistorySource((index, seconds) => this.#feed.history(index, seconds));
     store.receive({ type: 'scene', ...info.scene });
     this.#timeline.show(info);
@@ -241,7 +243,7 @@ class Player {
     const shown = this.#feed.show(this.#t);
     const there = !Number.isNaN(shown);
     if (there) {
-      this.#t = shown;
+      this.#t = this.#shown_t = shown;
       this.#documents.show(this.#now(), now_ms, this.#jumped);
       if (this.#jumped) {
         this.#jumped = false;
