@@ -97,7 +97,7 @@ setup(
         'zstandard>=0.25,<1',
     ],
     extras_require={'test': [
-        'mypy>=2.4,<3', 'pillow>=12,<14', 'pytest>=7.4,<8',
+        'mypy>=2.4,<3', 'pillow>=12,<14', 'pytest>=7.4,<8', 'pytest-xdist>=3.8,<4',
         'ruff>=0.17.5,<0.18', 'selenium>=4.51,<5', 'types-PyYAML>=6.0.12,<7',
     ]},
     entry_points={

@@ -19,8 +19,16 @@ colcon=("$CRGAME_PYTHON" -m colcon --log-level error --log-base log)
 echo "== colcon build"
 "${colcon[@]}" build --base-paths . --packages-select crgame_ros
 
+# All tests: a worker for each core, four at most (test/conftest.py says who runs what). A selection,
+# and whoever debugs, wants one.
+workers=()
+if (($# == 0)); then
+    cores=$(getconf _NPROCESSORS_ONLN)
+    workers=(" -n $((cores < 4 ? cores : 4))" ' --dist=loadgroup' ' --no-loadscope-reorder')
+fi
+
 # colcon takes an argument that starts with a dash only behind a blank, which it removes.
-arguments=(' -v')
+arguments=(' -v' "${workers[@]}")
 for argument in "$@"; do
     [[ $argument != -* ]] || argument=" $argument"
     [[ $argument != ./* || $PWD == "$called_from" ]] || argument=$called_from/$argument

@@ -26,6 +26,26 @@ def pytest_configure() -> None:
         os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(ROOT), *paths]))
 
 
+# Before xdist reads the groups.
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """
+    Put tests that keep to the clock last and into one group, the others into one for each file.
+
+    With `--dist loadgroup --no-loadscope-reorder` workers share the tests that compute, and
+    when these are done one worker runs the graphs and browsers, alone on the machine.
+    """
+    items.sort(key=_keeps_to_the_clock)
+    for item in items:
+        folder = item.path.relative_to(ROOT / 'test').with_suffix('')
+        group = 'clock' if _keeps_to_the_clock(item) else str(folder)
+        item.add_marker(pytest.mark.xdist_group(group))
+
+
+def _keeps_to_the_clock(item: pytest.Item) -> bool:
+    return item.path.relative_to(ROOT / 'test').parts[0] in REAL_TIME_FOLDERS
+
+
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     """Name long values by their length: a line of megabytes chokes whoever reads the output."""
     if isinstance(val, str | bytes) and len(val) > LONGEST_ID:
