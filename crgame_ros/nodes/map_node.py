@@ -21,7 +21,7 @@ from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.simulation.documents import parse_game_document
 
 PERIOD_S = 0.1
-# Joints of a vehicle in /vehicles/state: x, y, yaw, steering.
+# Joints of a vehicle in /vehicles/tick_state: x, y, yaw, steering.
 JOINTS = 4
 # What is published where nothing is occupied: viewers want at least one cell.
 NOTHING = OccupancyGrid((0.0, 0.0), 1.0, np.zeros((1, 1), dtype=bool))
@@ -37,7 +37,7 @@ class MapNode(Node):
             floating_point_range=[FloatingPointRange(from_value=1.0, to_value=1000.0)])).value
         endpoints = Endpoints(self)
         self._games = endpoints.polled('/scenario/game')
-        self._states = endpoints.polled('/vehicles/state', depth=1)
+        self._states = endpoints.polled('/vehicles/tick_state', depth=1)
         self._publisher = endpoints.publisher('/occupancy')
         self._map: TiledOccupancy | None = None
         self._published: OccupancyGrid | None = None

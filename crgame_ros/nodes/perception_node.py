@@ -42,7 +42,7 @@ class PerceptionNode(Node):
                 description='id of the AV that perceives', read_only=True)).value
         endpoints = Endpoints(self)
         self._documents = ScenarioDocuments(endpoints)
-        self._world = WorldFollower(endpoints)
+        self._world = WorldFollower(endpoints, '/vehicles/state')
         self._true = endpoints.polled('/<av>/true_request', self._vehicle_id)
         self._perceived = endpoints.publisher('/<av>/plan_request', self._vehicle_id)
         self._localization = LocalizationMessage(endpoints, self._vehicle_id)

@@ -31,7 +31,7 @@ from crgame_ros.traffic.spec import parse_traffic, TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world import WorldView
 
-PERIOD_S = 0.002
+PERIOD_S = 0.005
 # Garbage is collected after an answer, never in the middle of one.
 COLLECT_EVERY = 10
 # Ticks.
@@ -45,7 +45,7 @@ class TrafficNode(Node):
         super().__init__('traffic_node')
         endpoints = Endpoints(self)
         self._documents = ScenarioDocuments(endpoints)
-        self._world = WorldFollower(endpoints)
+        self._world = WorldFollower(endpoints, '/vehicles/tick_state')
         self._events = endpoints.polled('/scenario/events')
         self._agents = endpoints.publisher('/traffic/agents')
         self._report = NodeReport(endpoints, 'traffic_node: agents')
@@ -66,12 +66,12 @@ class TrafficNode(Node):
             scenario = self._documents.poll()
             if scenario is not None:
                 self._begin(scenario)
-            ticks = [step for step in self._world.steps() if step.tick]
-            # A little late, the agents catch up; after a standstill they go on from where they
-            # are by now.
+            ticks = list(self._world.steps())
             message = self._events.latest()
             if message is not None:
                 self._fired = parse_events_document(message.data)
+            # A little late, the agents catch up; after a standstill they go on from where they
+            # are by now.
             for step in ticks if len(ticks) <= MAX_BEHIND else ticks[-1:]:
                 if self._spec is not None:
                     self._advance(step)

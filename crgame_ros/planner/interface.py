@@ -10,10 +10,8 @@ rear-axle poses, those of obstacles are centre poses, all in the CommonRoad scen
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TYPE_CHECKING
 
-from commonroad.planning.planning_problem import PlanningProblem
-from commonroad.scenario.scenario import Scenario
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +19,11 @@ from crgame_ros.errors import InputError
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+
+# Messages are read by processes that need no scenario.
+if TYPE_CHECKING:
+    from commonroad.planning.planning_problem import PlanningProblem
+    from commonroad.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,8 @@ class PlannerContext:
     """
 
     vehicle_id: str
-    scenario: Scenario
-    planning_problem: PlanningProblem
+    scenario: 'Scenario'
+    planning_problem: 'PlanningProblem'
     vehicle: VehicleParameters
     objects: Mapping[str, ObjectDescription]
     time_step_s: float

@@ -4,6 +4,7 @@
 
 from collections.abc import MutableMapping
 import json
+from typing import TYPE_CHECKING
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.driver.source import COCKPIT, parse_source
@@ -11,8 +12,11 @@ from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.messages import from_joy, from_time
-from crgame_ros.simulation.engine import Simulation
-from crgame_ros.simulation.setup import Setup
+
+# The driver's process needs neither, and they take half a second to load.
+if TYPE_CHECKING:
+    from crgame_ros.simulation.engine import Simulation
+    from crgame_ros.simulation.setup import Setup
 
 NS = 1e-9
 # The driver that the game names, and an AV's planner; anything else names a driver of its own.
@@ -123,7 +127,7 @@ class Seats:
     :param sources: what people ordered so far, by seat; outlives a reset.
     """
 
-    def __init__(self, endpoints: Endpoints, setup: Setup, clock_offset_ns: int,
+    def __init__(self, endpoints: Endpoints, setup: 'Setup', clock_offset_ns: int,
                  sources: MutableMapping[str, str]) -> None:
         self._orders = endpoints.polled('/seats/order')
         self._sources = sources
@@ -145,7 +149,7 @@ class Seats:
         return [self._orders, *(seat.commands for seat in self.all)]
 
     def commands(self, now_ns: int, dt_s: float,
-                 simulation: Simulation) -> list[DriverCommand | None]:
+                 simulation: 'Simulation') -> list[DriverCommand | None]:
         """Give the command of every seat for this cycle; None for AVs that follow their plan."""
         return [
             *(seat.command(now_ns, dt_s, human.state.speed)

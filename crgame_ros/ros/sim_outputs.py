@@ -91,6 +91,8 @@ class SimOutputs:
         self.publish_every = steps_between_messages(setup.game.timing.rate)
         self._clock = endpoints.publisher('/clock')
         self._state = endpoints.publisher('/vehicles/state')
+        # For those who need no more: each reader of each step costs the loop.
+        self._tick_state = endpoints.publisher('/vehicles/tick_state')
         self._objects = endpoints.publisher('/traffic/objects')
         self._cycle = endpoints.publisher('/timing/cycle')
         self._latched = {name: endpoints.publisher(name) for name in (
@@ -168,7 +170,7 @@ class SimOutputs:
             self._publish_signals(result.k)
             for vehicle in self._vehicles:
                 vehicle.look_for_subscribers()
-        self._publish_states(states, stamp_ns)
+        self._publish_states(states, stamp_ns, result.objects is not None)
         if not self.frames_skipped:
             for vehicle, state in zip(self._vehicles, states, strict=True):
                 if vehicle.wanted:
@@ -184,7 +186,7 @@ class SimOutputs:
         scheduler, n = simulation.scheduler, simulation.n
         self._publish_objects(simulation.objects,
                               scheduler.stamp_ns(n - n % scheduler.steps_per_tick))
-        self._publish_states(simulation.states, scheduler.stamp_ns(n))
+        self._publish_states(simulation.states, scheduler.stamp_ns(n), scheduler.is_tick(n))
 
     def _publish_objects(self, objects: ObjectStates, stamp_ns: int) -> None:
         message = self._objects_message
@@ -208,13 +210,15 @@ class SimOutputs:
             self._request_messages[av_id] = message
         self._requests[av_id].publish(message.fill(request))
 
-    def _publish_states(self, states: list[VehicleState], stamp_ns: int) -> None:
+    def _publish_states(self, states: list[VehicleState], stamp_ns: int, tick: bool) -> None:
         message = self._state_message
         for index, state in enumerate(states):
             place = slice(4 * index, 4 * index + 4)
             (message.positions[place], message.velocities[place],
              message.accelerations[place]) = vehicle_to_joints(state)
         self._state.publish(message.stamp(stamp_ns))
+        if tick:
+            self._tick_state.publish(message.message)
 
     def _publish_signals(self, k: int) -> None:
         states = self._lights.states_at(k)
@@ -249,6 +253,7 @@ class SimOutputs:
         found: set[str] = set()
         for name, publishers in {
                 '/clock': {'': self._clock}, '/vehicles/state': {'': self._state},
+                '/vehicles/tick_state': {'': self._tick_state},
                 '/traffic/objects': {'': self._objects}, '/timing/cycle': {'': self._cycle},
                 '/<av>/plan_request': self._requests_as(contract, '/<av>/plan_request'),
                 '/<av>/true_request': self._requests_as(contract, '/<av>/true_request'),
@@ -284,8 +289,8 @@ class SimOutputs:
 
     def destroy(self) -> None:
         """Release the publishers, for a game with other vehicles."""
-        publishers = [self._clock, self._state, self._objects, self._cycle, self._diagnostics,
-                      *self._latched.values(), *self._requests.values()]
+        publishers = [self._clock, self._state, self._tick_state, self._objects, self._cycle,
+                      self._diagnostics, *self._latched.values(), *self._requests.values()]
         publishers += [item for vehicle in self._vehicles for item in vehicle.publishers]
         for publisher in publishers:
             self._node.destroy_publisher(publisher)

@@ -49,13 +49,14 @@ class WorldStep:
 
 class WorldFollower:
     """
-    Puts `/vehicles/state` and `/traffic/objects` together, in order and without a gap.
+    Puts the states of vehicles and `/traffic/objects` together, in order and without a gap.
 
     :param endpoints: of the node.
+    :param states: topic of the vehicles, at every step or at scenario time steps alone.
     """
 
-    def __init__(self, endpoints: Endpoints) -> None:
-        self._states = endpoints.polled('/vehicles/state')
+    def __init__(self, endpoints: Endpoints, states: str) -> None:
+        self._states = endpoints.polled(states)
         self._objects = endpoints.polled('/traffic/objects', depth=MAX_WAITING)
         self._scenario: ScenarioSet | None = None
         self._waiting: deque[JointTrajectory] = deque(maxlen=MAX_WAITING)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.scenario.object_motion import ABSENT, Motion, ROUNDING
+from crgame_ros.scenario.object_motion import ABSENT, Integrated
 from crgame_ros.scenario.object_path import ObjectPath, SpeedProfile
 from crgame_ros.scenario.object_spec import MoverType, ObjectSpec
 from crgame_ros.scenario.object_surroundings import Surroundings
@@ -18,7 +18,6 @@ from crgame_ros.traffic.car_following import IntelligentDriver
 
 FloatArray = NDArray[np.float64]
 
-SUB_STEP_S = 0.01
 # Distance to the side below which something is in the way, besides both half widths [m].
 SIDE_MARGIN = 0.3
 # A reactive object looks as far as it takes to stop comfortably, and this much farther [m].
@@ -26,7 +25,7 @@ _LOOK = 30.0
 _ARRIVED = 0.01
 
 
-class BicycleMotion(Motion):
+class BicycleMotion(Integrated):
     """
     Moves the rear axle along a path: x' = v cos psi, y' = v sin psi, psi' = v tan(delta) / L.
 
@@ -45,6 +44,7 @@ class BicycleMotion(Motion):
 
     def __init__(self, spec: ObjectSpec, path: ObjectPath, start: float,
                  wanted: FloatArray) -> None:
+        super().__init__(spec.start)
         self._spec, self._path, self._type = spec, path, spec.mover
         self._s = start
         # The bend that counts is that at the rear axle, behind the centre.
@@ -60,7 +60,6 @@ class BicycleMotion(Motion):
         self._speed = self._profile.at(start) if spec.start == 0.0 else 0.0
         # Until the first decision nothing is in the way.
         self._following = math.inf
-        self._gone = False
 
     def decide(self, time_s: float, others: Surroundings) -> None:
         """Find what is ahead on the path, and the acceleration behind it."""
@@ -95,15 +94,6 @@ class BicycleMotion(Motion):
         vx, vy, _ = others.velocities[first].tolist()
         yaw = float(seen.yaw[first])
         return max(float(gaps[first]), 0.0), vx * math.cos(yaw) + vy * math.sin(yaw)
-
-    def move(self, time_s: float, duration_s: float) -> None:
-        """Integrate speed and arc length in steps of 10 ms or a little less."""
-        steps = max(1, math.ceil(duration_s / SUB_STEP_S - ROUNDING))
-        step = duration_s / steps
-        for index in range(steps):
-            if self._gone or time_s + index * step < self._spec.start - ROUNDING:
-                continue
-            self._advance(step)
 
     def _advance(self, step: float) -> None:
         allowed = self._profile.at(self._s + self._speed * step)

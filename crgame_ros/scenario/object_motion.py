@@ -4,6 +4,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from crgame_ros.scenario.object_surroundings import Surroundings
 
 FloatArray = NDArray[np.float64]
 
+SUB_STEP_S = 0.01
 ABSENT = (np.nan, np.nan, np.nan)
 # A time step is a decimal fraction; ten of them are not exactly a second [s].
 ROUNDING = 1e-9
@@ -33,6 +35,31 @@ class Motion(ABC):
     @abstractmethod
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
         """Give the centre's pose (3) and its derivatives (3); NaN while absent."""
+
+
+class Integrated(Motion):
+    """
+    A movement that is integrated in small steps, from its start until it has gone.
+
+    :param start: until then it stands where it begins [s]
+    """
+
+    def __init__(self, start: float) -> None:
+        self._start = start
+        self._gone = False
+
+    def move(self, time_s: float, duration_s: float) -> None:
+        """Integrate in steps of 10 ms or a little less."""
+        steps = max(1, math.ceil(duration_s / SUB_STEP_S - ROUNDING))
+        step = duration_s / steps
+        for index in range(steps):
+            if self._gone or time_s + index * step < self._start - ROUNDING:
+                continue
+            self._advance(step)
+
+    @abstractmethod
+    def _advance(self, step: float) -> None:
+        """Integrate over one step [s]."""
 
 
 class Standstill(Motion):

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.scenario.object_crossing import Crossing
-from crgame_ros.scenario.object_motion import ABSENT, Motion, ROUNDING
+from crgame_ros.scenario.object_motion import ABSENT, Integrated
 from crgame_ros.scenario.object_path import SpeedProfile
 from crgame_ros.scenario.object_spec import ObjectSpec
 from crgame_ros.scenario.object_surroundings import Surroundings
 
 FloatArray = NDArray[np.float64]
 
-SUB_STEP_S = 0.01
 # How far the way may pass a corner, which decides the speed there [m].
 CORNER_OFFSET = 0.1
 # It walks towards a point of its path this far ahead, and as far as it gets in this time.
@@ -26,7 +25,7 @@ _ARRIVED = 0.02
 _SLOW = 0.05
 
 
-class ParticleMotion(Motion):
+class ParticleMotion(Integrated):
     """
     A point that is accelerated in any direction, |a| <= a_max, and looks where it goes.
 
@@ -38,6 +37,7 @@ class ParticleMotion(Motion):
     """
 
     def __init__(self, spec: ObjectSpec) -> None:
+        super().__init__(spec.start)
         self._spec, self._type = spec, spec.mover
         self._points = np.array(spec.path)
         chord = np.diff(self._points, axis=0)
@@ -53,7 +53,6 @@ class ParticleMotion(Motion):
         dx, dy = self._directions[0].tolist()
         self._velocity = (speed * dx, speed * dy)
         self._yaw = math.atan2(dy, dx)
-        self._gone = False
 
     def _planned_speeds(self) -> SpeedProfile:
         grid = np.union1d(np.linspace(0.0, self._goal, math.ceil(self._goal / _SPACING) + 1),
@@ -75,15 +74,6 @@ class ParticleMotion(Motion):
         """Choose how far to walk."""
         if not self._gone:
             self._stop = self._crossing.stop(self._s, math.hypot(*self._velocity), others)
-
-    def move(self, time_s: float, duration_s: float) -> None:
-        """Integrate velocity and position in steps of 10 ms or a little less."""
-        steps = max(1, math.ceil(duration_s / SUB_STEP_S - ROUNDING))
-        step = duration_s / steps
-        for index in range(steps):
-            if self._gone or time_s + index * step < self._spec.start - ROUNDING:
-                continue
-            self._advance(step)
 
     def _advance(self, step: float) -> None:
         (x, y), (vx, vy) = self._position, self._velocity

@@ -5,15 +5,18 @@
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.scenario.waypoint_projection import ALONE, CurveIndex, CurvePieces
+
+# A third of a second to load, which a run without way-points saves.
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 FloatArray = NDArray[np.float64]
 Interpolation = Literal['cubic', 'step']
@@ -98,6 +101,7 @@ class WaypointLane:
             ([0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))))
         self.kinds: Mapping[str, Interpolation] = MappingProxyType(
             _checked_kinds({**DEFAULT_KINDS, **(kinds or {})}))
+        from scipy.interpolate import CubicSpline
         self._curve = CubicSpline(self.s, self.points)
         self.width: FloatArray = columns['width'][kept]
         self.speed_limit: FloatArray = columns['speed_limit'][kept]
@@ -176,7 +180,8 @@ class WaypointLane:
         return CurveIndex(self.pieces)
 
     @cached_property
-    def _cubics(self) -> dict[str, PchipInterpolator]:
+    def _cubics(self) -> dict[str, 'PchipInterpolator']:
+        from scipy.interpolate import PchipInterpolator
         return {name: PchipInterpolator(self.s, getattr(self, name))
                 for name, kind in self.kinds.items() if kind == 'cubic'}
 

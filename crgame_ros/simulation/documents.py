@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 import json
 import math
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
@@ -21,10 +21,13 @@ from crgame_ros.scenario.game import DrivabilitySpec
 from crgame_ros.scenario.game_file import execution_entries
 from crgame_ros.scenario.object_file import object_entry
 from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.traffic.spec import traffic_entry
 from crgame_ros.vehicle.parameters import VehicleParameters
+
+# Whoever reads a document needs none of the engine, which takes half a second to load.
+if TYPE_CHECKING:
+    from crgame_ros.simulation.setup import Setup
 
 GAME_TOPIC = '/scenario/game'
 OBJECTS_TOPIC = '/scenario/objects'
@@ -33,7 +36,7 @@ EVENTS_TOPIC = '/scenario/events'
 MALFORMED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
 
 
-def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
+def game_document(setup: 'Setup', *, epoch: int, clock_offset_ns: int,
                   real_time_factor: float) -> str:
     """
     Write the resolved game (fields as in the contract, `/scenario/game`).

@@ -20,7 +20,7 @@ from crgame_ros.traffic.lane_change import (
     urgency,
 )
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import LaneOrder
+from crgame_ros.traffic.leaders import LaneOrder, Ways
 from crgame_ros.traffic.neighbours import Beside, look_beside
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
@@ -40,6 +40,9 @@ NO_CHANGE = 15.0
 # lane is as short as this allows [m].
 TOO_NEAR = 4.0
 TIGHT = 10.0
+# Slower than this, nobody swings out with less room to the one ahead in the own lane [m].
+SWING_OUT = 7.0
+LETTING_IN = 1.1
 # Who has not got far in a change for so long gives it up [s].
 GIVE_UP = 5.0
 STARTED = 0.4
@@ -90,6 +93,7 @@ class LaneChanges:
         self._give_up = round(GIVE_UP / time_step_s)
         self._gaps = GapAcceptance()
         self._courtesy = CourtesyRules()
+        self._patience = max(1, round(self._courtesy.patience / time_step_s))
 
     def finish(self, k: int, agents: Agents) -> None:
         """End the changes that have come to their end, and those that come to nothing."""
@@ -107,20 +111,22 @@ class LaneChanges:
             agents.calm_until[stuck] = k + self._give_up
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
-               acceleration: FloatArray, blocked: FloatArray, standing: BoolArray,
-               entries: Entries, order: LaneOrder) -> FloatArray:
+               acceleration: FloatArray, gap: FloatArray, blocked: FloatArray,
+               standing: BoolArray, entries: Entries, order: LaneOrder, way: Ways) -> FloatArray:
         """
         Begin lane changes, and say how those brake who make room.
 
         :param slots: (A) of the agents.
         :param desired: (A) desired speeds [m/s]
         :param acceleration: (A) that they want in their own lanes [m/s^2]
+        :param gap: (A) to whatever is ahead in the own lane, or inf [m]
         :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
         :param standing: (E) which entries are such obstacles.
+        :param way: of the agents.
         :return: (A) accelerations that courtesy allows, inf where it asks for nothing.
         """
         yielding = np.full(agents.count, np.inf)
-        wish = self._wishes(k, agents, slots, blocked, entries, order)
+        wish = self._wishes(k, agents, slots, gap, blocked, entries, order)
         if wish is None:
             return yielding[slots]
         wish = wish.take(~_blocked(wish, standing))
@@ -134,10 +140,11 @@ class LaneChanges:
         if self._cooperative:
             waiting = wish.take(must & ~np.isin(wish.slots, begun))
             self._make_room(agents, waiting, yielding)
+            self._let_in(agents, slots, waiting, way, yielding)
         return yielding[slots]
 
-    def _wishes(self, k: int, agents: Agents, slots: IntArray, blocked: FloatArray,
-                entries: Entries, order: LaneOrder) -> Wish | None:
+    def _wishes(self, k: int, agents: Agents, slots: IntArray, gap: FloatArray,
+                blocked: FloatArray, entries: Entries, order: LaneOrder) -> Wish | None:
         """List who may want to change to which side; urgency -1 is for speed alone."""
         graph, routes, found = self._graph, self._routes, []
         lane, destination = agents.lane[slots], agents.destination[slots]
@@ -146,7 +153,8 @@ class LaneChanges:
         stuck = blocked < PREPARE
         hurry = urgency(np.minimum(remaining, blocked), agents.speed[slots])
         free = (agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k) & (
-            blocked > TOO_NEAR)
+            blocked > TOO_NEAR) & ((agents.speed[slots] > SLOWEST) | (gap > SWING_OUT)
+                                   | np.isfinite(blocked))
         to_junction = np.where(self._conflicts.count[lane] > 0, 0.0, np.inf)
         onto = routes.next[destination, lane]
         to_junction = np.where(
@@ -224,6 +232,7 @@ class LaneChanges:
         agents.lane[slot], agents.s[slot] = beside.lane[i], beside.s[i]
         agents.d[slot] = beside.d[i]
         agents.previous[slot] = NOBODY
+        agents.waits[slot] = 0
         agents.calm_until[slot] = k + self._calm + round(
             float(span[0] / max(speed[0], 1.0)) * self._calm / CALM)
         self._relieve(agents, slot, beside.lead_gap[i], float(speed[0]))
@@ -256,6 +265,32 @@ class LaneChanges:
             np.zeros(len(slots)))
         falls = np.isfinite(beside.lead_gap) & willing & (speed > 2.0)
         np.minimum.at(yielding, slots[falls], -back[falls])
+
+    def _let_in(self, agents: Agents, slots: IntArray, wish: Wish, way: Ways,
+                yielding: FloatArray) -> None:
+        """
+        Have somebody stop for each who has stood long enough where the own lane ends.
+
+        It is the first on the lane beside who can do so without haste: those who are nearer and
+        faster pass. Who has been let in moves, and the next one has to stand as long (zipper).
+        """
+        rules = self._courtesy
+        speed = agents.speed[slots]
+        for i in np.flatnonzero(agents.waits[wish.slots] >= self._patience).tolist():
+            slot, lane, s = int(wish.slots[i]), wish.beside.lane[i], wish.beside.s[i]
+            row, step = np.nonzero(way.lane == lane)
+            room = way.offset[row, step] + s - 0.5 * (
+                agents.length[slots[row]] + agents.length[slot]) - self._gaps.standstill_gap
+            fits = (room > 0.0) & (slots[row] != slot) & (
+                speed[row]**2 <= 2.0 * rules.patient_deceleration * room)
+            if not fits.any():
+                continue
+            row, room = row[fits], room[fits]
+            first = int(room.argmin())
+            who = int(slots[row[first]])
+            # A little more than needed: less is needed then, and it stays the one who stops.
+            braking = LETTING_IN * agents.speed[who]**2 / (2.0 * room[first])
+            yielding[who] = min(yielding[who], -braking)
 
 
 def _blocked(wish: Wish, standing: BoolArray) -> BoolArray:

@@ -25,12 +25,16 @@ class CourtesyRules:
     :param urgent_deceleration: the same at urgency 1 [m/s^2]
     :param max_speed_drop: greatest Dv [m/s]
     :param time: D_t [s]
+    :param patience: how long one stands at the end of a lane until somebody stops for it [s]
+    :param patient_deceleration: hardest of the one who does [m/s^2]
     """
 
     deceleration: float = 1.0
     urgent_deceleration: float = 2.5
     max_speed_drop: float = 5.0
     time: float = 4.0
+    patience: float = 3.0
+    patient_deceleration: float = 2.0
 
     def deceleration_limit(self, urgency: Array | float,
                            aggressivity: Array | float) -> Array | float:

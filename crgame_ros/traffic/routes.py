@@ -15,6 +15,8 @@ CHANGE_LENGTH = 40.0
 # Staying in a lane that reaches the destination by a longer way is fine up to this [m].
 DETOUR = 100.0
 MAX_LOOP_DESTINATIONS = 16
+# No lane of a net that leaves nowhere is farther than this from a destination, if so many do [m].
+LEAST_LOOP = 150.0
 
 
 class Routes:
@@ -22,7 +24,7 @@ class Routes:
     The ways to every destination, as tables over destinations (D) and lanes (L).
 
     A destination is where a road leaves the map, all its parallel lanes together; in a net that
-    leaves nowhere, single lanes are.
+    leaves nowhere, roads far from each other are.
 
     :param graph: the lanes.
     :param costly: (L) what driving along a lane costs besides its length [m]
@@ -49,15 +51,41 @@ class Routes:
         both = (stay + change).tocsr().T.tocsr()
         costs = [_cost(both, members) for members in self.groups]
         reached = np.isfinite(costs).any(axis=0) if costs else np.zeros(len(graph), dtype=bool)
-        while not reached.all() and len(self.groups) < len(costs) + MAX_LOOP_DESTINATIONS:
-            self.groups.append(lanes[~reached][:1])
-            costs.append(_cost(both, self.groups[-1]))
-            reached |= np.isfinite(costs[-1])
+        loops = self._loop_destinations(both, np.asarray(~reached))
+        self.groups += [group for group, _ in loops]
+        costs += [cost for _, cost in loops]
         self.cost: FloatArray = np.array(costs)
         self._choose()
 
     def __len__(self) -> int:
         return len(self.groups)
+
+    def _loop_destinations(self, reverse: csr_matrix, nowhere: NDArray[np.bool_],
+                           ) -> list[tuple[IntArray, FloatArray]]:
+        """
+        Choose roads as destinations of lanes that lead to none, as far apart as can be.
+
+        :param reverse: costs against the direction of travel.
+        :param nowhere: (L) these lanes.
+        :return: lanes of each destination, and the cost (L) of every lane to it.
+        """
+        found: list[tuple[IntArray, FloatArray]] = []
+        nearest = np.where(nowhere, np.inf, 0.0)
+        while len(found) < MAX_LOOP_DESTINATIONS and nearest.max() > LEAST_LOOP:
+            members = self._road(int(nearest.argmax()))
+            found.append((members, _cost(reverse, members)))
+            nearest = np.minimum(nearest, np.where(nowhere, found[-1][1], 0.0))
+        return found
+
+    def _road(self, lane: int) -> IntArray:
+        """List a lane and those beside it."""
+        members, graph = {lane}, self._graph
+        for side in (graph.left, graph.right):
+            current = int(side[lane])
+            while current >= 0 and current not in members:
+                members.add(current)
+                current = int(side[current])
+        return np.array(sorted(members))
 
     def _choose(self) -> None:
         """Tabulate the best successor, and where the lane has to be left for another."""

@@ -183,7 +183,8 @@ class Traffic:
         acceleration = np.minimum(acceleration, long.before_line(speed, desired, halt))
         if self._spec.lane_changes:
             acceleration = np.minimum(acceleration, self._changes.decide(
-                k, agents, slots, desired, acceleration, blocked, standing, entries, order))
+                k, agents, slots, desired, acceleration, gap, blocked, standing, entries, order,
+                way))
         acceleration = np.maximum(acceleration, -model.max_deceleration)
         waits = (speed < STANDING) & (acceleration < 0.5)
         agents.waits[slots] = np.where(waits, agents.waits[slots] + 1, 0)

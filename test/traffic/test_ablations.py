@@ -237,8 +237,8 @@ def test_m3_without_lane_changes_a_ramp_is_a_dead_end() -> None:
     straight = slice(_first(run, 0, {52}) + 10, merged + 20)
     turning = np.abs(np.gradient(np.unwrap(run.poses[straight, 0, 2]), STEP_S))
     assert 0.3 < (turning * run.speeds[straight, 0]).max() < 2.5
-    stuck = drive('ZAM_DenseMerge-1_1_T-1', start, 35.0, lane_changes=False)
-    assert {stuck.lanelets(k)[0] for k in range(0, 351, 5)} == {51, 52}
+    stuck = drive('ZAM_DenseMerge-1_1_T-1', start, 40.0, lane_changes=False)
+    assert {stuck.lanelets(k)[0] for k in range(0, 401, 5)} == {51, 52}
     assert stuck.speeds[-1, 0] < 0.1
     end = stuck.network.line(52).length - stuck.network.locate(52, *stuck.poses[-1, 0, :2])[0]
     assert 2.25 < end < 2.25 + 6.0

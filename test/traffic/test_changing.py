@@ -138,3 +138,35 @@ def test_swerves_are_shared_by_all_agents_of_a_lane(maps: Path) -> None:
                 for p in (first, second))
     assert one.max() > 0.2
     np.testing.assert_allclose(one, two, atol=0.03)
+
+
+def stream(later: int, cooperative: bool) -> support.Run:
+    """Let somebody stand where the right lane ends, beside cars 45 m apart at 25 m/s."""
+    begins = [(365.0 - 45.0 * i, 0) for i in range(9)] + [(5.0, 18 * i + 18) for i in range(later)]
+    cars = [support.driving(10 + i, [(x, 0.0, 0.0), (1100.0, 0.0, 0.0)], 25.0, first_k=k)
+            for i, (x, k) in enumerate(begins)]
+    return support.Run(two_lanes(400.0), TrafficSpec(cooperative=cooperative), 0, (),
+                       [agent(1, 390.0, -3.5, 0.0, 14.0), *cars])
+
+
+def test_somebody_stops_for_whoever_has_stood_at_the_end_of_a_lane() -> None:
+    run = stream(25, cooperative=True).ticks(400)
+    assert run.overlaps() == []
+    let_in = np.flatnonzero(run.series(0)[0][:, 1] > -1.0)
+    # Not before the patience of 3 s; whoever stops for it needs 13 s from 25 m/s.
+    assert 30 < let_in[0] < 200
+    # Nobody brakes harder for it than where somebody cuts in.
+    speeds = np.array(run.speeds)[:, 1:]
+    assert np.nanmin(np.diff(speeds, axis=0)) / 0.1 > -4.1
+    # Without courtesy nobody does: such gaps are too short to drive into from a stand.
+    poses, _ = stream(25, cooperative=False).ticks(400).series(0)
+    assert np.nanmax(poses[:, 1]) < -3.0
+
+
+def test_who_has_stood_long_goes_when_the_lane_is_free() -> None:
+    run = stream(0, cooperative=False).ticks(300)
+    poses, speeds = run.series(0)
+    last = run.series(9)[0][:, 0]
+    passed = int(np.flatnonzero(last > 400.0)[0])
+    assert speeds[passed] == 0.0 and poses[passed, 1] < -3.0
+    assert poses[passed + 60, 1] > -1.0

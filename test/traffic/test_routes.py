@@ -69,6 +69,27 @@ def test_a_loop_without_an_exit_has_destinations_too() -> None:
     assert np.isfinite(routes.cost).any(axis=0).all()
 
 
+def test_destinations_of_a_net_without_exits_are_spread_over_it() -> None:
+    def ring(radius: float, first: int, **links: int) -> list:
+        corners = [(radius * np.cos(a), radius * np.sin(a))
+                   for a in np.linspace(0.0, 2 * np.pi, 161)]
+        return [support.lane_strip(
+            first + i, corners[40 * i:40 * i + 41], successor=[first + (i + 1) % 4],
+            predecessor=[first + (i - 1) % 4],
+            **{name: number + i for name, number in links.items()},
+            **{f'{name}_same_direction': True for name in links}) for i in range(4)]
+
+    # Two lanes side by side, four quarters of 157 m each.
+    lanes = [*ring(98.25, 1, adjacent_right=11), *ring(101.75, 11, adjacent_left=1)]
+    graph = LaneGraph(RoadNetwork(support.roads(*lanes).lanelet_network))
+    routes = Routes(graph)
+    # Both lanes of a quarter; no quarter is farther from one than three are long.
+    assert all(len(group) == 2 and group[1] - group[0] == 10 for group in names(graph, routes))
+    assert len(routes) >= 2
+    assert np.isfinite(routes.cost).all()
+    assert routes.cost.min(axis=0).max() < 330.0
+
+
 def test_merging_early_is_preferred_to_the_end_of_the_taper(maps: Path) -> None:
     graph = LaneGraph(network(maps / 'ZAM_Merge-1_1_T-1.xml'))
     conflicts = Conflicts(graph)
