@@ -38,10 +38,11 @@ class MarkerNode(Node):
         self._endpoints = Endpoints(self)
         self._markers = self._endpoints.publisher('/markers')
         self._documents = ScenarioDocuments(self._endpoints)
-        self._states = self._endpoints.polled('/vehicles/state', depth=1)
         self._objects = self._endpoints.polled('/traffic/objects', depth=1)
         self._signals = self._endpoints.polled('/scenario/signals')
         self._orders = self._endpoints.polled('/timing/frame_skip')
+        # What comes often or is large is subscribed to while somebody looks.
+        self._states: PolledSubscription | None = None
         self._paths: dict[str, tuple[PolledSubscription, PolledSubscription]] = {}
         self._set: ScenarioSet | None = None
         self._scene: SceneMarkers | None = None
@@ -67,6 +68,8 @@ class MarkerNode(Node):
             self._skipped = order.data
         if self._skipped:
             return
+        if self._states is None:
+            self._states = self._endpoints.polled('/vehicles/state', depth=1)
         self._take_documents()
         if self._scene is None or self._set is None:
             return
@@ -85,7 +88,14 @@ class MarkerNode(Node):
             self._sent_s = now_s
 
     def _rest(self) -> None:
-        """Give up the requests and plans, which are large: nobody looks."""
+        """Give up states, requests and plans: nobody looks."""
+        if self._states is not None:
+            self.destroy_subscription(self._states.subscription)
+            self._states = None
+        self._start_over()
+
+    def _start_over(self) -> None:
+        """Forget who has looked, and the plans and requests of a game's AVs."""
         for slots in self._paths.values():
             for slot in slots:
                 self.destroy_subscription(slot.subscription)
@@ -108,7 +118,7 @@ class MarkerNode(Node):
                            for entry in self._set.game.avs}
 
     def _begin(self, documents: ScenarioSet) -> None:
-        self._rest()
+        self._start_over()
         self._set, self._scene = documents, SceneMarkers(documents)
         self._scene.set_signals(self._light_states)
         self._vehicle_names = [name for item in documents.driven
@@ -142,7 +152,7 @@ class MarkerNode(Node):
                 ObjectStates(np.array(point.positions).reshape(-1, 3),
                              np.array(point.velocities).reshape(-1, 3)),
                 from_time(message.header.stamp))
-        message = self._states.latest()
+        message = None if self._states is None else self._states.latest()
         # Those of the game before or after this one are passed over.
         if message is None or message.joint_names != self._vehicle_names \
                 or from_time(message.header.stamp) < offset_ns:

@@ -283,8 +283,11 @@ def test_nothing_is_computed_while_nobody_looks(
         assert len(peer.messages['/vehicles/state']) > 10
         assert made == []
         with Peer(ros_domain, '/markers') as viewer:
-            stage.step()
-            viewer.wait_until(lambda: _frames(viewer.messages['/markers']), 'markers')
+            def drawn() -> bool:
+                stage.step()
+                return bool(_frames(viewer.messages['/markers']))
+
+            viewer.wait_until(drawn, 'markers')
         assert made[:2] == ['scene', 'message']
         # At 20 Hz it has noticed within a second that nobody looks any more.
         peer.listen_for(1.0)
