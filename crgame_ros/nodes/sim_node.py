@@ -15,6 +15,7 @@ from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.sim_control import SimControl
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.timing.time_slice import shorten_time_slice
 
 NS_PER_S = 1_000_000_000
 # /clock starts here: ROS takes a time of zero for "no clock yet".
@@ -36,6 +37,8 @@ class SimNode(Node):
         setup = self._told(build_setup(self._control.first_game()))
         if self._control.wants_realtime_priority:
             self._raise_priority()
+        else:
+            shorten_time_slice()
         self._control.paused = self._control.starts_paused
         epoch, offset_ns = 0, FIRST_OFFSET_NS
         while True:

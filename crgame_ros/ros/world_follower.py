@@ -106,7 +106,9 @@ class WorldFollower:
         tick = scheduler.is_tick(n)
         if tick:
             fresh = self._objects_by_n.pop(n, None)
-            if fresh is None and len(self._waiting) < MAX_WAITING // 2:
+            # Objects come in order: behind newer ones, those of this tick never will.
+            if fresh is None and max(self._objects_by_n, default=-1) < n \
+                    and len(self._waiting) < MAX_WAITING // 2:
                 return None
             self._latest = fresh or self._latest
             self._objects_by_n = {at: states for at, states in self._objects_by_n.items()

@@ -53,7 +53,8 @@ def test_the_tiles_near_the_vehicles_come_when_they_change(tmp_path: Path) -> No
                                env=os.environ | {'ROS_DOMAIN_ID': str(domain)})
     try:
         with Peer(domain, '/occupancy') as peer:
-            games, states = peer.publisher('/scenario/game'), peer.publisher('/vehicles/state')
+            games = peer.publisher('/scenario/game')
+            states = peer.publisher('/vehicles/tick_state')
             grids = peer.messages['/occupancy']
 
             def drive(count: int, *positions: tuple[float, float]) -> None:

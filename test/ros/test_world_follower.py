@@ -1,0 +1,124 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Steps of the world are put together in order, whatever half of one is lost or late."""
+
+from collections.abc import Callable, Iterator
+import time
+
+from live_support import PATIENCE_S, SCENARIOS
+import numpy as np
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+
+from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import StateMessage
+from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
+from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.documents import game_document, objects_document
+from crgame_ros.simulation.setup import build_setup
+
+STATES = '/vehicles/tick_state'
+
+
+@pytest.fixture(scope='module')
+def scenario() -> ScenarioSet:
+    """Give the documents of a game with recorded traffic."""
+    setup = build_setup(load_game(SCENARIOS / 'traffic.yaml'))
+    collector = DocumentCollector()
+    collector.take('xml', setup.loaded.xml_text)
+    collector.take('objects', objects_document(setup.descriptions))
+    collector.take('game', game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    documents = collector.complete()
+    assert documents is not None and documents.others
+    return documents
+
+
+class Stage:
+    """A follower, and what publishes to it."""
+
+    def __init__(self, scenario: ScenarioSet, domain: int) -> None:
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.node: Node = rclpy.create_node('stage', context=self._context)
+        endpoints = Endpoints(self.node)
+        self._scheduler = scenario.game.scheduler
+        self._states = endpoints.publisher(STATES)
+        self._objects = endpoints.publisher('/traffic/objects')
+        self._state = StateMessage([name for item in scenario.driven
+                                    for name in vehicle_joint_names(item.id)])
+        self._object = StateMessage([name for item in scenario.others
+                                     for name in object_joint_names(item.id)])
+        self._follower = WorldFollower(endpoints, STATES)
+        self._follower.begin(scenario)
+        self.steps: list[WorldStep] = []
+        self._wait(lambda: all(item.get_subscription_count() == 1
+                               for item in (self._states, self._objects)))
+
+    def _wait(self, condition: Callable[[], bool]) -> None:
+        until_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+
+    def state(self, k: int) -> None:
+        """Say where the vehicles are at tick k."""
+        n = k * self._scheduler.steps_per_tick
+        self._states.publish(self._state.stamp(self._scheduler.stamp_ns(n)))
+
+    def objects(self, k: int) -> None:
+        """Say where the objects are at tick k: all at x = k."""
+        n = k * self._scheduler.steps_per_tick
+        self._object.positions[:] = k
+        self._objects.publish(self._object.stamp(self._scheduler.stamp_ns(n)))
+
+    def follow(self, count: int) -> list[tuple[int, float]]:
+        """Wait for so many steps in all, and give tick and objects of each."""
+        self._wait(lambda: len(self.take()) >= count)
+        time.sleep(0.1)
+        return [(step.n // self._scheduler.steps_per_tick, float(step.objects.poses[0, 0]))
+                for step in self.take()]
+
+    def take(self) -> list[WorldStep]:
+        """Take what is complete."""
+        self.steps += self._follower.steps()
+        return self.steps
+
+    def close(self) -> None:
+        """End it."""
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+
+@pytest.fixture
+def stage(scenario: ScenarioSet, ros_domain: int) -> Iterator[Stage]:
+    found = Stage(scenario, ros_domain)
+    yield found
+    found.close()
+
+
+def test_states_wait_for_the_objects_of_their_tick(stage: Stage) -> None:
+    stage.objects(0)
+    stage.state(0)
+    stage.state(1)
+    assert stage.follow(1) == [(0, 0.0)]
+    stage.objects(1)
+    assert stage.follow(2) == [(0, 0.0), (1, 1.0)]
+    assert all(step.tick and np.isfinite(step.states).all() for step in stage.steps)
+
+
+def test_a_tick_whose_objects_are_lost_holds_up_nothing(stage: Stage) -> None:
+    """As at the start: the reader of objects may be known to the writer later than the other."""
+    stage.state(0)
+    stage.state(1)
+    stage.objects(1)
+    # Before anything was heard of the objects there is no world.
+    assert stage.follow(1) == [(1, 1.0)]
+    for k in (2, 3):
+        stage.state(k)
+    stage.objects(3)
+    # Of tick 2 the last known ones.
+    assert stage.follow(3) == [(1, 1.0), (2, 1.0), (3, 3.0)]

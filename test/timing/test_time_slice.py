@@ -1,0 +1,40 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The time slice that the loop asks for, against what the kernel says."""
+
+import os
+import platform
+import threading
+
+import pytest
+
+from crgame_ros.timing.time_slice import shorten_time_slice, SHORTEST_NS, time_slice_ns
+
+KERNEL = tuple(int(part) for part in platform.release().split('.')[:2])
+
+
+def in_a_thread(work: list[object]) -> None:
+    """Shorten the slice of a thread that ends, for it is the thread's own."""
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    work.append(shorten_time_slice())
+    work.append(time_slice_ns())
+    work.append(os.getpriority(os.PRIO_PROCESS, 0) == before)
+
+
+@pytest.mark.skipif(platform.machine() not in ('x86_64', 'aarch64'), reason='another processor')
+@pytest.mark.skipif(KERNEL < (6, 12), reason='Linux gives slices to ordinary tasks from 6.12 on')
+def test_the_kernel_takes_the_slice_and_nothing_else_changes() -> None:
+    here = time_slice_ns()
+    work: list[object] = []
+    thread = threading.Thread(target=in_a_thread, args=(work,))
+    thread.start()
+    thread.join()
+    assert work == [True, SHORTEST_NS, True]
+    assert time_slice_ns() == here != SHORTEST_NS
+
+
+def test_on_a_processor_without_a_known_number_nothing_happens(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(platform, 'machine', lambda: 'pdp11')
+    assert not shorten_time_slice()
+    assert time_slice_ns() is None
