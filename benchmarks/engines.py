@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 import statistics
 import tempfile
+import time
 from typing import Any
 
 from live_graph import LiveGraph
@@ -25,6 +26,8 @@ ROWS = (('mean step error [ms]', 'mean_step_error_ms'),
         ('timeout ratio', 'timeout_ratio'), ('busy p50 [ms]', 'busy_p50_ms'),
         ('busy p99 [ms]', 'busy_p99_ms'), ('late traffic [ticks]', 'late_ticks'),
         ('plan latency p50 [ms]', 'latency_p50_ms'), ('plan latency p99 [ms]', 'latency_p99_ms'))
+# Until the first cycle.
+STARTING_S = 3.0
 REPORTS = ('traffic_node: agents', 'perception_node: av0')
 
 
@@ -46,7 +49,15 @@ def write_game(name: str, agents: int, folder: Path) -> Path:
 
 def run(game: Path, duration_s: float, folder: Path) -> dict[str, Any]:
     """Run a game live; give its timing with the number of late ticks, and what nodes report."""
-    report = LiveGraph(folder, [str(game), '--duration', str(duration_s)]).wait()
+    graph = LiveGraph(folder, [str(game), '--duration', str(duration_s)])
+    # Between a fourth and three fourths of the run everybody has started and nobody has ended.
+    time.sleep(STARTING_S + 0.25 * duration_s)
+    before = graph.cpu_seconds()
+    time.sleep(0.5 * duration_s)
+    used = graph.cpu_seconds()
+    share = {name: (used[name] - before[name]) / (0.5 * duration_s)
+             for name in used if name in before}
+    report = graph.wait()
     late, said = 0, dict[str, list[Mapping[str, str]]]()
     with BagReader(folder / 'bag') as reader:
         for item in reader.decoded(['/diagnostics']):
@@ -56,8 +67,8 @@ def run(game: Path, duration_s: float, folder: Path) -> dict[str, Any]:
                     said.setdefault(status.name, []).append(
                         {value.key: value.value for value in status.values})
     latency = report['planners']['av0']['latency_ms']
-    return report | {'late_ticks': late, 'said': said, 'latency_p50_ms': latency['p50'],
-                     'latency_p99_ms': latency['p99']}
+    return report | {'late_ticks': late, 'said': said, 'share': share,
+                     'latency_p50_ms': latency['p50'], 'latency_p99_ms': latency['p99']}
 
 
 def print_table(reports: Mapping[str, list[dict[str, Any]]]) -> None:
@@ -69,6 +80,15 @@ def print_table(reports: Mapping[str, list[dict[str, Any]]]) -> None:
             values = [float(report[key]) for report in runs]
             cells += f'{statistics.median(values):14.4g}{max(values):12.4g}'
         print(f'{label:28}{cells}')
+    print('share of a core')
+    for node in sorted({node for runs in reports.values() for report in runs
+                        for node in report['share']}):
+        cells = ''
+        for runs in reports.values():
+            values = [report['share'][node] for report in runs if node in report['share']]
+            cells += (f'{statistics.median(values):14.1%}{max(values):12.1%}' if values
+                      else f'{"-":>14}{"-":>12}')
+        print(f'  {node:26}{cells}')
     for name in REPORTS:
         work = [values for report in reports['with engines'] for values in
                 report['said'].get(name, [])[1:]]

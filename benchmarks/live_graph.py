@@ -54,6 +54,17 @@ class LiveGraph:
         return {name: int(pid) for name, pid in re.findall(
             r'^(\S+): process (\d+)$', text, re.MULTILINE)}
 
+    def cpu_seconds(self) -> dict[str, float]:
+        """Give the processor time that each node has used so far [s], of those that still run."""
+        used = {}
+        for name, pid in self.node_pids().items():
+            try:
+                fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+            except OSError:
+                continue
+            used[name] = (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+        return used
+
     def page(self) -> str:
         """Wait for the address of the cockpit."""
         until_s = time.monotonic() + START_LIMIT_S

@@ -15,6 +15,9 @@ from crgame_ros.traffic.routes import Routes
 COASTING = 1.2
 # Who drives across ahead has been waited for or will be gone; this much is no alarm yet [m/s^2].
 ALARM = 2.5
+# With which agents brake before the end of a lane that they have not got out of [m/s^2], and the
+# time in which they get to the speed at which that begins [s].
+AT_END, AT_END_TIME = 3.0, 1.0
 # Lines are halted at with this gap instead of the standstill gap [m].
 LINE_GAP = 0.5
 
@@ -77,6 +80,21 @@ class Longitudinal:
         """Give the acceleration (A) before a point to halt at, a distance ahead of the front."""
         gap = np.maximum(distance, 0.0) + self._model.standstill_gap - LINE_GAP
         return np.asarray(self._model.acceleration(speed, desired, gap, np.zeros_like(speed)))
+
+    @staticmethod
+    def before_end(speed: FloatArray, distance: FloatArray) -> FloatArray:
+        """
+        Give the acceleration (A) before the end of a lane, a distance ahead of the front.
+
+        The speed follows sqrt(2 b d): at full speed as far as can be, for gaps are found there,
+        then with constant braking, and softly at the end.
+        """
+        distance = np.maximum(distance, 0.0)
+        allowed = np.sqrt(2.0 * AT_END * distance)
+        share = np.minimum(speed / np.maximum(allowed, 0.01), 1.0)
+        softly = (allowed - speed) / AT_END_TIME - AT_END * share**2
+        needed = speed**2 / (2.0 * np.maximum(distance, 0.5))
+        return np.where(speed > allowed, np.minimum(softly, -needed), softly)
 
 
 def changing_pairs(graph: LaneGraph, routes: Routes, agents: Agents, slots: IntArray,

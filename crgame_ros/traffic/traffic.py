@@ -178,9 +178,10 @@ class Traffic:
         blocked = least(pairs.agent, np.where(standing[pairs.entry], pairs.gap, np.inf),
                         len(slots), np.inf)
         halt = np.minimum(self._junctions(k, slots, way, entries, pairs, desired),
-                          self._lane_ends(way, agents.length[slots]))
-        halt = np.minimum(halt, self._before_obstacles(slots, blocked))
+                          self._before_obstacles(slots, blocked))
         acceleration = np.minimum(acceleration, long.before_line(speed, desired, halt))
+        acceleration = np.minimum(acceleration, long.before_end(
+            speed, self._lane_ends(way, agents.length[slots])))
         if self._spec.lane_changes:
             acceleration = np.minimum(acceleration, self._changes.decide(
                 k, agents, slots, desired, acceleration, gap, blocked, standing, entries, order,
