@@ -40,8 +40,9 @@ NO_CHANGE = 15.0
 # lane is as short as this allows [m].
 TOO_NEAR = 4.0
 TIGHT = 10.0
-# Slower than this, nobody swings out with less room to the one ahead in the own lane [m].
+# Below `SLOWEST` nobody swings out with less room to the one ahead in the own lane [m].
 SWING_OUT = 7.0
+# Share of the braking that is needed, with which somebody stops for who stands at a lane's end.
 LETTING_IN = 1.1
 # Who has not got far in a change for so long gives it up [s].
 GIVE_UP = 5.0

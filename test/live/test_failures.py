@@ -122,6 +122,7 @@ def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
         file = part / 'bag_part2_0.mcap'
         wait_until(lambda: file.stat().st_size > 20_000, 'a part of the recording')
         limit = file.stat().st_size + 1000
+        peer.wait_until(lambda: peer.statuses('recorder_node: recording'), 'word of the recorder')
         healthy = peer.statuses('recorder_node: recording')[-1]
         assert healthy[0].level == healthy[0].OK and int(healthy[1]['bytes']) > 0
         resource.prlimit(launcher.node('recorder_node'), resource.RLIMIT_FSIZE, (limit, limit))
