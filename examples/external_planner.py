@@ -74,6 +74,6 @@ if __name__ == '__main__':
     rclpy.init(signal_handler_options=rclpy.signals.SignalHandlerOptions.SIGINT)
     try:
         rclpy.spin(ExternalPlanner())
-    except BaseException:
-        if rclpy.ok():  # else it was Ctrl-C, whatever it interrupted
+    except BaseException as error:
+        if rclpy.ok() and not isinstance(error, KeyboardInterrupt):  # else it was Ctrl-C
             raise

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import gc
 import os
 from pathlib import Path
+import signal
 
 import pytest
 
@@ -20,6 +21,10 @@ ROOT = Path(__file__).resolve().parents[1]
 def pytest_configure() -> None:
     """Prepare the environment before any test imports rclpy, and inherit it to processes."""
     prepare_environment()
+    # A shell starts what runs in the background deaf to Ctrl-C, and so are its children. In such
+    # a process rclpy's own handler now and then fails to wake what waits.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
     paths = os.environ.get('PYTHONPATH', '').split(os.pathsep)
     if str(ROOT) not in paths:
