@@ -41,7 +41,7 @@ NO_CHANGE = 15.0
 TOO_NEAR = 4.0
 TIGHT = 10.0
 # Below `SLOWEST` nobody swings out with less room to the one ahead in the own lane [m].
-SWING_OUT = 7.0
+OUT_OF_QUEUE = 7.0
 # Share of the braking that is needed, with which somebody stops for who stands at a lane's end.
 LETTING_IN = 1.1
 # Who has not got far in a change for so long gives it up [s].
@@ -154,7 +154,7 @@ class LaneChanges:
         stuck = blocked < PREPARE
         hurry = urgency(np.minimum(remaining, blocked), agents.speed[slots])
         free = (agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k) & (
-            blocked > TOO_NEAR) & ((agents.speed[slots] > SLOWEST) | (gap > SWING_OUT)
+            blocked > TOO_NEAR) & ((agents.speed[slots] > SLOWEST) | (gap > OUT_OF_QUEUE)
                                    | np.isfinite(blocked))
         to_junction = np.where(self._conflicts.count[lane] > 0, 0.0, np.inf)
         onto = routes.next[destination, lane]

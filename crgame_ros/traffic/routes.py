@@ -40,7 +40,7 @@ class Routes:
         side = [[j for j in (graph.left[i], graph.right[i]) if j >= 0] for i in lanes]
         # A lane that ends beside one that goes on: whoever is on it has to merge.
         self.drops: NDArray[np.bool_] = ends & np.array(
-            [_goes_on(graph, int(i), ends) for i in lanes])
+            [not ends[_road(graph, int(i))].all() for i in lanes])
         self.is_exit: NDArray[np.bool_] = ends & ~self.drops
         links = [(i, j) for i in lanes[self.is_exit] for j in side[i] if self.is_exit[j]]
         pair = np.array(links, dtype=np.int64).reshape(-1, 2).T
@@ -72,20 +72,10 @@ class Routes:
         found: list[tuple[IntArray, FloatArray]] = []
         nearest = np.where(nowhere, np.inf, 0.0)
         while len(found) < MAX_LOOP_DESTINATIONS and nearest.max() > LEAST_LOOP:
-            members = self._road(int(nearest.argmax()))
+            members = _road(self._graph, int(nearest.argmax()))
             found.append((members, _cost(reverse, members)))
             nearest = np.minimum(nearest, np.where(nowhere, found[-1][1], 0.0))
         return found
-
-    def _road(self, lane: int) -> IntArray:
-        """List a lane and those beside it."""
-        members, graph = {lane}, self._graph
-        for side in (graph.left, graph.right):
-            current = int(side[lane])
-            while current >= 0 and current not in members:
-                members.add(current)
-                current = int(side[current])
-        return np.array(sorted(members))
 
     def _choose(self) -> None:
         """Tabulate the best successor, and where the lane has to be left for another."""
@@ -166,13 +156,12 @@ def _straightest(graph: LaneGraph) -> IntArray:
     return result
 
 
-def _goes_on(graph: LaneGraph, lane: int, ends: NDArray[np.bool_]) -> bool:
-    """Tell whether a lane beside this one goes on."""
+def _road(graph: LaneGraph, lane: int) -> IntArray:
+    """List a lane and those beside it."""
+    members = {lane}
     for side in (graph.left, graph.right):
-        current, seen = int(side[lane]), {lane}
-        while current >= 0 and current not in seen:
-            if not ends[current]:
-                return True
-            seen.add(current)
+        current = int(side[lane])
+        while current >= 0 and current not in members:
+            members.add(current)
             current = int(side[current])
-    return False
+    return np.array(sorted(members))

@@ -318,15 +318,12 @@ def test_maps_that_are_refused() -> None:
 
 
 SLOW = """
-import os, signal, sys, time
+import os, sys, time
 from pathlib import Path
 from crgame_ros.scenario import occupancy_writer
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.occupancy_raster_spec import RasterSpec
 from crgame_ros.scenario.rasterize import Raster
-
-# Whoever starts the tests in the background has told them to ignore it.
-signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def progress(done, total):
     print(done, total, flush=True)
