@@ -3,6 +3,7 @@
 """The state of all agents, one array per quantity."""
 
 from collections.abc import Sequence
+from typing import Any, cast, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,90 @@ from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 # Share of its length by which a vehicle's axles are apart, and its rear axle from its centre.
 WHEELBASE = 0.6
 REAR_TO_CENTER = 0.3
+BoolArray = NDArray[np.bool_]
+
 NOBODY = -1
+# Waits for nobody; others are -1 and below.
+FREE = -2**62
+# What vehicles of a type are allowed at most wherever, in Germany [m/s]; bicycles: what they do.
+TOP_SPEED = {'truck': 80.0 / 3.6, 'bus': 100.0 / 3.6, 'bicycle': 5.5, 'pedestrian': 1.4}
+
+
+class AgentTable(Protocol):
+    """
+    What is known of agents (A), each in a slot of its own.
+
+    :param length, width: [m]
+    :param wheelbase: [m]; `rear_to_center` from the rear axle to the centre [m].
+    :param active: whether it is on the road.
+    :param x, y, yaw: pose of the rear axle [m, rad].
+    :param speed, acceleration, steering: [m/s, m/s^2, rad]; yaw_rate [rad/s].
+    :param lane, s, d: of the centre in its lane [m].
+    :param destination: row of `Routes`.
+    :param factor: desired speed over speed limit; `top` its own limit, of its type [m/s].
+    :param aggressivity: 0 to 1, of the driver (Hidas 2005).
+    :param source: lane that it is leaving, or -1; from_s: where in its lane that began [m];
+        curve (A, 6): polynomial of the change (FS 4); span: its length [m].
+    :param calm_until: tick before which it does not think of changing lanes again;
+        `content_until` the same for changes for speed alone.
+    :param waits: ticks for which it has been standing.
+    :param grant: tick at which it was let into a junction, or -1; entered, until: the lanes with
+        which that one begins and ends.
+    :param previous: lane before its present one, or -1.
+    :param side: 1 while it changes to the left, -1 to the right.
+    :param relief: how much of its desired gap it forgoes for now [m].
+    :param free_at: tick from which an empty slot may be taken.
+    :param leader: who is next ahead, -1 - n for the n-th of the others, or `FREE`.
+    :param blocker: the agent that it waits for, -1 - n for the n-th of the others, or `FREE`.
+    :param insists_until: tick until which it goes first, having been found in a circle.
+    """
+
+    length: FloatArray
+    width: FloatArray
+    wheelbase: FloatArray
+    rear_to_center: FloatArray
+    active: BoolArray
+    x: FloatArray
+    y: FloatArray
+    yaw: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    steering: FloatArray
+    yaw_rate: FloatArray
+    lane: IntArray
+    s: FloatArray
+    d: FloatArray
+    destination: IntArray
+    factor: FloatArray
+    top: FloatArray
+    aggressivity: FloatArray
+    source: IntArray
+    from_s: FloatArray
+    curve: FloatArray
+    span: FloatArray
+    calm_until: IntArray
+    content_until: IntArray
+    waits: IntArray
+    grant: IntArray
+    entered: IntArray
+    until: IntArray
+    previous: IntArray
+    side: IntArray
+    relief: FloatArray
+    free_at: IntArray
+    leader: IntArray
+    blocker: IntArray
+    insists_until: IntArray
+
+
+def empty_table(count: int) -> AgentTable:
+    """Make a table of agents that are not there: one structured array, a record per agent."""
+    kinds: dict[Any, str] = {FloatArray: 'f8', IntArray: 'i8', BoolArray: '?'}
+    table = np.zeros(count, dtype=[
+        (name, kinds[kind], 6) if name == 'curve' else (name, kinds[kind])
+        for name, kind in AgentTable.__annotations__.items()])
+    # Columns are attributes of records in compiled code, and of no interest elsewhere.
+    return cast(AgentTable, table)
 
 
 class Agents:
@@ -22,45 +106,30 @@ class Agents:
 
     :param descriptions: what each looks like.
 
-    Attributes, each of shape (A):
-        active: whether it is on the road.
-        x, y, yaw: pose of the rear axle [m, rad].
-        speed, acceleration, steering: [m/s, m/s^2, rad]; yaw_rate [rad/s].
-        lane, s, d: of the centre in its lane [m].
-        destination: row of `Routes`.
-        factor: desired speed over speed limit.
-        aggressivity: 0 to 1, of the driver (Hidas 2005).
-        source: lane that it is leaving, or -1; from_s: where in its lane that began [m];
-        curve (A, 6): polynomial of the change (FS 4); span: its length [m].
-        calm_until: tick before which it does not think of changing lanes again.
-        waits: ticks for which it has been standing.
-        grant: tick at which it was let into a junction, or -1; entered, until: the lanes with
-            which that one begins and ends.
-        previous: lane before its present one, or -1.
-        side: 1 while it changes to the left, -1 to the right.
-        relief: how much of its desired gap it forgoes for now [m].
-        free_at: tick from which an empty slot may be taken.
+    The columns of `table` are attributes.
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription]) -> None:
-        count = len(descriptions)
-        self.count = count
-        self.length: FloatArray = np.array([x.shape.length for x in descriptions], dtype=float)
-        self.width: FloatArray = np.array([x.shape.width for x in descriptions], dtype=float)
-        self.wheelbase: FloatArray = WHEELBASE * self.length
-        self.rear_to_center: FloatArray = REAR_TO_CENTER * self.length
-        self.active: NDArray[np.bool_] = np.zeros(count, dtype=bool)
-        for name in ('x', 'y', 'yaw', 'speed', 'acceleration', 'steering', 'yaw_rate', 's', 'd',
-                     'from_s', 'span', 'relief', 'aggressivity'):
-            setattr(self, name, np.zeros(count))
-        self.factor: FloatArray = np.ones(count)
-        for name in ('lane', 'destination', 'calm_until', 'waits', 'free_at', 'side'):
-            setattr(self, name, np.zeros(count, dtype=np.int64))
+        self.count = len(descriptions)
+        self.table = empty_table(self.count)
+        for name in AgentTable.__annotations__:
+            setattr(self, name, np.asarray(self.table)[name])
+        self.length[:] = [x.shape.length for x in descriptions]
+        self.width[:] = [x.shape.width for x in descriptions]
+        self.wheelbase[:] = WHEELBASE * self.length
+        self.rear_to_center[:] = REAR_TO_CENTER * self.length
+        self.top[:] = [TOP_SPEED.get(x.type, np.inf) for x in descriptions]
+        self.factor[:] = 1.0
         for name in ('source', 'grant', 'until', 'entered', 'previous'):
-            setattr(self, name, np.full(count, NOBODY, dtype=np.int64))
-        self.curve: FloatArray = np.zeros((count, 6))
+            getattr(self, name)[:] = NOBODY
+        self.leader[:] = self.blocker[:] = FREE
 
     # Declared for readers and type checkers; made above.
+    length: FloatArray
+    width: FloatArray
+    wheelbase: FloatArray
+    rear_to_center: FloatArray
+    active: BoolArray
     x: FloatArray
     y: FloatArray
     yaw: FloatArray
@@ -70,13 +139,17 @@ class Agents:
     yaw_rate: FloatArray
     s: FloatArray
     d: FloatArray
+    factor: FloatArray
+    top: FloatArray
     from_s: FloatArray
     span: FloatArray
+    curve: FloatArray
     relief: FloatArray
     aggressivity: FloatArray
     lane: IntArray
     destination: IntArray
     calm_until: IntArray
+    content_until: IntArray
     waits: IntArray
     free_at: IntArray
     source: IntArray
@@ -85,6 +158,9 @@ class Agents:
     entered: IntArray
     previous: IntArray
     side: IntArray
+    leader: IntArray
+    blocker: IntArray
+    insists_until: IntArray
 
     def centers(self) -> FloatArray:
         """Give the poses (A, 3) of the centres [m, rad]."""
@@ -117,6 +193,8 @@ class Agents:
         for zero in (self.acceleration, self.steering, self.yaw_rate, self.relief, self.waits,
                      self.calm_until):
             zero[slot] = 0
+        self.content_until[slot] = self.insists_until[slot] = 0
+        self.leader[slot] = self.blocker[slot] = FREE
         for none in (self.source, self.grant, self.until, self.entered, self.previous):
             none[slot] = NOBODY
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from crgame_ros.errors import InputError
 from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.registry import ModelRegistry
+from crgame_ros.traffic.compiled import compiled, vectorized
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,65 @@ GUARD_SHARE = 0.8
 # What the guard leaves between bumpers, as a share of the gap at standstill.
 GUARD_GAP = 0.5
 LEAST_ROOM = 0.01
+# While a leader is known not to brake harder than this the guard asks for no more than that, or
+# what is needed [m/s^2].
+BRAKES_HARD, GUARD_DECELERATION = -2.0, 3.0
+# What is needed is braked with at once and a little harder, so that less is needed then.
+FORESIGHT = 1.05
+
+
+@vectorized
+def _spared(relief: float, desired_gap: float, gap: float, standstill_gap: float) -> float:
+    """Give what of a relief counts: nearer than the gap at standstill nobody is patient [m]."""
+    patience = min(max(2.0 * gap / standstill_gap - 1.0, 0.0), 1.0)
+    return min(relief, max(desired_gap - gap, 0.0)) * patience
+
+
+@compiled
+def _guard_of(speed: float, gap: float, lead_speed: float, standstill_gap: float,
+              hardest: float) -> float:
+    stopping = gap - GUARD_GAP * standstill_gap + max(lead_speed, 0.0)**2 / (2.0 * hardest)
+    share = speed**2 / (2.0 * hardest * max(stopping, LEAST_ROOM))
+    return hardest * min(max((share - GUARD_SHARE) / (1.0 - GUARD_SHARE), 0.0), 1.0)
+
+
+@vectorized
+def _guard(speed: float, gap: float, lead_speed: float, standstill_gap: float,
+           hardest: float) -> float:
+    return _guard_of(speed, gap, lead_speed, standstill_gap, hardest)
+
+
+@compiled
+def needed_deceleration(speed: float, room: float, lead_speed: float,
+                        lead_acceleration: float) -> float:
+    """
+    Give the constant braking that just avoids contact, if the leader goes on as it does.
+
+    :param room: that may be used up [m]
+    :param lead_acceleration: where it brakes, it may do so to a stop [m/s^2]
+    :return: 0 or above [m/s^2]
+    """
+    room, lead_speed = max(room, LEAST_ROOM), max(lead_speed, 0.0)
+    result = max(speed - lead_speed, 0.0)**2 / (2.0 * room)
+    if lead_acceleration < -0.5:
+        result = max(result, speed**2 / (2.0 * (room - lead_speed**2 / (2.0 * lead_acceleration))))
+    return result
+
+
+@vectorized
+def _limited(wanted: float, speed: float, gap: float, lead_speed: float,
+             lead_acceleration: float, standstill_gap: float, most: float,
+             hardest: float) -> float:
+    """Limit what a law wants, and brake as hard as the guard demands."""
+    guard = _guard_of(speed, gap, lead_speed, standstill_gap, hardest)
+    if lead_acceleration > BRAKES_HARD:
+        guard = min(guard, max(GUARD_DECELERATION, FORESIGHT * needed_deceleration(
+            speed, gap - GUARD_GAP * standstill_gap, lead_speed, lead_acceleration)))
+    if guard > 0.0:
+        wanted = min(wanted, -guard)
+    if speed < STANDING and wanted < START:
+        wanted = min(wanted, -START)
+    return min(max(wanted, -hardest), most)
 
 
 class CarFollowing(ABC):
@@ -58,7 +118,8 @@ class CarFollowing(ABC):
         """Give the steady gap behind a leader of the same speed, (A,) [m]."""
 
     def acceleration(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array,
-                     relief: Array | float = 0.0) -> Array:
+                     relief: Array | float = 0.0,
+                     lead_acceleration: Array | float = -np.inf) -> Array:
         """
         Give the acceleration for the next decision interval.
 
@@ -71,19 +132,16 @@ class CarFollowing(ABC):
         :param lead_speed: (A,) of the leader along the lane; any value where there is none [m/s]
         :param relief: (A,) by how much the desired gap may be missed for now (`courtesy`); the
             guard against collisions looks at the true gap [m]
+        :param lead_acceleration: (A,) of the leader; without it, it may brake its hardest at any
+            moment [m/s^2]
         :return: (A,) [m/s^2]
         """
         lead_speed = np.where(np.isposinf(gap), speed, lead_speed)
-        missing = np.maximum(self.desired_gap(speed) - gap, 0.0)
-        # Nearer than the gap at standstill nobody is patient.
-        patience = np.clip(2.0 * gap / self.standstill_gap - 1.0, 0.0, 1.0)
-        spared = np.minimum(relief, missing) * patience
+        spared = _spared(relief, self.desired_gap(speed), gap, self.standstill_gap)
         wanted = self.follow(speed, desired_speed, gap + spared, lead_speed)
-        guard = self.guard_deceleration(speed, gap, lead_speed)
-        wanted = np.where(guard > 0.0, np.minimum(wanted, -guard), wanted)
-        held = (speed < STANDING) & (wanted < START)
-        wanted = np.where(held, np.minimum(wanted, -START), wanted)
-        return np.clip(wanted, -self.max_deceleration, self.max_acceleration)
+        return np.asarray(_limited(
+            wanted, speed, gap, lead_speed, lead_acceleration, self.standstill_gap,
+            self.max_acceleration, self.max_deceleration))
 
     def guard_deceleration(self, speed: Array, gap: Array, lead_speed: Array) -> Array:
         """
@@ -95,11 +153,22 @@ class CarFollowing(ABC):
 
         :return: (A,) [m/s^2]
         """
-        stopping = (gap - GUARD_GAP * self.standstill_gap
-                    + np.maximum(lead_speed, 0.0) ** 2 / (2.0 * self.max_deceleration))
-        share = speed ** 2 / (2.0 * self.max_deceleration * np.maximum(stopping, LEAST_ROOM))
-        ramp = np.clip((share - GUARD_SHARE) / (1.0 - GUARD_SHARE), 0.0, 1.0)
-        return self.max_deceleration * ramp
+        return np.asarray(_guard(speed, gap, lead_speed, self.standstill_gap,
+                                 self.max_deceleration))
+
+
+@vectorized
+def _cruise(speed: float, desired: float, gap: float, lead_speed: float, time_gap: float,
+            h: float, gain: float, standstill_gap: float, comfortable: float,
+            speed_time: float) -> float:
+    """FS 3 with timely braking, or the approach to the desired speed if that is less."""
+    error = standstill_gap + time_gap * speed - gap
+    following = -(speed - lead_speed + gain * error) / h
+    room = max(gap - standstill_gap, 0.5 * standstill_gap)
+    needed = max(speed - lead_speed, 0.0)**2 / (2.0 * room)
+    if needed > comfortable:
+        following = min(following, -needed)
+    return min(following, max((desired - speed) / speed_time, -comfortable))
 
 
 class AdaptiveCruise(CarFollowing):
@@ -151,15 +220,9 @@ class AdaptiveCruise(CarFollowing):
 
     def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
         """Give FS 3 with timely braking, or the approach to the desired speed if that is less."""
-        error = self.desired_gap(speed) - gap
-        following = -(speed - lead_speed + self.gain * error) / self.h
-        room = np.maximum(gap - self.standstill_gap, 0.5 * self.standstill_gap)
-        needed = np.maximum(speed - lead_speed, 0.0) ** 2 / (2.0 * room)
-        following = np.where(needed > self._comfortable_deceleration,
-                             np.minimum(following, -needed), following)
-        free = np.maximum((desired_speed - speed) / self._speed_time,
-                          -self._comfortable_deceleration)
-        return np.minimum(following, free)
+        return np.asarray(_cruise(
+            speed, desired_speed, gap, lead_speed, self.time_gap, self.h, self.gain,
+            self.standstill_gap, self._comfortable_deceleration, self._speed_time))
 
     def desired_gap(self, speed: Array) -> Array:
         """Give s0 + T v."""

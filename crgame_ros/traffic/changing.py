@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import Agents, NOBODY
 from crgame_ros.traffic.car_following import CarFollowing
-from crgame_ros.traffic.conflicts import Conflicts
+from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.courtesy import CourtesyRules, relief_at_change
 from crgame_ros.traffic.lane_change import (
     CHANGE_THRESHOLD,
@@ -20,7 +20,7 @@ from crgame_ros.traffic.lane_change import (
     urgency,
 )
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import LaneOrder, Ways
+from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.neighbours import Beside, look_beside
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
@@ -29,6 +29,10 @@ BoolArray = NDArray[np.bool_]
 
 # After a change, time without another one; and with which the next for speed is thought of [s].
 CALM = 4.0
+# After any change, time without one for speed; and how often agents think of those, spread over
+# the ticks where there are more than so many agents [s].
+CONTENT = 12.0
+THOUGHT, AT_ONCE = 1.0, 50
 # Changes for speed are left alone where the route wants the lane within this distance [m].
 COMMITTED = 250.0
 SLOWEST = 3.0
@@ -91,6 +95,8 @@ class LaneChanges:
         self._politeness = politeness
         self._cooperative = cooperative
         self._calm = max(1, round(CALM / time_step_s))
+        self._content = round(CONTENT / time_step_s)
+        self._thoughts = max(1, round(THOUGHT / time_step_s))
         self._give_up = round(GIVE_UP / time_step_s)
         self._gaps = GapAcceptance()
         self._courtesy = CourtesyRules()
@@ -113,7 +119,7 @@ class LaneChanges:
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
                acceleration: FloatArray, gap: FloatArray, blocked: FloatArray,
-               standing: BoolArray, entries: Entries, order: LaneOrder, way: Ways) -> FloatArray:
+               standing: BoolArray, entries: Entries, way: Ways) -> FloatArray:
         """
         Begin lane changes, and say how those brake who make room.
 
@@ -127,7 +133,7 @@ class LaneChanges:
         :return: (A) accelerations that courtesy allows, inf where it asks for nothing.
         """
         yielding = np.full(agents.count, np.inf)
-        wish = self._wishes(k, agents, slots, gap, blocked, entries, order)
+        wish = self._wishes(k, agents, slots, gap, blocked, entries)
         if wish is None:
             return yielding[slots]
         wish = wish.take(~_blocked(wish, standing))
@@ -145,7 +151,7 @@ class LaneChanges:
         return yielding[slots]
 
     def _wishes(self, k: int, agents: Agents, slots: IntArray, gap: FloatArray,
-                blocked: FloatArray, entries: Entries, order: LaneOrder) -> Wish | None:
+                blocked: FloatArray, entries: Entries) -> Wish | None:
         """List who may want to change to which side; urgency -1 is for speed alone."""
         graph, routes, found = self._graph, self._routes, []
         lane, destination = agents.lane[slots], agents.destination[slots]
@@ -156,18 +162,20 @@ class LaneChanges:
         free = (agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k) & (
             blocked > TOO_NEAR) & ((agents.speed[slots] > SLOWEST) | (gap > OUT_OF_QUEUE)
                                    | np.isfinite(blocked))
-        to_junction = np.where(self._conflicts.count[lane] > 0, 0.0, np.inf)
+        wide = (agents.width[slots] > NARROW).astype(np.int64)
+        has = np.isfinite(self._conflicts.table.entry)
         onto = routes.next[destination, lane]
-        to_junction = np.where(
-            (onto >= 0) & (self._conflicts.count[np.maximum(onto, 0)] > 0)
-            & (to_junction > 0.0), graph.length[lane] - agents.s[slots], to_junction)
-        free &= to_junction > NO_CHANGE
+        junction = has[wide, lane] | ((onto >= 0) & has[wide, np.maximum(onto, 0)] & (
+            graph.length[lane] - agents.s[slots] <= NO_CHANGE))
+        free &= ~junction
+        content = agents.content_until[slots] <= k
+        content &= (slots * (len(slots) > AT_ONCE) + k) % self._thoughts == 0
         for side, table in ((1, graph.left), (-1, graph.right)):
             aside = table[lane]
             at = np.maximum(aside, 0)
             must = free & (aside >= 0) & (stuck | ((needs == side) & (remaining < PREPARE)))
             must &= np.isfinite(routes.cost[destination, at])
-            may = free & ~must & (needs == 0) & (aside >= 0) & (
+            may = free & content & ~must & (needs == 0) & (aside >= 0) & (
                 np.isfinite(routes.cost[destination, at])) & (
                 (routes.change[destination, at] == 0)
                 | (routes.remaining[destination, at] - agents.s[slots] > COMMITTED)) & (
@@ -179,7 +187,7 @@ class LaneChanges:
             np.concatenate([f[i] for f in found]) for i in range(5))
         if not len(who):
             return None
-        beside = look_beside(graph, routes, agents, who, lanes, entries, order)
+        beside = look_beside(graph.table, routes.next, agents.table, who, lanes, entries)
         return Wish(who, sides, hurries, room, beside)
 
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
@@ -234,6 +242,7 @@ class LaneChanges:
         agents.d[slot] = beside.d[i]
         agents.previous[slot] = NOBODY
         agents.waits[slot] = 0
+        agents.content_until[slot] = k + self._content
         agents.calm_until[slot] = k + self._calm + round(
             float(span[0] / max(speed[0], 1.0)) * self._calm / CALM)
         self._relieve(agents, slot, beside.lead_gap[i], float(speed[0]))

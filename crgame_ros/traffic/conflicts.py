@@ -3,18 +3,27 @@
 """Where lanes cross or merge, and who has the right of way there."""
 
 from commonroad.common.common_lanelet import LaneletType
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 import shapely
 
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 
 # Two vehicles meet where their lanes' centres are closer than a vehicle's width and a margin [m].
 WIDTH = 2.6
+# The same for trucks; the widest vehicle allowed, and the widest that counts as a car [m].
+WIDE, WIDEST, NARROW = 3.4, 2.55, 2.1
+# Between the sides of vehicles that pass: across each other's way, and in opposite directions [m].
+CROSSING_MARGIN, PASSING_MARGIN = 0.8, 0.1
 # Lanes whose headings differ by more than this over a conflict are the two ways of one road.
 ONCOMING = 2.6
+# And by less than this those beside each other, without being neighbours in the file [rad].
+ALONGSIDE = 0.2
 TURN = 0.45
 # A sign counts for the way behind it as far as this, while no other way joins [m].
 SIGN_REACH = 80.0
@@ -26,32 +35,75 @@ _YIELDING = {'YIELD', 'STOP', 'ROUNDABOUT'}
 _PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
 
 
+class ConflictTable(NamedTuple):
+    """
+    The rows (C) of `Conflicts`, and what they mean for lanes (L) and two widths of vehicle.
+
+    :param first, count: (L) rows of each lane.
+    :param lane, other: (C) lane of the row; the same conflict seen from the other lane.
+    :param start, end: (2, C) arc lengths between which cars, or wide vehicles, touch [m]
+    :param distance: (C) between the centre lines where they are nearest [m]
+    :param margin: (C) between the sides of vehicles that pass each other there [m]
+    :param priority: (C) 1: this lane goes first, -1: the other, 0: whoever comes first.
+    :param merges: (C) whether the lanes join for good.
+    :param entry, leave: (2, L) where the first conflict of a lane begins and the last ends, for
+        narrow and for wide vehicles; inf and 0 without one [m]
+    """
+
+    first: IntArray
+    count: IntArray
+    lane: IntArray
+    other: IntArray
+    start: FloatArray
+    end: FloatArray
+    distance: FloatArray
+    margin: FloatArray
+    priority: IntArray
+    merges: NDArray[np.bool_]
+    entry: FloatArray
+    leave: FloatArray
+
+
+@compiled
+def touch(conflicts: ConflictTable, row: int, width: float, other_width: float) -> bool:
+    """Tell whether vehicles of two widths are in each other's way in a conflict."""
+    between = 0.5 * (width + other_width) + conflicts.margin[row]
+    return bool(conflicts.distance[row] < between)
+
+
+@compiled
+def is_wide(width: float, other_width: float) -> int:
+    """Tell which of the two stretches of a conflict counts: 1 for wide vehicles, else 0."""
+    return 1 if 0.5 * (width + other_width) + CROSSING_MARGIN > WIDTH else 0
+
+
 class Conflicts:
     """
-    Pairs of lanes that cross or merge; each is two rows, one seen from either lane.
+    Pairs of lanes that cross, merge or overlap; each is two rows, one seen from either lane.
 
     The rows of a lane are `first[lane]:first[lane] + count[lane]`. Vehicles keep to the right.
 
     :param graph: the lanes.
 
-    Attributes of each row: `lane`, `other` (the row of the other lane), `start` and `end` (arc
-    lengths between which vehicles on the two lanes touch [m]) and `priority` (1: this lane goes
-    first, -1: the other, 0: whoever comes first).
+    Attribute `table`: the rows; its columns for cars are `lane`, `other`, `start`, `end` and
+    `priority`.
     """
 
     def __init__(self, graph: LaneGraph) -> None:
         self._graph = graph
-        rows: list[tuple[int, int, float, float]] = []
+        rows: list[tuple[int, int, _Stretch]] = []
         for i, j in _candidates(graph):
             here, there = _stretch(graph, i, j), _stretch(graph, j, i)
             # Neighbours share a border; where one ends they may run into each other all the same.
             if here is None or there is None or _is_fork(graph, i, j, here, there):
                 continue
-            rows += [(i, j, *here), (j, i, *there)]
-        rows.sort()
+            rows += [(i, j, here), (j, i, there)]
+        rows.sort(key=lambda row: row[:2])
         self.lane: IntArray = np.array([r[0] for r in rows], dtype=np.int64)
-        self.start: FloatArray = np.array([r[2] for r in rows], dtype=np.float64)
-        self.end: FloatArray = np.array([r[3] for r in rows], dtype=np.float64)
+        start = np.array([r[2].start for r in rows], dtype=np.float64).reshape(-1, 2).T.copy()
+        end = np.array([r[2].end for r in rows], dtype=np.float64).reshape(-1, 2).T.copy()
+        self.start: FloatArray = start[0]
+        self.end: FloatArray = end[0]
         place = {(r[0], r[1]): n for n, r in enumerate(rows)}
         self.other: IntArray = np.array([place[r[1], r[0]] for r in rows], dtype=np.int64)
         self.count: IntArray = np.bincount(self.lane, minlength=len(graph)).astype(np.int64)
@@ -59,15 +111,19 @@ class Conflicts:
         self.rank: IntArray = np.array([_rank(graph, i) for i in range(len(graph))])
         self.priority: IntArray = np.array(
             [_priority(graph, self.rank, r[0], r[1]) for r in rows], dtype=np.int64)
-        # Where the first conflict of each lane begins [m].
-        self.entry: FloatArray = np.full(len(graph), np.inf)
-        np.minimum.at(self.entry, self.lane, self.start)
-        self.leave: FloatArray = np.zeros(len(graph))
-        np.maximum.at(self.leave, self.lane, self.end)
-
         # The ways join for good: one goes on behind the other.
         last = self.end > graph.length[self.lane] - 1.0
         self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
+        distance = np.array([r[2].distance for r in rows], dtype=np.float64)
+        margin = np.array([r[2].margin for r in rows], dtype=np.float64)
+        entry, leave = np.full((2, len(graph)), np.inf), np.zeros((2, len(graph)))
+        for wide, width in enumerate((NARROW, WIDEST)):
+            counts = distance < 0.5 * (width + WIDEST) + margin
+            np.minimum.at(entry[wide], self.lane[counts], start[1][counts])
+            np.maximum.at(leave[wide], self.lane[counts], end[1][counts])
+        self.table = ConflictTable(
+            self.first, self.count, self.lane, self.other, start, end, distance, margin,
+            self.priority, self.merges, entry, leave)
 
     def __len__(self) -> int:
         return len(self.lane)
@@ -85,36 +141,56 @@ def _candidates(graph: LaneGraph) -> list[tuple[int, int]]:
     lines = [shapely.LineString(np.stack((graph.x[a:b], graph.y[a:b]), axis=-1))
              for a, b in zip(graph.first, graph.first + graph.count, strict=True)]
     tree = shapely.STRtree(lines)
-    left, right = tree.query(lines, predicate='dwithin', distance=WIDTH)
+    left, right = tree.query(lines, predicate='dwithin', distance=WIDE)
     following = [{int(j) for j in row if j >= 0} for row in graph.successors]
     before = [{int(j) for j in row if j >= 0} for row in graph.predecessors]
     return sorted((int(i), int(j)) for i, j in zip(left, right, strict=True)
-                  if i < j and not (_beside(graph, int(i), int(j)) and lines[i].distance(
+                  if i < j and not (_same_way(graph, int(i), int(j)) and lines[i].distance(
                       lines[j]) > JOINING) and j not in following[i] and i not in following[j]
                   and not before[i] & before[j])
 
 
-def _beside(graph: LaneGraph, i: int, j: int) -> bool:
-    return j in graph.beside[i] or i in graph.beside[j]
+def _same_way(graph: LaneGraph, i: int, j: int) -> bool:
+    """Tell whether two lanes are neighbours of one direction."""
+    return j in (graph.left[i], graph.right[i]) or i in (graph.left[j], graph.right[j])
 
 
-def _stretch(graph: LaneGraph, i: int, j: int) -> tuple[float, float] | None:
+class _Stretch(NamedTuple):
+    """Where a lane is within reach of another: for cars and for wide vehicles [m]."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    distance: float
+    margin: float
+
+
+def _stretch(graph: LaneGraph, i: int, j: int) -> _Stretch | None:
     """Find where lane i is within reach of lane j, as arc lengths on i."""
     a = slice(int(graph.first[i]), int(graph.first[i] + graph.count[i]))
     b = slice(int(graph.first[j]), int(graph.first[j] + graph.count[j]))
     there = cKDTree(np.stack((graph.x[b], graph.y[b]), axis=-1))
     distance, nearest = there.query(np.stack((graph.x[a], graph.y[a]), axis=-1))
     turn = np.abs(np.angle(np.exp(1j * (graph.yaw[a] - graph.yaw[b][nearest]))))
-    close = np.flatnonzero(distance < WIDTH)
+    # Who comes towards one, or drives beside, keeps to the lane as well: little room is enough.
+    about = turn[distance < WIDE]
+    beside = bool((about < ALONGSIDE).all()) and float(distance.min()) > PASSING_MARGIN + NARROW
+    margin = PASSING_MARGIN if beside or bool((about > ONCOMING).all()) else CROSSING_MARGIN
+    reach = 0.5 * (WIDEST + WIDEST) + margin
+    close = np.flatnonzero(distance < min(reach, WIDE))
     # Touching ends are those of consecutive ways, of which nobody gets into the other's.
-    if not (turn[close] < ONCOMING).any() or (distance.min() > 0.5 * WIDTH and len(close) < 4):
+    if not len(close) or (distance.min() > 0.5 * WIDTH and len(close) < 4):
         return None
-    return float(close[0] * graph.step[i]), float(close[-1] * graph.step[i])
+    near = np.flatnonzero(distance < min(reach, WIDTH))
+    near = near if len(near) else close
+    step = float(graph.step[i])
+    return _Stretch((float(near[0] * step), float(close[0] * step)),
+                    (float(near[-1] * step), float(close[-1] * step)),
+                    float(distance.min()), margin)
 
 
-def _is_fork(graph: LaneGraph, i: int, j: int, here: tuple[float, float],
-             there: tuple[float, float]) -> bool:
+def _is_fork(graph: LaneGraph, i: int, j: int, first: _Stretch, second: _Stretch) -> bool:
     """Tell whether two lanes only part: they begin together, or one ends where other begins."""
+    here, there = (first.start[0], first.end[0]), (second.start[0], second.end[0])
     starts = here[0] < 1.0 and there[0] < 1.0
     a, b = int(graph.first[i]), int(graph.first[j])
     same = abs(wrap_pi(float(graph.yaw[a] - graph.yaw[b]))) < 0.5

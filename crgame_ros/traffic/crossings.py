@@ -2,25 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Crossing and merging: who goes first, by right of way and gap acceptance."""
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.traffic.agents import Agents, NOBODY
-from crgame_ros.traffic.conflicts import Conflicts
+from crgame_ros.traffic.agents import Agents, AgentTable, FREE, NOBODY
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.conflicts import Conflicts, ConflictTable, touch
 from crgame_ros.traffic.junctions import Arrivals, Passages, time_to
-from crgame_ros.traffic.lane_cells import spans
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.leaders import Ways
+from crgame_ros.traffic.leaders import Pairs, Ways
+from crgame_ros.traffic.placement import Entries
 
 BoolArray = NDArray[np.bool_]
 
 STANDING = 0.05
+# A leader that is faster drives on [m/s].
+DRIVES_ON = 3.0
+# What others are expected to bear at most [m/s^2], and how fast agents get to and out of
+# conflicts when they hurry, go steadily, and take their time [m/s^2].
+HURRY, TIMID = 1.8, 0.7
 
 
-@dataclass(frozen=True)
-class CrossingRules:
+class CrossingRules(NamedTuple):
     """
     How agents pass junctions.
 
@@ -33,6 +39,7 @@ class CrossingRules:
         right of way among those who stand [s]; own choice.
     :param acceleration: with which agents expect to cross [m/s^2]
     :param deceleration: that others are expected to bear at most, to stop for the agent [m/s^2]
+    :param withdrawal: that agents take at most to give up a right that they had [m/s^2]
     :param zipper: standing time after which those on the road let one merge, if they can slow
         down gently [s]; own choice.
     :param room: behind the junction, besides the agent's own length [m]
@@ -43,18 +50,48 @@ class CrossingRules:
     patience: float = 3.0
     acceleration: float = 1.3
     deceleration: float = 3.0
+    withdrawal: float = 2.2
     zipper: float = 6.0
     room: float = 1.5
 
 
-@dataclass(frozen=True)
-class _Meetings:
-    """Pairs of an agent and somebody else who comes to the same conflict."""
+class Situation(NamedTuple):
+    """
+    What agents (A) find before their next junction.
 
-    agent: IntArray
+    :param slots: (A) of the agents.
+    :param desired: (A) desired speeds [m/s]
+    :param rear_stop: (A) distance to where the leader's rear will be if it stops [m]
+    :param light: (A) distance of the front from a line with a red light, or inf [m]
+    :param stop_sign: (A) whether a stop sign stands before the junction.
+    :param queued: (A) gap to the nearest who waits ahead and was not let in, or inf [m]
+    """
+
+    slots: IntArray
+    desired: FloatArray
+    rear_stop: FloatArray
+    light: FloatArray
+    stop_sign: BoolArray
+    queued: FloatArray
+
+
+class Meetings(NamedTuple):
+    """
+    Pairs (M) of an agent and somebody else who comes to the same conflict, in order of agents.
+
+    :param begin: (A + 1) rows of each agent.
+    :param who: (M) row of the other agent, or -1 - n for the n-th of the others.
+    :param into: (M) distance of the agent's front from the conflict [m]
+    :param priority: (M) of the agent.
+    :param apart: (M) whether both pass at different times anyway.
+    :param inside: (M) whether the other is in the conflict.
+    :param committed: (M) whether the other can no longer stop before it.
+    :param courteous: (M) whether the other can let the agent merge without haste.
+    """
+
+    begin: IntArray
     who: IntArray
     into: FloatArray
-    is_other: BoolArray
     priority: IntArray
     apart: BoolArray
     inside: BoolArray
@@ -68,8 +105,9 @@ class Crossings:
 
     An agent waits before a junction until it is let in. It is let in for all conflicts of the
     junction at once: when everybody who has the right of way, and everybody already let in, gets
-    to them in sufficient time before or after it, and there is room behind. Among those let in
-    whoever was first goes first. So nobody waits in a circle.
+    to them in sufficient time before or after it, and there is room behind. One is let in after
+    the other; among those let in whoever was first goes first, unless that one waits for the
+    other itself. Who stands in a circle of waiting is found by `waiting`.
 
     :param conflicts: of the lanes.
     :param rules: of passing.
@@ -77,159 +115,305 @@ class Crossings:
     """
 
     def __init__(self, conflicts: Conflicts, rules: CrossingRules, time_step_s: float) -> None:
-        self._conflicts = conflicts
+        self._conflicts = conflicts.table
         self._rules = rules
-        self._patience = round(rules.patience / time_step_s)
-        self._zipper = round(rules.zipper / time_step_s)
-        self._second = max(1, round(1.0 / time_step_s))
+        self._ticks = np.array([max(1, round(seconds / time_step_s)) for seconds in (
+            rules.patience, rules.zipper, 1.0)])
 
-    def halts(self, k: int, agents: Agents, slots: IntArray, way: Ways, passage: Passages,
-              arrivals: Arrivals, others: Arrivals, desired: FloatArray, rear_stop: FloatArray,
-              light: FloatArray, stop_sign: BoolArray, queued: FloatArray) -> FloatArray:
+    def halts(self, k: int, agents: Agents, way: Ways, passage: Passages, arrivals: Arrivals,
+              situation: Situation) -> FloatArray:
         """
         Let agents (A) in, and tell where the others halt.
 
-        :param slots: (A) of the agents.
-        :param desired: (A) desired speeds [m/s]
-        :param rear_stop: (A) distance to where the leader's rear will be if it stops [m]
-        :param light: (A) distance of the front from a line with a red light, or inf [m]
-        :param stop_sign: (A) whether a stop sign stands before the junction.
-        :param queued: (A) gap to the nearest who waits ahead and was not let in, or inf [m]
-        :return: (A) distance of the front from where it has to halt, or inf [m]
+        :return: (A) distance of the front from where it has to halt, or inf [m]; for whom is
+            noted in `Agents.blocker`.
         """
-        speed, length = agents.speed[slots], agents.length[slots]
-        self._release(agents, slots, way, passage)
-        granted = agents.grant[slots] >= 0
-        needed = speed**2 / (2.0 * np.maximum(passage.hold, 0.1))
-        can_stop = (passage.hold > 0.0) & (needed < self._rules.deceleration)
+        return _halts(self._conflicts, self._rules, self._ticks, k, agents.table, way, passage,
+                      arrivals, situation)
+
+
+@compiled
+def queues(agents: AgentTable, slots: IntArray, pairs: Pairs,
+           entries: Entries) -> tuple[FloatArray, FloatArray]:
+    """
+    Look at who is ahead of agents (A), before a junction or behind it.
+
+    :return: `Situation.rear_stop` and `Situation.queued`
+    """
+    rear_stop, queued = np.full(len(slots), math.inf), np.full(len(slots), math.inf)
+    for p in range(len(pairs.agent)):
+        i, n = pairs.agent[p], pairs.entry[p]
+        speed, owner = max(entries.speed[n], 0.0), entries.owner[n]
+        # A leader that drives on makes room itself.
+        if speed <= DRIVES_ON:
+            rear_stop[i] = min(rear_stop[i], pairs.distance[p] + speed**2 / 6.0)
+        if not entries.crosses[n] and (
+                agents.grant[owner] < 0 if owner >= 0 else speed < DRIVES_ON):
+            queued[i] = min(queued[i], pairs.gap[p])
+    return rear_stop, queued
+
+
+@compiled
+def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, k: int,
+           agents: AgentTable, way: Ways, passage: Passages, arrivals: Arrivals,
+           at: Situation) -> FloatArray:
+    slots, count = at.slots, len(at.slots)
+    _release(agents, slots, way, passage)
+    stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    for i in range(count):
         # Nobody is let in past somebody who waits before the same junction.
-        stopped = np.minimum(light, queued) < passage.hold + 2.0
-        near = passage.hold < 10.0 + 4.2 * speed
-        full = rear_stop < passage.end + 0.5 * length + self._rules.room
-        ready = (passage.first >= 0) & near & ~stopped & ~full & (
-            ~stop_sign | ((agents.waits[slots] >= self._second) & (speed < STANDING)
-                          & (passage.hold < 4.0)))
-        inside = (passage.first >= 0) & ~granted & (passage.hold < -1.0)
-        meeting = self._meet(agents, slots, way, passage, arrivals, others, desired,
-                             stopped | full)
-        count = len(slots)
-        withdrawn = granted & can_stop & (stopped | _any(
-            meeting, meeting.is_other & self._yields(meeting, agents, slots, granted), count))
-        agents.grant[slots[withdrawn]] = NOBODY
-        granted &= ~withdrawn
-        blocked = _any(meeting, self._yields(meeting, agents, slots, granted), count)
-        wants = ready & ~granted & ~blocked & ~inside
-        wants &= ~_any(meeting, self._loses(meeting, agents, slots, wants), count)
-        self._grant(k, agents, slots, way, passage, wants | inside)
-        granted = agents.grant[slots] >= 0
-        halt = np.where((passage.first >= 0) & ~granted & near, passage.hold, np.inf)
-        return np.minimum(halt, self._inside_halt(meeting, agents, slots, granted, speed))
+        stopped[i] = min(at.light[i], at.queued[i]) < passage.hold[i] + 2.0
+        full[i] = at.rear_stop[i] < passage.end[i] + 0.5 * agents.length[slots[i]] + rules.room
+    meeting = _meet(conflicts, rules, agents, way, passage, arrivals, at, stopped | full)
+    for i, slot in enumerate(slots):
+        agents.blocker[slot] = FREE
+        if agents.grant[slot] >= 0 and _withdraws(rules, ticks, k, agents, passage, meeting, at,
+                                                  stopped, i):
+            agents.grant[slot] = NOBODY
+    for i in _in_turn(k, agents, slots):
+        slot = slots[i]
+        if passage.first[i] < 0 or agents.grant[slot] >= 0:
+            continue
+        inside = passage.hold[i] < -1.0
+        if inside or _may_enter(rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
+            agents.grant[slot] = k
+            agents.until[slot] = way.lane[i, passage.last[i]]
+            agents.entered[slot] = way.lane[i, passage.first[i]]
+    halt = np.full(count, math.inf)
+    for i, slot in enumerate(slots):
+        if passage.first[i] >= 0:
+            if agents.grant[slot] >= 0:
+                halt[i] = _inside_halt(k, agents, meeting, at, i)
+            elif _is_near(agents.speed[slot], passage.hold[i]):
+                halt[i] = passage.hold[i]
+    return halt
 
-    def _release(self, agents: Agents, slots: IntArray, way: Ways, passage: Passages) -> None:
-        """Take back what agents were granted that have passed their junction."""
-        row = np.arange(len(slots))
-        ahead = (way.lane == agents.until[slots][:, None]).any(axis=1)
-        start = way.lane[row, np.maximum(passage.first, 0)]
-        done = (agents.grant[slots] >= 0) & (~ahead | (passage.first < 0))
+
+@compiled
+def _is_near(speed: float, hold: float) -> bool:
+    """Tell whether a junction is so near that one asks to be let in."""
+    return hold < 10.0 + 4.2 * speed
+
+
+@compiled
+def _release(agents: AgentTable, slots: IntArray, way: Ways, passage: Passages) -> None:
+    """Take back what agents were granted that have passed their junction."""
+    for i, slot in enumerate(slots):
+        if agents.grant[slot] < 0:
+            continue
+        ahead = False
+        for step in range(way.count[i]):
+            ahead |= way.lane[i, step] == agents.until[slot]
+        first = passage.first[i]
         # A lane may be on the way again later: then its beginning is the next junction's.
-        done |= (agents.grant[slots] >= 0) & (passage.first > 0) & (
-            passage.hold > 0.0) & (start != agents.entered[slots])
-        agents.grant[slots[done]] = NOBODY
+        again = first > 0 and passage.hold[i] > 0.0 and (
+            way.lane[i, first] != agents.entered[slot])
+        if not ahead or first < 0 or again:
+            agents.grant[slot] = NOBODY
 
-    def _grant(self, k: int, agents: Agents, slots: IntArray, way: Ways, passage: Passages,
-               chosen: BoolArray) -> None:
-        row = np.flatnonzero(chosen)
-        agents.grant[slots[row]] = k
-        agents.until[slots[row]] = way.lane[row, passage.last[row]]
-        agents.entered[slots[row]] = way.lane[row, passage.first[row]]
 
-    def _meet(self, agents: Agents, slots: IntArray, way: Ways, passage: Passages,
-              arrivals: Arrivals, others: Arrivals, desired: FloatArray,
-              stays: BoolArray) -> _Meetings:
-        """Pair agents with everybody whose conflicts are theirs, and compare their times."""
-        rules, conflicts = self._rules, self._conflicts
-        mine = np.flatnonzero((passage.first[arrivals.who] >= 0) & (
-            arrivals.step <= passage.last[arrivals.who]))
-        who = np.concatenate((arrivals.who, others.who))
-        conflict = np.concatenate((arrivals.conflict, others.conflict))
-        order = np.argsort(conflict, kind='stable')
-        wanted = conflicts.other[arrivals.conflict[mine]]
-        first = np.searchsorted(conflict[order], wanted)
-        row, place = spans(first, np.searchsorted(conflict[order], wanted, side='right') - first)
-        theirs, ours = order[place], mine[row]
-        agent, them = arrivals.who[ours], who[theirs]
-        is_other = them < 0
-        keep = (is_other | (them != agent)) & (arrivals.into[ours] > 0.0)
-        # Who waits before a red light or a full junction comes to no conflict.
-        keep &= is_other | ~stays[np.maximum(them, 0)] | (
-            agents.grant[slots[np.maximum(them, 0)]] >= 0)
-        ours, theirs, agent, them = ours[keep], theirs[keep], agent[keep], them[keep]
-        is_other = is_other[keep]
-        into, out, speed = (np.concatenate(pair)[theirs] for pair in (
-            (arrivals.into, others.into), (arrivals.out, others.out),
-            (arrivals.speed, others.speed)))
-        top = np.where(is_other, speed, desired[np.maximum(them, 0)])
-        early = np.where(is_other & (speed < 0.3) & (into > 0.0), np.inf,
-                         time_to(into, speed, rules.acceleration, top))
-        late = np.where(is_other, np.maximum(out, 0.0) / np.maximum(speed, 0.1),
-                        time_to(out, speed, 0.7, np.maximum(0.8 * top, 2.0)))
-        there = time_to(arrivals.into[ours], arrivals.speed[ours], 1.8, desired[agent])
-        gone = time_to(arrivals.out[ours], arrivals.speed[ours], rules.acceleration,
-                       desired[agent])
-        apart = (there > late + rules.gap_after) | (gone + rules.gap_before < early)
-        committed = into < speed**2 / (2.0 * rules.deceleration)
-        joins = conflicts.merges[arrivals.conflict[ours]]
-        courteous = ~is_other & joins & (into > 2.0 * speed + speed**2 / 3.0)
-        return _Meetings(agent, them, arrivals.into[ours], is_other,
-                         conflicts.priority[arrivals.conflict[ours]], apart,
-                         (into <= 0.0) & (out > 0.0), committed, courteous)
+@compiled
+def _in_turn(k: int, agents: AgentTable, slots: IntArray) -> IntArray:
+    """Order agents: who insists, then who has stood for longest, then the lower number."""
+    key = np.empty(len(slots))
+    for i, slot in enumerate(slots):
+        key[i] = -agents.waits[slot] - (1e9 if agents.insists_until[slot] > k else 0.0)
+    return np.argsort(key, kind='mergesort')
 
-    def _yields(self, meeting: _Meetings, agents: Agents, slots: IntArray,
-                granted: BoolArray) -> BoolArray:
-        """Tell in which meetings the agent lets the other go first."""
-        them = np.maximum(meeting.who, 0)
-        let_in = ~meeting.is_other & granted[them]
-        waits, theirs = agents.waits[slots[meeting.agent]], agents.waits[slots[them]]
-        # Among those who stand, whoever has stood for longest goes first.
-        patient = ~meeting.is_other & ~let_in & (waits > self._patience) & (
-            theirs > 0) & _first(waits, meeting.agent, theirs, them)
-        patient |= meeting.courteous & (waits > self._zipper)
-        right = (meeting.priority < 0) & ~patient
-        sure = meeting.inside | (meeting.is_other & meeting.committed)
-        return ~meeting.apart & (let_in | right | sure)
 
-    def _loses(self, meeting: _Meetings, agents: Agents, slots: IntArray,
-               wants: BoolArray) -> BoolArray:
-        """Tell in which meetings of two who could both go now the agent lets the other go."""
-        them = np.maximum(meeting.who, 0)
-        both = ~meeting.is_other & wants[them] & wants[meeting.agent] & ~meeting.apart
-        waits, theirs = agents.waits[slots[meeting.agent]], agents.waits[slots[them]]
-        later = ~_first(waits, meeting.agent, theirs, them)
-        long = np.maximum(waits, theirs) > self._patience
-        return both & np.where(long | (meeting.priority == 0), later, meeting.priority < 0)
+@compiled
+def _meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way: Ways,
+          passage: Passages, arrivals: Arrivals, at: Situation, stays: BoolArray) -> Meetings:
+    """Pair agents with everybody whose conflicts are theirs, and compare their times."""
+    room = 64
+    found = _empty(len(at.slots), room)
+    used = 0
+    rows = _rows_of(arrivals, len(at.slots))
+    for i, slot in enumerate(at.slots):
+        for n in range(rows.begin[i], rows.begin[i + 1]):
+            mine = rows.row[n]
+            if passage.first[i] < 0 or arrivals.step[mine] > passage.last[i] \
+                    or arrivals.into[mine] <= 0.0:
+                continue
+            conflict = arrivals.conflict[mine]
+            other = conflicts.other[conflict]
+            for theirs in range(arrivals.begin[other], arrivals.begin[other + 1]):
+                who = arrivals.who[theirs]
+                if who == i or not touch(conflicts, conflict, agents.width[slot],
+                                         arrivals.width[theirs]):
+                    continue
+                # Who waits before a red light or a full junction comes to no conflict.
+                if who >= 0 and stays[who] and agents.grant[at.slots[who]] < 0 \
+                        and arrivals.into[theirs] > 0.0:
+                    continue
+                if used == len(found.who):
+                    found = _grown(found)
+                _compare(conflicts, rules, arrivals, mine, theirs, at.desired, found, used)
+                used += 1
+        found.begin[i + 1] = used
+    return found
 
-    def _inside_halt(self, meeting: _Meetings, agents: Agents, slots: IntArray,
-                     granted: BoolArray, speed: FloatArray) -> FloatArray:
-        """Let agents in a junction halt before a conflict whose other side is taken."""
-        them = np.maximum(meeting.who, 0)
-        key = agents.grant[slots] * agents.count + slots
-        senior = ~meeting.is_other & granted[them] & (key[them] < key[meeting.agent])
-        taken = meeting.is_other & (meeting.inside | meeting.committed)
-        stop = granted[meeting.agent] & ~meeting.apart & (senior | taken)
+
+class _Rows(NamedTuple):
+    begin: IntArray
+    row: IntArray
+
+
+@compiled
+def _rows_of(arrivals: Arrivals, count: int) -> _Rows:
+    """List the rows of arrivals by agent."""
+    begin = np.zeros(count + 1, np.int64)
+    for who in arrivals.who:
+        if who >= 0:
+            begin[who + 1] += 1
+    for i in range(count):
+        begin[i + 1] += begin[i]
+    fill, row = begin.copy(), np.empty(begin[count], np.int64)
+    for n, who in enumerate(arrivals.who):
+        if who >= 0:
+            row[fill[who]] = n
+            fill[who] += 1
+    return _Rows(begin, row)
+
+
+@compiled
+def _empty(agents: int, room: int) -> Meetings:
+    return Meetings(
+        np.zeros(agents + 1, np.int64), np.empty(room, np.int64), np.empty(room),
+        np.empty(room, np.int64), np.empty(room, np.bool_), np.empty(room, np.bool_),
+        np.empty(room, np.bool_), np.empty(room, np.bool_))
+
+
+@compiled
+def _grown(found: Meetings) -> Meetings:
+    more, size = _empty(len(found.begin) - 1, 2 * len(found.who)), len(found.who)
+    more.begin[:] = found.begin
+    more.who[:size], more.into[:size] = found.who, found.into
+    more.priority[:size], more.apart[:size] = found.priority, found.apart
+    more.inside[:size], more.committed[:size] = found.inside, found.committed
+    more.courteous[:size] = found.courteous
+    return more
+
+
+@compiled
+def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
+             theirs: int, desired: FloatArray, found: Meetings, n: int) -> None:
+    """Write the meeting of two arrivals into row n."""
+    who, conflict = arrivals.who[theirs], arrivals.conflict[mine]
+    into, out, speed = arrivals.into[theirs], arrivals.out[theirs], arrivals.speed[theirs]
+    if who < 0:
+        early = math.inf if speed < 0.3 and into > 0.0 else time_to(
+            into, speed, rules.acceleration, speed)
+        late = max(out, 0.0) / max(speed, 0.1)
+    else:
+        early = time_to(into, speed, rules.acceleration, desired[who])
+        late = time_to(out, speed, TIMID, max(0.8 * desired[who], 2.0))
+    i = arrivals.who[mine]
+    there = time_to(arrivals.into[mine], arrivals.speed[mine], HURRY, desired[i])
+    gone = time_to(arrivals.out[mine], arrivals.speed[mine], rules.acceleration, desired[i])
+    found.who[n], found.into[n] = who, arrivals.into[mine]
+    found.priority[n] = conflicts.priority[conflict]
+    found.apart[n] = there > late + rules.gap_after or gone + rules.gap_before < early
+    found.inside[n] = into <= 0.0 and out > 0.0
+    found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
+    found.courteous[n] = who >= 0 and conflicts.merges[conflict] and (
+        into > 2.0 * speed + speed**2 / 3.0)
+
+
+@compiled
+def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
+               passage: Passages, meeting: Meetings, at: Situation, stopped: BoolArray,
+               i: int) -> bool:
+    """Tell whether an agent gives up its right to enter, while that is easy."""
+    speed = agents.speed[at.slots[i]]
+    if passage.hold[i] <= 0.0 or speed**2 > 2.0 * rules.withdrawal * passage.hold[i]:
+        return False
+    if stopped[i]:
+        return True
+    for n in range(meeting.begin[i], meeting.begin[i + 1]):
+        if meeting.who[n] < 0 and _yields(ticks, k, agents, meeting, at, i, n):
+            return True
+    return False
+
+
+@compiled
+def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
+               passage: Passages, meeting: Meetings, at: Situation, stopped: BoolArray,
+               full: BoolArray, i: int) -> bool:
+    """Tell whether an agent is let in now; note for whom it waits otherwise."""
+    slot = at.slots[i]
+    speed = agents.speed[slot]
+    if not _is_near(speed, passage.hold[i]):
+        return False
+    if stopped[i] or full[i]:
+        agents.blocker[slot] = agents.leader[slot]
+        return False
+    if at.stop_sign[i] and (agents.waits[slot] < ticks[2] or speed >= STANDING
+                            or passage.hold[i] >= 4.0):
+        return False
+    for n in range(meeting.begin[i], meeting.begin[i + 1]):
+        if _yields(ticks, k, agents, meeting, at, i, n):
+            who = meeting.who[n]
+            agents.blocker[slot] = at.slots[who] if who >= 0 else who
+            return False
+    return True
+
+
+@compiled
+def _yields(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
+            i: int, n: int) -> bool:
+    """Tell whether an agent lets the other of a meeting go first."""
+    if meeting.apart[n]:
+        return False
+    slot, who = at.slots[i], meeting.who[n]
+    if meeting.inside[n]:
+        return True
+    if who < 0:
+        return bool(meeting.committed[n] or meeting.priority[n] < 0)
+    them = at.slots[who]
+    if agents.insists_until[slot] > k and agents.speed[them] < 1.0:
+        return False
+    if agents.grant[them] >= 0:
+        return True
+    waits, theirs = agents.waits[slot], agents.waits[them]
+    # Among those who stand, whoever has stood for longest goes first.
+    longer = waits > theirs or (waits == theirs and i < who)
+    patient = waits > ticks[0] and theirs > 0 and longer
+    patient |= meeting.courteous[n] and waits > ticks[1]
+    return bool(meeting.priority[n] < 0 and not patient)
+
+
+@compiled
+def _inside_halt(k: int, agents: AgentTable, meeting: Meetings, at: Situation,
+                 i: int) -> float:
+    """Give the distance at which who was let in halts before a conflict that is taken."""
+    slot = at.slots[i]
+    result = math.inf
+    for n in range(meeting.begin[i], meeting.begin[i + 1]):
+        who = meeting.who[n]
+        if meeting.apart[n] or meeting.into[n] >= result:
+            continue
         # Who cannot stop before it any more had better be quick.
-        stop &= speed[meeting.agent]**2 / (2.0 * np.maximum(meeting.into, 0.1)) < 6.0
-        result = np.full(len(slots), np.inf)
-        np.minimum.at(result, meeting.agent[stop], meeting.into[stop])
-        return result
-
-
-def _any(meeting: _Meetings, holds: BoolArray, count: int) -> BoolArray:
-    """Tell for which agents something holds in any meeting."""
-    result = np.zeros(count, dtype=bool)
-    result[meeting.agent[holds]] = True
+        if agents.speed[slot]**2 > 12.0 * max(meeting.into[n], 0.1):
+            continue
+        if who < 0:
+            stops = meeting.inside[n] or meeting.committed[n]
+        else:
+            stops = meeting.inside[n] or _is_senior(k, agents, at, i, who)
+        if stops:
+            result = meeting.into[n]
+            agents.blocker[slot] = at.slots[who] if who >= 0 else who
     return result
 
 
-def _first(waits: IntArray, agent: IntArray, theirs: IntArray, them: IntArray) -> BoolArray:
-    """Tell whether an agent has stood longer than another; the lower number decides a tie."""
-    return np.asarray((waits > theirs) | ((waits == theirs) & (agent < them)))
+@compiled
+def _is_senior(k: int, agents: AgentTable, at: Situation, i: int, who: int) -> bool:
+    """Tell whether another who was let in goes before an agent that was."""
+    slot, them = at.slots[i], at.slots[who]
+    grant, theirs = agents.grant[slot], agents.grant[them]
+    # Who stands behind the agent, or waits for it, lets it go.
+    if theirs < 0 or agents.leader[them] == slot:
+        return False
+    if agents.insists_until[slot] > k and agents.speed[them] < 1.0:
+        return False
+    return bool(theirs < grant or (theirs == grant and them < slot))

@@ -2,46 +2,53 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who will be in which conflict when: the passages of agents, and the ways of all others."""
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.traffic.conflicts import Conflicts, WAITING_ROOM
-from crgame_ros.traffic.lane_cells import spans
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.agents import AgentTable
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.conflicts import ConflictTable, NARROW
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.lane_table import LaneTable
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.placement import Entries
 
+# With less room than this before a conflict nobody waits inside the junction [m].
+WAITING_ROOM = 15.0
 # How far ahead others are expected, at their present speed [s]; and how much farther [m].
 OTHERS_TIME = 8.0
 OTHERS_REACH = 15.0
 MAX_BRANCHES = 6
 
 
-@dataclass(frozen=True)
-class Arrivals:
+class Arrivals(NamedTuple):
     """
-    Who comes to which conflict (R rows).
+    Who comes to which conflict (R rows), in the order of the conflicts.
 
+    :param begin: (C + 1) rows at which those of each conflict begin.
     :param who: (R) row of the agent, or -1 - n for the n-th of the others.
     :param conflict: (R) row of `Conflicts`.
     :param into: (R) distance of its front from the conflict [m], negative inside.
     :param out: (R) distance of its rear from the conflict's end [m]
     :param speed: (R) [m/s]
+    :param width: (R) [m]
     :param step: (R) of the agent's way; 0 for others.
     """
 
+    begin: IntArray
     who: IntArray
     conflict: IntArray
     into: FloatArray
     out: FloatArray
     speed: FloatArray
+    width: FloatArray
     step: IntArray
 
 
-@dataclass(frozen=True)
-class Passages:
+class Passages(NamedTuple):
     """
     The next junction on the way of each agent (A).
 
@@ -57,97 +64,175 @@ class Passages:
     end: FloatArray
 
 
-def passages(graph: LaneGraph, conflicts: Conflicts, lines: FloatArray, way: Ways,
-             length: FloatArray) -> Passages:
+@compiled
+def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: AgentTable,
+             slots: IntArray) -> Passages:
     """
     Find the next junction of each agent: lanes with conflicts and no room to wait in between.
 
     :param lines: (L) arc length of each lane's stop line [m], infinite without one.
-    :param length: (A) of the agents [m]
     """
-    lane = np.maximum(way.lane, 0)
-    has = (way.lane >= 0) & (conflicts.count[lane] > 0)
-    coming = has & (way.offset + conflicts.leave[lane] + 0.5 * length[:, None] > 0.0)
-    row = np.arange(len(lane))
-    any_coming = coming.any(axis=1)
-    first = np.where(any_coming, np.argmax(coming, axis=1), -1)
-    last = first.copy()
-    for step in range(1, way.depth):
-        joined = (last == step - 1) & has[:, step] & (
-            conflicts.entry[lane[:, step]] < WAITING_ROOM)
-        last = np.where(joined, step, last)
-    start = lane[row, np.maximum(first, 0)]
-    entry = conflicts.entry[start]
-    hold = np.where(entry > WAITING_ROOM, entry - 1.0, np.minimum(0.0, entry - 0.5))
-    hold = way.offset[row, np.maximum(first, 0)] + hold
-    before = np.maximum(first - 1, 0)
-    line = way.offset[row, before] + lines[lane[row, before]]
-    hold = np.where((first > 0) & np.isfinite(line), np.minimum(line, hold), hold)
-    final = np.maximum(last, 0)
-    end = way.offset[row, final] + conflicts.leave[lane[row, final]]
-    return Passages(first, last, np.where(any_coming, hold - 0.5 * length, np.inf),
-                    np.where(any_coming, end, -np.inf))
+    count = len(slots)
+    result = Passages(np.full(count, -1, np.int64), np.full(count, -1, np.int64),
+                      np.full(count, math.inf), np.full(count, -math.inf))
+    for i, slot in enumerate(slots):
+        wide = 1 if agents.width[slot] > NARROW else 0
+        entry, leave, half = conflicts.entry[wide], conflicts.leave[wide], 0.5 * agents.length[slot]
+        for step in range(way.count[i]):
+            lane = way.lane[i, step]
+            if not math.isfinite(entry[lane]):
+                continue
+            if result.first[i] < 0:
+                if way.offset[i, step] + leave[lane] + half > 0.0:
+                    result.first[i] = result.last[i] = step
+                    result.hold[i] = _hold(entry[lane], lines, way, i, step) - half
+                    result.end[i] = way.offset[i, step] + leave[lane]
+            elif way.offset[i, step] + entry[lane] - result.end[i] < WAITING_ROOM:
+                result.last[i] = step
+                result.end[i] = way.offset[i, step] + leave[lane]
+            else:
+                break
+    return result
 
 
-def agent_arrivals(graph: LaneGraph, conflicts: Conflicts, way: Ways, previous: IntArray,
-                   speed: FloatArray, length: FloatArray) -> Arrivals:
+@compiled
+def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int) -> float:
+    """Give the distance from an agent's centre to where its front waits before a junction [m]."""
+    hold = entry - 1.0 if entry > WAITING_ROOM else min(0.0, entry - 0.5)
+    hold += way.offset[i, step]
+    if step > 0:
+        line = lines[way.lane[i, step - 1]]
+        if math.isfinite(line):
+            hold = min(hold, way.offset[i, step - 1] + line)
+    return float(hold)
+
+
+@compiled
+def arrivals(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: AgentTable,
+             slots: IntArray, entries: Entries, drives: NDArray[np.bool_],
+             widths: FloatArray) -> Arrivals:
     """
-    List the conflicts on the ways of agents, that of the lane just left included.
+    List the conflicts on the ways of agents, that of the lane just left included, and of others.
 
-    :param previous: (A) lane that each was in before its present one, or -1.
-    """
-    behind = np.where(previous >= 0, way.offset[:, 0] - graph.length[previous], 0.0)
-    lane = np.concatenate((previous[:, None], way.lane), axis=1)
-    offset = np.concatenate((behind[:, None], way.offset), axis=1)
-    used = np.flatnonzero((lane.ravel() >= 0) & (conflicts.count[lane.ravel()] > 0))
-    who, step = np.divmod(used, lane.shape[1])
-    at, offsets = lane.ravel()[used], offset.ravel()[used]
-    row, conflict = spans(conflicts.first[at], conflicts.count[at])
-    who, step, offsets = who[row], step[row] - 1, offsets[row]
-    into = offsets + conflicts.start[conflict] - 0.5 * length[who]
-    out = offsets + conflicts.end[conflict] + 0.5 * length[who]
-    keep = out > 0.0
-    return Arrivals(who[keep], conflict[keep], into[keep], out[keep], speed[who[keep]],
-                    step[keep])
-
-
-def other_arrivals(graph: LaneGraph, conflicts: Conflicts, entries: Entries,
-                   drives: NDArray[np.bool_]) -> Arrivals:
-    """
-    List the conflicts that others may come to, by whatever way they go on.
+    Others may go on by whatever way there is.
 
     :param drives: (O) which of the others are vehicles.
+    :param widths: (O) of the others [m]
     """
-    other = -1 - entries.owner
-    mine = np.flatnonzero((entries.owner < 0) & ~entries.crosses & (entries.speed > -0.5))
-    mine = mine[drives[other[mine]]]
-    lane, owner, speed = entries.lane[mine], entries.owner[mine], np.maximum(
-        entries.speed[mine], 0.0)
-    # Distances to the lane's beginning, of the front and of the rear.
-    front, rear = -entries.front[mine], -entries.rear[mine]
-    parts = []
-    for _ in range(MAX_BRANCHES):
-        row, conflict = spans(conflicts.first[lane], conflicts.count[lane])
-        parts.append((owner[row], conflict, front[row] + conflicts.start[conflict],
-                      rear[row] + conflicts.end[conflict], speed[row]))
-        front, rear = front + graph.length[lane], rear + graph.length[lane]
-        branch, column = np.nonzero((graph.successors[lane] >= 0) & (
-            front < OTHERS_REACH + OTHERS_TIME * speed)[:, None])
-        lane = graph.successors[lane[branch], column]
-        owner, speed, front, rear = owner[branch], speed[branch], front[branch], rear[branch]
-        if not len(lane):
-            break
-    who, conflict, into, out, speed = (np.concatenate([p[i] for p in parts]) for i in range(5))
-    keep = out > 0.0
-    return Arrivals(who[keep], conflict[keep].astype(np.int64), into[keep], out[keep],
-                    speed[keep], np.zeros(int(keep.sum()), dtype=np.int64))
+    room = _room(conflicts, way, agents, slots)
+    found = _empty(0, room + 64)
+    used = 0
+    for i, slot in enumerate(slots):
+        half = 0.5 * agents.length[slot]
+        for step in range(-1, way.count[i]):
+            if step < 0:
+                lane = agents.previous[slot]
+                offset = way.offset[i, 0] - lanes.length[lane] if lane >= 0 else 0.0
+            else:
+                lane, offset = way.lane[i, step], way.offset[i, step]
+            if lane >= 0:
+                for row in range(conflicts.first[lane], conflicts.first[lane]
+                                 + conflicts.count[lane]):
+                    if offset + conflicts.end[1, row] + half > 0.0:
+                        _note(found, used, i, row, offset + conflicts.start[1, row] - half,
+                              offset + conflicts.end[1, row] + half, agents.speed[slot],
+                              agents.width[slot], step)
+                        used += 1
+    for n in range(len(entries.owner)):
+        other = -1 - entries.owner[n]
+        if other >= 0 and drives[other] and not entries.crosses[n] and entries.speed[n] > -0.5:
+            found, used = _others(lanes, conflicts, entries, n, widths[other], found, used)
+    return _by_conflict(found, used, len(conflicts.lane))
 
 
-def time_to(distance: FloatArray, speed: FloatArray, acceleration: float,
-            top: FloatArray) -> FloatArray:
-    """Give the time to cover distances when accelerating up to top speeds [s]; 0 if behind."""
-    distance, top = np.maximum(distance, 0.0), np.maximum(np.maximum(top, speed), 0.5)
+@compiled
+def _room(conflicts: ConflictTable, way: Ways, agents: AgentTable, slots: IntArray) -> int:
+    room = 0
+    for i, slot in enumerate(slots):
+        if agents.previous[slot] >= 0:
+            room += conflicts.count[agents.previous[slot]]
+        for step in range(way.count[i]):
+            room += conflicts.count[way.lane[i, step]]
+    return int(room)
+
+
+@compiled
+def _empty(conflicts: int, room: int) -> Arrivals:
+    return Arrivals(np.zeros(conflicts + 1, np.int64), np.empty(room, np.int64),
+                    np.empty(room, np.int64), np.empty(room), np.empty(room), np.empty(room),
+                    np.empty(room), np.empty(room, np.int64))
+
+
+@compiled
+def _note(found: Arrivals, n: int, who: int, conflict: int, into: float, out: float,
+          speed: float, width: float, step: int) -> None:
+    found.who[n], found.conflict[n], found.step[n] = who, conflict, step
+    found.into[n], found.out[n], found.speed[n], found.width[n] = into, out, speed, width
+
+
+@compiled
+def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int, width: float,
+            found: Arrivals, used: int) -> tuple[Arrivals, int]:
+    """Note the conflicts that one of the others may come to, along all branches."""
+    speed = max(entries.speed[n], 0.0)
+    reach = OTHERS_REACH + OTHERS_TIME * speed
+    lane = np.full(MAX_BRANCHES**2, -1, np.int64)
+    front = np.zeros(MAX_BRANCHES**2)
+    lane[0], front[0] = entries.lane[n], -entries.front[n]
+    pending, done = 1, 0
+    size = entries.front[n] - entries.rear[n]
+    while done < pending:
+        current, offset = lane[done], front[done]
+        done += 1
+        for row in range(conflicts.first[current],
+                         conflicts.first[current] + conflicts.count[current]):
+            out = offset + size + conflicts.end[1, row]
+            if out > 0.0:
+                if used == len(found.who):
+                    found = _grown(found)
+                _note(found, used, entries.owner[n], row, offset + conflicts.start[1, row], out,
+                      speed, width, 0)
+                used += 1
+        offset += lanes.length[current]
+        if offset < reach:
+            for onward in lanes.successors[current]:
+                if onward >= 0 and pending < len(lane):
+                    lane[pending], front[pending] = onward, offset
+                    pending += 1
+    return found, used
+
+
+@compiled
+def _grown(found: Arrivals) -> Arrivals:
+    more = _empty(0, 2 * len(found.who))
+    for n in range(len(found.who)):
+        _note(more, n, found.who[n], found.conflict[n], found.into[n], found.out[n],
+              found.speed[n], found.width[n], found.step[n])
+    return more
+
+
+@compiled
+def _by_conflict(found: Arrivals, used: int, conflicts: int) -> Arrivals:
+    """Put arrivals in the order of their conflicts; those of one stay in order."""
+    result = _empty(conflicts, used)
+    for n in range(used):
+        result.begin[found.conflict[n] + 1] += 1
+    for row in range(conflicts):
+        result.begin[row + 1] += result.begin[row]
+    fill = result.begin.copy()
+    for n in range(used):
+        row = found.conflict[n]
+        _note(result, fill[row], found.who[n], row, found.into[n], found.out[n], found.speed[n],
+              found.width[n], found.step[n])
+        fill[row] += 1
+    return result
+
+
+@compiled
+def time_to(distance: float, speed: float, acceleration: float, top: float) -> float:
+    """Give the time to cover a distance when accelerating up to a top speed [s]; 0 if behind."""
+    distance, top = max(distance, 0.0), max(top, speed, 0.5)
     gain = (top**2 - speed**2) / (2.0 * acceleration)
-    rising = (np.sqrt(speed**2 + 2.0 * acceleration * distance) - speed) / acceleration
-    steady = (top - speed) / acceleration + (distance - gain) / top
-    return np.asarray(np.where(distance < gain, rising, steady))
+    if distance < gain:
+        return (math.sqrt(speed**2 + 2.0 * acceleration * distance) - speed) / acceleration
+    return (top - speed) / acceleration + (distance - gain) / top

@@ -2,15 +2,64 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which lanes are near a point: a grid over the map, made once."""
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 
 CELL = 3.0
 # How far from a centre line a body's centre may be and still reach into the lane [m].
 REACH = 9.0
+
+
+class CellTable(NamedTuple):
+    """
+    The cells with lanes, as arrays.
+
+    :param origin_x, origin_y: corner of the grid [m]
+    :param columns, rows: of cells in y and in x.
+    :param keys: (K) of the cells with lanes, ascending; `starts` (K + 1) of their lanes.
+    :param lanes: (N) of all cells, one cell behind the other.
+    :param guesses: (N) arc length of the lane nearest to the cell [m]
+    """
+
+    origin_x: float
+    origin_y: float
+    columns: int
+    rows: int
+    keys: IntArray
+    starts: IntArray
+    lanes: IntArray
+    guesses: FloatArray
+
+
+@compiled
+def cell_of(cells: CellTable, x: float, y: float) -> int:
+    """Give the row of the cell around a point, or -1 where no lane is near."""
+    row, column = math.floor((x - cells.origin_x) / CELL), math.floor(
+        (y - cells.origin_y) / CELL)
+    if not (0 <= row < cells.rows and 0 <= column < cells.columns):
+        return -1
+    key = int(row) * cells.columns + int(column)
+    found = int(np.searchsorted(cells.keys, key))
+    return found if found < len(cells.keys) and cells.keys[found] == key else -1
+
+
+@compiled
+def cells_of(cells: CellTable, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray]:
+    """Give where the lanes near points (N) begin in the table, and how many there are."""
+    first, size = np.zeros(len(x), np.int64), np.zeros(len(x), np.int64)
+    for i in range(len(x)):
+        cell = cell_of(cells, x[i], y[i])
+        if cell >= 0:
+            first[i] = cells.starts[cell]
+            size[i] = cells.starts[cell + 1] - first[i]
+    return first, size
 
 
 class LaneCells:
@@ -41,10 +90,10 @@ class LaneCells:
             guesses.append(nearest[near] * graph.step[lane])
         key, lane_of, guess = (np.concatenate(x) for x in (keys, lanes, guesses))
         order = np.lexsort((lane_of, key))
-        self._keys, self._starts = np.unique(key[order], return_index=True)
-        self._ends = np.append(self._starts[1:], len(key))
-        self._lanes: IntArray = lane_of[order]
-        self._guesses: FloatArray = guess[order]
+        keys, starts = np.unique(key[order], return_index=True)
+        self.table = CellTable(
+            float(self._origin[0]), float(self._origin[1]), self._columns, self._rows, keys,
+            np.append(starts, len(key)), lane_of[order].astype(np.int64), guess[order])
 
     def near(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """
@@ -53,12 +102,9 @@ class LaneCells:
         :return: for each pair of a point and a lane the point's row, the lane, and the arc length
             about which the point is
         """
-        found = np.searchsorted(self._keys, self._cells(points))
-        found = np.minimum(found, len(self._keys) - 1)
-        known = self._keys[found] == self._cells(points)
-        size = np.where(known, self._ends[found] - self._starts[found], 0)
-        rows, place = spans(self._starts[found], size)
-        return rows, self._lanes[place], self._guesses[place]
+        first, size = cells_of(self.table, points[:, 0].copy(), points[:, 1].copy())
+        rows, place = spans(first, size)
+        return rows, self.table.lanes[place], self.table.guesses[place]
 
     def _cells(self, points: FloatArray) -> IntArray:
         cell = np.floor((points - self._origin) / CELL).astype(np.int64)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.lane_table import LaneTable, poses_on, project_all
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -48,6 +49,10 @@ class LaneGraph:
         curve = np.sqrt(lateral_acceleration / np.maximum(np.abs(self.curvature), 1e-4))
         # What a curve allows of itself; a limit is scaled by each driver's own factor.
         self.curve_speed: FloatArray = np.maximum(curve, 2.0)
+        self.table = LaneTable(
+            self.first, self.count, self.length, self.step, self.limit, self.left, self.right,
+            self.successors, self.predecessors, self.x, self.y, self.yaw, self.curvature,
+            self.half_width)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -61,7 +66,7 @@ class LaneGraph:
         lines = [network.line(i) for i in self.ids]
         self.length: FloatArray = np.array([line.length for line in lines])
         self.count: IntArray = np.maximum(np.ceil(self.length / STEP - 1e-9), 1).astype(int) + 1
-        self.first: IntArray = np.concatenate(([0], np.cumsum(self.count)[:-1]))
+        self.first: IntArray = np.cumsum(self.count) - self.count
         self.step: FloatArray = self.length / (self.count - 1)
         parts: list[FloatArray] = []
         for i, line in enumerate(lines):
@@ -73,8 +78,8 @@ class LaneGraph:
             half = 0.5 * np.interp(s, lanelet.distance, np.hypot(*across.T))
             slope = np.gradient(yaw, s) if len(s) > 1 else np.zeros_like(s)
             parts.append(np.stack((x, y, yaw, slope, half)))
-        self.x, self.y, self.yaw, self.curvature, self.half_width = np.concatenate(parts, axis=1)
-        self.cos, self.sin = np.cos(self.yaw), np.sin(self.yaw)
+        self.x, self.y, self.yaw, self.curvature, self.half_width = (
+            np.ascontiguousarray(row) for row in np.concatenate(parts, axis=1))
 
     def _connect(self, network: RoadNetwork) -> None:
         lanelets = [network.lanelet_network.find_lanelet_by_id(i) for i in self.ids]
@@ -109,27 +114,9 @@ class LaneGraph:
         row = np.rint(s / self.step[lane]).astype(np.int64)
         return np.asarray(self.first[lane] + np.clip(row, 0, self.count[lane] - 1))
 
-    def segments(self, lane: IntArray, s: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Give the table row at or before s (N), and the share of the step beyond it."""
-        share = s / self.step[lane]
-        row = np.minimum(np.maximum(share.astype(np.int64), 0), self.count[lane] - 2)
-        return self.first[lane] + row, share - row
-
     def poses(self, lane: IntArray, s: FloatArray, d: FloatArray) -> FloatArray:
         """Give the poses (N, 3) at arc length s and offset d to the left; straight beyond."""
-        x, y, yaw = self._points(lane, s)
-        result = np.empty((len(s), 3))
-        result[:, 0], result[:, 1], result[:, 2] = x - d * np.sin(yaw), y + d * np.cos(yaw), yaw
-        return result
-
-    def _points(self, lane: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Give x, y and heading of the centre lines at arc lengths (N)."""
-        row, share = self.segments(lane, s)
-        after = row + 1
-        x, y, yaw = self.x[row], self.y[row], self.yaw[row]
-        inside = np.minimum(np.maximum(share, 0.0), 1.0)
-        return (x + share * (self.x[after] - x), y + share * (self.y[after] - y),
-                yaw + inside * (self.yaw[after] - yaw))
+        return poses_on(self.table, lane, s, d)
 
     def project(self, lane: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray,
                 rounds: int = 3) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -139,13 +126,7 @@ class LaneGraph:
         :param rounds: of correction; one is enough for a guess that is off by centimetres.
         :return: s [m], d [m] and the lane's heading there [rad]
         """
-        s = guess
-        for _ in range(rounds):
-            lane_x, lane_y, yaw = self._points(lane, s)
-            cos, sin = np.cos(yaw), np.sin(yaw)
-            east, north = x - lane_x, y - lane_y
-            s = s + east * cos + north * sin
-        return s, north * cos - east * sin, yaw
+        return project_all(self.table, lane, x, y, np.asarray(guess, dtype=np.float64), rounds)
 
     def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Find points (N) in the coordinates of one lane, wherever on it; s, d [m]."""

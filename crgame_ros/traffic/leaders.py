@@ -2,52 +2,44 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who is ahead of whom: the ways of all agents over several lanes, and what is on them."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from crgame_ros.traffic.lane_cells import spans
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.placement import Entries
-from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.agents import FREE
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.lane_table import LaneTable, nearest_row
+from crgame_ros.traffic.placement import Entries, rear_within
 
-MAX_LANES = 24
-# Of what is ahead in one lane this many are looked at: those beside the way lead nobody.
-MAX_AHEAD = 8
+MAX_LANES = 40
+# Of what is in the way ahead so many are answered to, and so many that drive the same way.
+MAX_AHEAD, MAX_LEADERS = 6, 2
 # A vehicle this far behind the beginning of a body may still be beside it [m].
 LONGEST = 25.0
 SIDE_MARGIN = 0.15
+# In a curve the corners of a vehicle swing out by at most this, its front keeps that in lane [m].
+MAX_SWING = 1.0
 
 
-@dataclass(frozen=True)
-class Ways:
+class Ways(NamedTuple):
     """
     The lanes that agents (A) will drive, in steps (J).
 
     :param lane: (A, J) -1 behind the end of the way.
     :param offset: (A, J) from the agent's centre to the lane's beginning [m]; negative for the
         lane that it is in.
+    :param count: (A) steps of each way.
     :param horizon: (A) how far ahead it looks [m]
     """
 
     lane: IntArray
     offset: FloatArray
+    count: IntArray
     horizon: FloatArray
 
-    @property
-    def depth(self) -> int:
-        """Number of steps J."""
-        return int(self.lane.shape[1])
 
-    def reach(self, graph: LaneGraph) -> FloatArray:
-        """Give the distance (A) from each agent's centre to the end of its way [m]."""
-        last = np.maximum((self.lane >= 0).sum(axis=1) - 1, 0)
-        row = np.arange(len(last))
-        return np.asarray(self.offset[row, last] + graph.length[self.lane[row, last]])
-
-
-@dataclass(frozen=True)
-class Pairs:
+class Pairs(NamedTuple):
     """
     What is ahead of agents (P pairs), in the order of the agents.
 
@@ -63,82 +55,138 @@ class Pairs:
     distance: FloatArray
 
 
+class Corridors(NamedTuple):
+    """
+    What agents (A) take of the road.
+
+    :param owner: (A) the agents, as entries name them.
+    :param length: (A) [m]
+    :param front: (A) from the rear axle to the front bumper [m]
+    :param low, high: (A) right and left edge, from the reference [m]
+    """
+
+    owner: IntArray
+    length: FloatArray
+    front: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
 def look_distance(speed: FloatArray) -> FloatArray:
     """Give how far ahead an agent looks: it stops in half of that, comfortably [m]."""
     return np.asarray(30.0 + 3.0 * speed + speed**2 / 4.0)
 
 
-def ways(graph: LaneGraph, routes: Routes, lane: IntArray, s: FloatArray,
+@compiled
+def ways(lanes: LaneTable, following: IntArray, lane: IntArray, s: FloatArray,
          destination: IntArray, horizon: FloatArray) -> Ways:
-    """Follow the routes of agents (A) from where they are, each as far as it looks."""
-    lanes, offsets = [lane], [-s]
-    current, offset = lane, -s
-    for _ in range(MAX_LANES - 1):
-        end = offset + graph.length[current]
-        following = routes.next[destination, current]
-        on = (lanes[-1] >= 0) & (following >= 0) & (end < horizon)
-        if not on.any():
-            break
-        current = np.where(on, following, current)
-        offset = np.where(on, end, offset)
-        lanes.append(np.where(on, current, -1))
-        offsets.append(offset)
-    return Ways(np.stack(lanes, axis=1), np.stack(offsets, axis=1), horizon)
-
-
-class LaneOrder:
     """
-    Finds entries by lane and arc length.
+    Follow the routes of agents (A) from where they are, each as far as it looks.
 
-    :param entries: in the order of lane and beginning.
+    :param following: (D, L) next lane to a destination, or -1 (`Routes.next`).
     """
+    count = len(lane)
+    way = Ways(np.full((count, MAX_LANES), -1, np.int64), np.zeros((count, MAX_LANES)),
+               np.ones(count, np.int64), horizon)
+    for i in range(count):
+        current, offset = lane[i], -s[i]
+        way.lane[i, 0], way.offset[i, 0] = current, offset
+        for step in range(1, MAX_LANES):
+            offset += lanes.length[current]
+            current = following[destination[i], current]
+            if current < 0 or offset >= horizon[i]:
+                break
+            way.lane[i, step], way.offset[i, step] = current, offset
+            way.count[i] = step + 1
+    return way
 
-    def __init__(self, entries: Entries) -> None:
-        self._stride = 1e6
-        self._keys = entries.lane * self._stride + entries.rear
 
-    def between(self, lane: IntArray, low: FloatArray, high: FloatArray,
-                ) -> tuple[IntArray, IntArray]:
-        """Give the rows (N), (N) from and up to which entries begin within [low, high)."""
-        first = np.searchsorted(self._keys, lane * self._stride + np.maximum(low, -1e4))
-        last = np.searchsorted(self._keys, lane * self._stride + np.minimum(high, 9e5))
-        return first, last
+@compiled
+def first_from(entries: Entries, lane: int, rear: float) -> int:
+    """Give the first row of a lane whose entry begins at an arc length or behind it."""
+    low, high = entries.begin[lane], entries.begin[lane + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if entries.rear[middle] < rear:
+            low = middle + 1
+        else:
+            high = middle
+    return int(low)
 
 
-def ahead(entries: Entries, order: LaneOrder, way: Ways, owner: IntArray, length: FloatArray,
-          low: FloatArray, high: FloatArray, reference: FloatArray | None = None,
-          limit: int = MAX_AHEAD) -> Pairs:
+@compiled
+def swing(curvature: float, front: float) -> float:
+    """
+    Give by how much more than half its width a vehicle takes on either side in a curve [m].
+
+    With its rear axle f^2 / (4 R) inside the middle, f the distance to its front, the rear's
+    inner and the front's outer corner are equally far out.
+    """
+    return min(0.25 * abs(curvature) * front * front, MAX_SWING)
+
+
+@compiled
+def ahead(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
+          reference: FloatArray) -> Pairs:
     """
     Find what is ahead of each agent and in its way.
 
-    :param owner: (A) the agents, as entries name them.
-    :param length: (A) of the agents [m]
-    :param low: (A) right edge of what an agent takes, from the reference [m]
-    :param high: (A) its left edge [m]
-    :param reference: (E) offset of the reference in the entries' lanes where they are [m]
-    :param limit: how many entries of a lane are looked at, the first ones.
+    :param reference: offset of the reference at each point of the lanes [m]; empty: none.
     """
-    count, depth = way.lane.shape
-    agent = np.repeat(np.arange(count), depth)
-    lane, offset = way.lane.ravel(), way.offset.ravel()
-    used = np.flatnonzero(lane >= 0)
-    agent, lane, offset = agent[used], lane[used], offset[used]
-    first, last = order.between(lane, -offset - LONGEST, way.horizon[agent] - offset)
-    row, entry = spans(first, np.minimum(last - first, limit + 4))
-    who = agent[row]
-    middle = 0.5 * (entries.rear[entry] + entries.front[entry]) + offset[row]
-    shift = 0.0 if reference is None else reference[entry]
-    blocks = (middle > 0.0) & (entries.owner[entry] != owner[who]) & (
-        entries.low[entry] - shift < high[who] + SIDE_MARGIN) & (
-        entries.high[entry] - shift > low[who] - SIDE_MARGIN)
-    row, entry, who = row[blocks], entry[blocks], who[blocks]
-    distance = entries.rear[entry] + offset[row]
-    return Pairs(who, entry, distance - 0.5 * length[who], distance)
+    count = len(way.count)
+    agent, entry = np.empty(count * MAX_AHEAD, np.int64), np.empty(count * MAX_AHEAD, np.int64)
+    distance = np.empty(count * MAX_AHEAD)
+    used = 0
+    for i in range(count):
+        end = used + MAX_AHEAD
+        leaders = 0
+        for step in range(way.count[i]):
+            lane, offset = way.lane[i, step], way.offset[i, step]
+            n = first_from(entries, lane, -offset - LONGEST)
+            while n < entries.begin[lane + 1] and used < end and leaders < MAX_LEADERS and (
+                    entries.rear[n] + offset < way.horizon[i]):
+                rear = _in_the_way(lanes, entries, n, lane, offset, corridor, i, reference)
+                if rear < np.inf:
+                    agent[used], entry[used], distance[used] = i, n, rear + offset
+                    used += 1
+                    leaders += 0 if entries.crosses[n] else 1
+                n += 1
+            if used >= end or leaders >= MAX_LEADERS:
+                break
+    who = agent[:used].copy()
+    return Pairs(who, entry[:used].copy(), distance[:used] - 0.5 * corridor.length[who],
+                 distance[:used].copy())
 
 
+@compiled
+def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: float,
+                corridor: Corridors, i: int, reference: FloatArray) -> float:
+    """Give where an entry that is in an agent's way begins [m], inf for any other."""
+    middle = 0.5 * (entries.rear[n] + entries.front[n])
+    if middle + offset <= 0.0 or entries.owner[n] == corridor.owner[i]:
+        return np.inf
+    row = nearest_row(lanes, lane, min(max(middle, 0.0), lanes.length[lane]))
+    shift = reference[row] if len(reference) else 0.0
+    margin = SIDE_MARGIN + swing(lanes.curvature[row], corridor.front[i])
+    return float(rear_within(entries, n, corridor.low[i] + shift - margin,
+                             corridor.high[i] + shift + margin))
+
+
+@compiled
 def least(agent: IntArray, values: FloatArray, count: int, default: float) -> FloatArray:
     """Give the least value (count) of each agent, the default where there is none."""
     result = np.full(count, default)
-    np.minimum.at(result, agent, values)
+    for i in range(len(agent)):
+        result[agent[i]] = min(result[agent[i]], values[i])
     return result
 
+
+@compiled
+def nearest(pairs: Pairs, owner: IntArray, count: int) -> tuple[FloatArray, IntArray]:
+    """Give the least gap (count) of each agent and whose it is; inf and `FREE` without one."""
+    gap, leader = np.full(count, np.inf), np.full(count, FREE, np.int64)
+    for p in range(len(pairs.agent)):
+        i = pairs.agent[p]
+        if pairs.gap[p] < gap[i]:
+            gap[i], leader[i] = pairs.gap[p], owner[pairs.entry[p]]
+    return gap, leader

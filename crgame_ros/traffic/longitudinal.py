@@ -2,24 +2,149 @@
 # SPDX-License-Identifier: Apache-2.0
 """How fast agents want to drive, and how they accelerate behind whatever is ahead (FS M2)."""
 
+import math
+
 import numpy as np
 
-from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.agents import Agents, AgentTable
 from crgame_ros.traffic.car_following import CarFollowing
+from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import ahead, LaneOrder, least, Pairs, Ways, ways
+from crgame_ros.traffic.lane_table import LaneTable, nearest_row
+from crgame_ros.traffic.leaders import least, Pairs, Ways
 from crgame_ros.traffic.placement import Entries
-from crgame_ros.traffic.routes import Routes
 
 # With which agents slow down for a curve or a lower limit ahead [m/s^2].
 COASTING = 1.2
+# They look at the speeds allowed so far ahead, and are at them then [s].
+LOOKS = (0.3, 0.6, 1.0)
 # Who drives across ahead has been waited for or will be gone; this much is no alarm yet [m/s^2].
-ALARM = 2.5
-# With which agents brake before the end of a lane that they have not got out of [m/s^2], and the
-# time in which they get to the speed at which that begins [s].
-AT_END, AT_END_TIME = 3.0, 1.0
-# Lines are halted at with this gap instead of the standstill gap [m].
-LINE_GAP = 0.5
+ALARM = 2.0
+# Time between the rear of who crosses leaving the own way and being there oneself [s].
+BEHIND_CROSSING = 0.4
+# With which agents halt at a line [m/s^2]; and before the end of a lane that they have not got
+# out of: at full speed as far as can be, for gaps are found there.
+AT_LINE, AT_END = 1.6, 3.0
+# Lines are halted at with this gap [m], and a standing agent this near stays [m].
+LINE_GAP, AT_REST = 0.5, 0.3
+# Comfortable jerk [m/s^3]: of braking more, of braking less or accelerating; what is wanted beyond
+# `EMERGENCY` is done at once [m/s^2].
+JERK, RELEASE, EMERGENCY = 3.0, 4.0, 3.0
+
+
+@compiled
+def _envelope(lanes: LaneTable, speed: FloatArray) -> FloatArray:
+    """Give the speeds from which one slows down in time for what the same lane allows ahead."""
+    result = speed.copy()
+    for lane in range(len(lanes.first)):
+        first, gain = lanes.first[lane], 2.0 * COASTING * lanes.step[lane]
+        for row in range(first + lanes.count[lane] - 2, first - 1, -1):
+            result[row] = min(result[row], math.sqrt(result[row + 1]**2 + gain))
+    return result
+
+
+@compiled
+def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: float, top: float,
+             ahead: float) -> float:
+    """Give the speed that limits and curves allow an agent a distance ahead of its centre."""
+    result = math.inf
+    for step in range(way.count[i]):
+        lane, begins = way.lane[i, step], way.offset[i, step] - ahead
+        wanted = min(lanes.limit[lane] * factor, top)
+        if begins > 0.0:
+            there = min(wanted, envelope[lanes.first[lane]])
+            result = min(result, math.sqrt(there * there + 2.0 * COASTING * begins))
+        elif begins + lanes.length[lane] > 0.0 or step == way.count[i] - 1:
+            result = min(wanted, envelope[nearest_row(lanes, lane, -begins)])
+    return result
+
+
+@compiled
+def _speeds(lanes: LaneTable, envelope: FloatArray, way: Ways, agents: AgentTable,
+            slots: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Give what is allowed now (A), and the acceleration (A) that keeps to what is ahead."""
+    desired, limit = np.empty(len(slots)), np.full(len(slots), math.inf)
+    for i, slot in enumerate(slots):
+        factor, top, speed = agents.factor[slot], agents.top[slot], agents.speed[slot]
+        desired[i] = _allowed(lanes, envelope, way, i, factor, top, 0.0)
+        for look in LOOKS:
+            there = _allowed(lanes, envelope, way, i, factor, top, speed * look)
+            limit[i] = min(limit[i], (there - speed) / look)
+        # Whoever is much too fast, because a limit has changed, takes its time.
+        limit[i] = max(limit[i], -2.0 * COASTING)
+    return desired, limit
+
+
+@compiled
+def halt_before(speed: float, distance: float, braking: float) -> float:
+    """
+    Give the acceleration that halts a distance ahead.
+
+    The speed follows sqrt(2 b d), looked at a moment ahead so that braking sets in smoothly; where
+    more is needed it is braked with at once.
+    """
+    if distance >= math.inf:
+        return math.inf
+    if speed < AT_REST and distance < AT_REST:
+        return -1.0
+    result = math.inf
+    for look in LOOKS:
+        allowed = math.sqrt(2.0 * braking * max(distance - speed * look, 0.0))
+        result = min(result, (allowed - speed) / look)
+    needed = speed * speed / (2.0 * max(distance, 0.2))
+    return max(result, -max(needed, braking))
+
+
+@compiled
+def halts_before(speed: FloatArray, distance: FloatArray, braking: float) -> FloatArray:
+    """Give the accelerations (A) that halt distances ahead; see `halt_before`."""
+    result = np.empty(len(speed))
+    for i in range(len(speed)):
+        result[i] = halt_before(speed[i], max(distance[i], 0.0), braking)
+    return result
+
+
+@compiled
+def _crossing(entries: Entries, pairs: Pairs, slots: IntArray, agents: AgentTable,
+              low: FloatArray, high: FloatArray, wanted: FloatArray) -> None:
+    """
+    Replace what is wanted behind those who drive across.
+
+    They have been waited for or will be gone; only the last moment to brake counts, and nothing
+    if they leave the own way before.
+    """
+    for p in range(len(pairs.agent)):
+        n, i = pairs.entry[p], pairs.agent[p]
+        if not entries.crosses[n] or entries.owner[n] < 0:
+            continue
+        speed = agents.speed[slots[i]]
+        aside = entries.aside[n]
+        clear = math.inf
+        if aside > 0.5:
+            clear = (high[i] + 0.3 - entries.low[n]) / aside
+        elif aside < -0.5:
+            clear = (low[i] - 0.3 - entries.high[n]) / aside
+        needed = speed * speed / (2.0 * max(pairs.gap[p] - 0.5, 0.05))
+        late = pairs.gap[p] < speed * (clear + BEHIND_CROSSING)
+        wanted[p] = -needed if late and needed > ALARM else math.inf
+
+
+@compiled
+def smoothed(previous: FloatArray, wanted: FloatArray, speed: FloatArray,
+             dt_s: float) -> FloatArray:
+    """Limit how fast accelerations (A) change, but for emergencies [m/s^2]."""
+    result = np.empty(len(wanted))
+    for i in range(len(wanted)):
+        before = previous[i] if speed[i] > 0.0 else max(previous[i], 0.0)
+        low, high = before - JERK * dt_s, before + RELEASE * dt_s
+        if wanted[i] < -EMERGENCY:
+            low = wanted[i]
+        if before < -EMERGENCY or speed[i] < 1.0:
+            high = math.inf
+        result[i] = min(max(wanted[i], low), high)
+        if speed[i] <= 0.0 and wanted[i] < 0.0:
+            result[i] = wanted[i]
+    return result
 
 
 class Longitudinal:
@@ -33,85 +158,42 @@ class Longitudinal:
     def __init__(self, graph: LaneGraph, model: CarFollowing) -> None:
         self._graph = graph
         self._model = model
-        # The speeds from which one slows down for the curves of the same lane in time.
-        self._envelope = graph.curve_speed.copy()
-        for lane in range(len(graph)):
-            first, count = int(graph.first[lane]), int(graph.count[lane])
-            part = self._envelope[first:first + count]
-            ahead_of = 2.0 * COASTING * float(graph.step[lane]) * np.arange(count)
-            part[:] = np.sqrt(np.minimum.accumulate((part**2 + ahead_of)[::-1])[::-1] - ahead_of)
+        self._envelope = _envelope(graph.table, graph.curve_speed)
 
-    def desired_speed(self, way: Ways, s: FloatArray, factor: FloatArray) -> FloatArray:
-        """Give the speeds (A) that limits and curves allow, those ahead in time [m/s]."""
-        graph = self._graph
-        result = np.minimum(graph.limit[way.lane[:, 0]] * factor,
-                            self._envelope[graph.rows(way.lane[:, 0], s)])
-        for step in range(1, way.depth):
-            lane = np.maximum(way.lane[:, step], 0)
-            there = np.minimum(graph.limit[lane] * factor, self._envelope[graph.first[lane]])
-            allowed = np.sqrt(there**2 + 2.0 * COASTING * np.maximum(way.offset[:, step], 0.0))
-            result = np.where(way.lane[:, step] >= 0, np.minimum(result, allowed), result)
-        return result
+    def slow_for(self, speed: FloatArray) -> None:
+        """Take over what else limits speeds, at each point of the lanes [m/s]: swerves."""
+        self._envelope = _envelope(self._graph.table, np.minimum(self._graph.curve_speed, speed))
+
+    def speeds(self, way: Ways, agents: Agents,
+               slots: IntArray) -> tuple[FloatArray, FloatArray]:
+        """
+        Give the speeds (A) that limits and curves allow [m/s], those ahead in time.
+
+        :return: and the accelerations (A) with which nobody gets too fast [m/s^2]
+        """
+        desired, limit = _speeds(self._graph.table, self._envelope, way, agents.table, slots)
+        return desired, limit
 
     def allowed(self, lane: int, s: float, factor: float) -> float:
         """Give the speed that limit and curves allow somewhere [m/s]."""
-        row = self._graph.rows(np.array([lane]), np.array([s]))[0]
+        row = nearest_row(self._graph.table, lane, s)
         return float(min(self._graph.limit[lane] * factor, self._envelope[row]))
 
     def behind(self, agents: Agents, slots: IntArray, desired: FloatArray, pairs: Pairs,
-               entries: Entries) -> FloatArray:
-        """Give the acceleration (A) behind everything ahead; that of a free road at most."""
+               entries: Entries, corridor: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """
+        Give the acceleration (A) behind everything ahead; that of a free road at most.
+
+        :param corridor: right and left edge (A) of what each agent takes [m]
+        """
         speed = agents.speed[slots]
         nobody = np.full(len(slots), np.inf)
         free = self._model.acceleration(speed, desired, nobody, speed)
         if not len(pairs.agent):
             return np.asarray(free)
         who, entry = pairs.agent, pairs.entry
-        wanted = self._model.acceleration(speed[who], desired[who], pairs.gap,
-                                          entries.speed[entry], agents.relief[slots[who]])
-        # Crossing agents have agreed on who goes first: only the last moment to brake counts.
-        needed = speed[who]**2 / (2.0 * np.maximum(pairs.gap - 0.5, 0.05))
-        crossing = entries.crosses[entry] & (entries.owner[entry] >= 0)
-        wanted = np.where(crossing, np.where(needed > ALARM, -needed, np.inf), wanted)
+        wanted = self._model.acceleration(
+            speed[who], desired[who], pairs.gap, entries.speed[entry],
+            agents.relief[slots[who]], entries.acceleration[entry])
+        _crossing(entries, pairs, slots, agents.table, *corridor, wanted)
         return np.asarray(np.minimum(free, least(who, wanted, len(slots), np.inf)))
-
-    def before_line(self, speed: FloatArray, desired: FloatArray,
-                    distance: FloatArray) -> FloatArray:
-        """Give the acceleration (A) before a point to halt at, a distance ahead of the front."""
-        gap = np.maximum(distance, 0.0) + self._model.standstill_gap - LINE_GAP
-        return np.asarray(self._model.acceleration(speed, desired, gap, np.zeros_like(speed)))
-
-    @staticmethod
-    def before_end(speed: FloatArray, distance: FloatArray) -> FloatArray:
-        """
-        Give the acceleration (A) before the end of a lane, a distance ahead of the front.
-
-        The speed follows sqrt(2 b d): at full speed as far as can be, for gaps are found there,
-        then with constant braking, and softly at the end.
-        """
-        distance = np.maximum(distance, 0.0)
-        allowed = np.sqrt(2.0 * AT_END * distance)
-        share = np.minimum(speed / np.maximum(allowed, 0.01), 1.0)
-        softly = (allowed - speed) / AT_END_TIME - AT_END * share**2
-        needed = speed**2 / (2.0 * np.maximum(distance, 0.5))
-        return np.where(speed > allowed, np.minimum(softly, -needed), softly)
-
-
-def changing_pairs(graph: LaneGraph, routes: Routes, agents: Agents, slots: IntArray,
-                   entries: Entries, order: LaneOrder, horizon: FloatArray,
-                   ) -> tuple[IntArray, Pairs]:
-    """
-    Find what is ahead in the lanes that agents are leaving, as far as they are still there.
-
-    :return: rows of `slots`, and pairs of these.
-    """
-    row = np.flatnonzero(agents.source[slots] != NOBODY)
-    row = row[agents.source[slots[row]] != agents.lane[slots[row]]]
-    who = slots[row]
-    lane, center = agents.source[who], agents.centers()[who]
-    guess = agents.s[who] * graph.length[lane] / graph.length[agents.lane[who]]
-    s, d, _ = graph.project(lane, center[:, 0], center[:, 1], guess)
-    way = ways(graph, routes, lane, s, agents.destination[who], horizon[row])
-    half = 0.5 * agents.width[who]
-    pairs = ahead(entries, order, way, who, agents.length[who], d - half, d + half)
-    return row, pairs

@@ -2,25 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who drives in the lane beside an agent: the gap it would change into."""
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 
-from crgame_ros.traffic.agents import Agents
-from crgame_ros.traffic.lane_cells import spans
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import ahead, LaneOrder, look_distance, ways
-from crgame_ros.traffic.placement import Entries
-from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.agents import AgentTable
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.lane_table import LaneTable, project_on
+from crgame_ros.traffic.leaders import first_from
+from crgame_ros.traffic.placement import Entries, front_within, rear_within
 
 LOOK_BEHIND = 120.0
-MAX_LANES_BEHIND = 5
-# Of the entries that begin behind an agent in one lane the last ones are looked at.
-LAST = 3
+MAX_LANES_BEHIND = 8
+MAX_LANES_AHEAD = 12
+# Who is beside has to be clear of the own width by this [m].
+SIDE_MARGIN = 0.15
+# No vehicle is longer [m].
+LONG = 25.0
 
 
-@dataclass(frozen=True)
-class Beside:
+class Beside(NamedTuple):
     """
     The lanes beside agents (N), and who is ahead and behind there.
 
@@ -48,62 +51,88 @@ class Beside:
     follower: IntArray
 
 
-def look_beside(graph: LaneGraph, routes: Routes, agents: Agents, slots: IntArray,
-                lane: IntArray, entries: Entries, order: LaneOrder) -> Beside:
+@compiled
+def look_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+                lane: IntArray, entries: Entries) -> Beside:
     """
     Look into the lanes beside agents.
 
+    :param following: (D, L) next lane to a destination, or -1.
     :param slots: (N) the agents.
     :param lane: (N) the lane beside each.
     """
-    center = agents.centers()[slots]
-    guess = agents.s[slots] * graph.length[lane] / graph.length[agents.lane[slots]]
-    s, d, yaw = graph.project(lane, center[:, 0], center[:, 1], guess)
-    count, half = len(slots), 0.5 * agents.width[slots]
-    horizon = look_distance(agents.speed[slots])
-    way = ways(graph, routes, lane, s, agents.destination[slots], horizon)
-    pairs = ahead(entries, order, way, slots, agents.length[slots], -half, half)
-    lead_gap, lead_speed = np.full(count, np.inf), np.zeros(count)
-    leader = np.full(count, -1, dtype=np.int64)
-    for_row = np.lexsort((pairs.gap, pairs.agent))
-    who, place = np.unique(pairs.agent[for_row], return_index=True)
-    lead_gap[who] = pairs.gap[for_row[place]]
-    leader[who] = pairs.entry[for_row[place]]
-    lead_speed[who] = entries.speed[leader[who]]
-    gap, row = _behind(graph, agents, slots, lane, s, entries, order)
-    known = row >= 0
-    speed = np.where(known, entries.speed[np.maximum(row, 0)], 0.0) if len(entries) else gap * 0.0
-    owner = entries.owner[np.maximum(row, 0)] if len(entries) else np.full(count, -1)
-    return Beside(lane, s, d, center[:, 2] - yaw, lead_gap, lead_speed, leader, gap,
-                  speed, np.where(known & (owner >= 0), owner, -1))
+    count = len(slots)
+    result = Beside(
+        lane, np.empty(count), np.empty(count), np.empty(count), np.full(count, math.inf),
+        np.zeros(count), np.full(count, -1, np.int64), np.full(count, math.inf),
+        np.zeros(count), np.full(count, -1, np.int64))
+    for i, slot in enumerate(slots):
+        yaw = agents.yaw[slot]
+        x = agents.x[slot] + agents.rear_to_center[slot] * math.cos(yaw)
+        y = agents.y[slot] + agents.rear_to_center[slot] * math.sin(yaw)
+        guess = agents.s[slot] * lanes.length[lane[i]] / lanes.length[agents.lane[slot]]
+        s, d, heading = project_on(lanes, lane[i], x, y, guess, 3)
+        result.s[i], result.d[i], result.turn[i] = s, d, yaw - heading
+        _look_ahead(lanes, following, agents, slot, entries, result, i)
+        _look_behind(lanes, agents, slot, entries, result, i)
+    return result
 
 
-def _behind(graph: LaneGraph, agents: Agents, slots: IntArray, lane: IntArray, s: FloatArray,
-            entries: Entries, order: LaneOrder) -> tuple[FloatArray, IntArray]:
-    """Find who is next behind each agent, in the lane or those that lead to it."""
-    count, half = len(slots), 0.5 * agents.width[slots]
-    rear = -0.5 * agents.length[slots]
-    best, entry_of = np.full(count, np.inf), np.full(count, -1, dtype=np.int64)
-    agent, current, offset = np.arange(count), lane, -s
-    for _ in range(MAX_LANES_BEHIND):
-        # Arc lengths of the lane that are behind the agent's centre.
-        first, last = order.between(current, -offset - LOOK_BEHIND, -offset)
-        row, entry = spans(np.maximum(first, last - LAST), np.minimum(last - first, LAST))
-        who = agent[row]
-        middle = 0.5 * (entries.rear[entry] + entries.front[entry]) + offset[row]
-        blocks = (middle <= 0.0) & (entries.owner[entry] != slots[who]) & (
-            entries.low[entry] < half[who]) & (entries.high[entry] > -half[who])
-        row, entry, who = row[blocks], entry[blocks], who[blocks]
-        gap = rear[who] - (entries.front[entry] + offset[row])
-        ordered = np.lexsort((gap, who))
-        unique, place = np.unique(who[ordered], return_index=True)
-        better = gap[ordered[place]] < best[unique]
-        best[unique[better]] = gap[ordered[place]][better]
-        entry_of[unique[better]] = entry[ordered[place]][better]
-        branch, column = np.nonzero((graph.predecessors[current] >= 0) & (
-            (offset > -LOOK_BEHIND) & np.isinf(best[agent]))[:, None])
-        current = graph.predecessors[current[branch], column]
-        agent, offset = agent[branch], offset[branch] - graph.length[current]
-        if not len(agent):
+@compiled
+def _look_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+                entries: Entries, result: Beside, i: int) -> None:
+    """Find who is next ahead in the lane beside and those that follow on the route."""
+    speed, half = agents.speed[slot], 0.5 * agents.width[slot] + SIDE_MARGIN
+    horizon = 30.0 + 3.0 * speed + speed**2 / 4.0
+    lane, offset = result.lane[i], -result.s[i]
+    for _ in range(MAX_LANES_AHEAD):
+        for n in range(entries.begin[lane], entries.begin[lane + 1]):
+            if entries.rear[n] + offset > horizon:
+                break
+            middle = 0.5 * (entries.rear[n] + entries.front[n]) + offset
+            if middle > 0.0 and entries.owner[n] != slot:
+                gap = rear_within(entries, n, -half, half) + offset - 0.5 * agents.length[slot]
+                if gap < result.lead_gap[i]:
+                    result.lead_gap[i], result.leader[i] = gap, n
+                    result.lead_speed[i] = entries.speed[n]
+        offset += lanes.length[lane]
+        lane = following[agents.destination[slot], lane]
+        if lane < 0 or offset > horizon or result.leader[i] >= 0:
             break
-    return best, entry_of
+
+
+@compiled
+def _look_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entries,
+                 result: Beside, i: int) -> None:
+    """Find who is next behind, in the lane or those that lead to it."""
+    half = 0.5 * agents.width[slot] + SIDE_MARGIN
+    pending_lane = np.full(32, -1, np.int64)
+    pending_offset = np.zeros(32)
+    pending_lane[0], pending_offset[0] = result.lane[i], -result.s[i]
+    done, pending = 0, 1
+    while done < pending:
+        lane, offset = pending_lane[done], pending_offset[done]
+        done += 1
+        found = False
+        last = first_from(entries, lane, LONG - offset)
+        for n in range(last - 1, entries.begin[lane] - 1, -1):
+            if entries.rear[n] + offset < -LOOK_BEHIND:
+                break
+            middle = 0.5 * (entries.rear[n] + entries.front[n]) + offset
+            if middle > 0.0 or entries.owner[n] == slot:
+                continue
+            gap = -0.5 * agents.length[slot] - (front_within(entries, n, -half, half) + offset)
+            if gap < math.inf:
+                found = True
+            if gap < result.follow_gap[i]:
+                result.follow_gap[i], result.follow_speed[i] = gap, entries.speed[n]
+                result.follower[i] = max(entries.owner[n], -1)
+            # Those sorted before begin, and so end, farther behind; the longest are excepted.
+            if found and entries.rear[n] + offset < -LONG:
+                break
+        if not found and offset > -LOOK_BEHIND:
+            for before in lanes.predecessors[lane]:
+                if before >= 0 and pending < len(pending_lane):
+                    pending_lane[pending] = before
+                    pending_offset[pending] = offset - lanes.length[before]
+                    pending += 1

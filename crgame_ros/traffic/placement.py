@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which part of which lane is taken by whom."""
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.traffic.lane_cells import LaneCells
-from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.lane_cells import cell_of, CellTable
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.lane_table import angle_between, LaneTable, point_on, project_on
 
 # How far ahead a body's way to the side counts as taken, by what it is [s].
 WALKER_TIME = 2.0
@@ -16,15 +19,19 @@ VEHICLE_TIME = 0.7
 MAX_SHIFT = 3.0
 # A body that points elsewhere than its lane by more than this crosses it [rad].
 CROSSING = 0.7
+# Bodies beside a lane by less than this count as in it: who drives there may be wider [m].
+BESIDE = 0.4
+# Lanes with more bodies are sorted by a general algorithm.
+FEW = 32
 
 
-@dataclass(frozen=True)
-class Bodies:
+class Bodies(NamedTuple):
     """
     Everything (B) that may stand or drive in a lane.
 
     :param poses: (B, 3) of the centres [m, rad]; all finite.
     :param velocities: (B, 3) [m/s, rad/s]
+    :param acceleration: (B) along the heading [m/s^2]
     :param length: (B) [m]
     :param width: (B) [m]
     :param owner: (B) agent, or -1 - n for the n-th of the others.
@@ -34,6 +41,7 @@ class Bodies:
 
     poses: FloatArray
     velocities: FloatArray
+    acceleration: FloatArray
     length: FloatArray
     width: FloatArray
     owner: IntArray
@@ -41,76 +49,207 @@ class Bodies:
     claim: IntArray
 
     @classmethod
-    def join(cls, parts: list['Bodies']) -> 'Bodies':
+    def join(cls, parts: 'list[Bodies]') -> 'Bodies':
         """Put several together."""
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in
-                     ('poses', 'velocities', 'length', 'width', 'owner', 'time',
-                      'claim')))
+        return cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-@dataclass(frozen=True)
-class Entries:
+class Entries(NamedTuple):
     """
     What is in the lanes (E), in the order of lane and of where it begins.
 
+    :param begin: (L + 1) rows at which the entries of each lane begin.
     :param lane: (E)
     :param rear: (E) arc length at which it begins [m]
     :param front: (E) at which it ends [m]
     :param low: (E) its right edge, as an offset to the left [m]
     :param high: (E) its left edge [m]
+    :param corners: (E, 4, 2) arc lengths and offsets of its corners, in turn [m]
+    :param drift: (E) how far to the side it takes more, by its motion there [m]
     :param speed: (E) along the lane [m/s]
+    :param aside: (E) across it, to the left [m/s]
+    :param acceleration: (E) along the lane [m/s^2]
     :param crosses: (E) whether it points across the lane or against it.
+    :param claims: (E) whether it is changing into the lane, and has it already.
     :param owner: (E) as in `Bodies`.
     :param body: (E) row of `Bodies`.
     """
 
+    begin: IntArray
     lane: IntArray
     rear: FloatArray
     front: FloatArray
     low: FloatArray
     high: FloatArray
+    corners: FloatArray
+    drift: FloatArray
     speed: FloatArray
+    aside: FloatArray
+    acceleration: FloatArray
     crosses: NDArray[np.bool_]
+    claims: NDArray[np.bool_]
     owner: IntArray
     body: IntArray
 
-    def __len__(self) -> int:
-        return len(self.lane)
-
     def take(self, rows: IntArray) -> 'Entries':
-        """Pick some of them."""
-        return Entries(*(getattr(self, name)[rows] for name in (
-            'lane', 'rear', 'front', 'low', 'high', 'speed', 'crosses', 'owner', 'body')))
+        """Pick some of them; where those of each lane begin is not told."""
+        return Entries(np.empty(0, np.int64), *(column[rows] for column in self[1:]))
 
 
-def place(graph: LaneGraph, cells: LaneCells, bodies: Bodies) -> Entries:
+@compiled
+def place(lanes: LaneTable, cells: CellTable, bodies: Bodies) -> Entries:
     """
     Find the part of every lane that bodies take.
 
-    A rectangle in the lane's coordinates surrounds the body; where it moves to the side, or
-    walks, what it takes within its time ahead belongs to it.
+    A body's corners in the lane's coordinates bound it; `rear_within` tells which part of it is
+    in the way of whom. Where it moves to the side, or walks, what it takes within its time ahead
+    belongs to it; who changes lanes has the new one already.
     """
-    row, lane, guess = cells.near(bodies.poses[:, :2])
-    x, y = bodies.poses[row, 0], bodies.poses[row, 1]
-    s, d, yaw = graph.project(lane, x, y, guess)
-    turn = heading_difference(bodies.poses[row, 2], yaw)
-    cos, sin = np.abs(np.cos(turn)), np.abs(np.sin(turn))
-    half_length, half_width = 0.5 * bodies.length[row], 0.5 * bodies.width[row]
-    along = half_length * cos + half_width * sin
-    aside = half_length * sin + half_width * cos
-    u, v = bodies.velocities[row, 0], bodies.velocities[row, 1]
-    speed = u * np.cos(yaw) + v * np.sin(yaw)
-    drift = np.clip((v * np.cos(yaw) - u * np.sin(yaw)) * bodies.time[row], -MAX_SHIFT, MAX_SHIFT)
-    low = d - aside + np.minimum(drift, 0.0)
-    high = d + aside + np.maximum(drift, 0.0)
-    claims = bodies.claim[row] == lane
-    low = np.where(claims, np.minimum(low, -half_width), low)
-    high = np.where(claims, np.maximum(high, half_width), high)
-    half = graph.half_width[graph.rows(lane, s)]
-    inside = (low < half) & (high > -half) & (s + along > 0.0) & (
-        s - along < graph.length[lane])
-    keep = np.flatnonzero(inside)
-    order = keep[np.lexsort((row[keep], (s - along)[keep], lane[keep]))]
-    return Entries(lane[order], (s - along)[order], (s + along)[order], low[order], high[order],
-                   speed[order], np.cos(turn[order]) < np.cos(CROSSING), bodies.owner[row[order]],
-                   row[order])
+    room = 0
+    cell = np.empty(len(bodies.owner), np.int64)
+    for i in range(len(cell)):
+        cell[i] = cell_of(cells, bodies.poses[i, 0], bodies.poses[i, 1])
+        if cell[i] >= 0:
+            room += cells.starts[cell[i] + 1] - cells.starts[cell[i]]
+    found = _empty(len(lanes.first), room)
+    count = 0
+    for i in range(len(cell)):
+        if cell[i] >= 0:
+            for j in range(cells.starts[cell[i]], cells.starts[cell[i] + 1]):
+                count += _put(lanes, bodies, i, cells.lanes[j], cells.guesses[j], found, count)
+    return _sorted(found, count)
+
+
+@compiled
+def _empty(lanes: int, room: int) -> Entries:
+    return Entries(
+        np.zeros(lanes + 1, np.int64), np.empty(room, np.int64), np.empty(room), np.empty(room),
+        np.empty(room), np.empty(room), np.empty((room, 4, 2)), np.empty(room), np.empty(room),
+        np.empty(room), np.empty(room), np.empty(room, np.bool_), np.empty(room, np.bool_),
+        np.empty(room, np.int64), np.empty(room, np.int64))
+
+
+@compiled
+def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, found: Entries,
+         n: int) -> int:
+    """Write the entry of a body in a lane into row n, if it is in it; return how many."""
+    x, y, heading = bodies.poses[i, 0], bodies.poses[i, 1], bodies.poses[i, 2]
+    half_length, half_width = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
+    reach = half_length + half_width
+    s, d, yaw = project_on(lanes, lane, x, y, guess, 3)
+    if s < -reach or s > lanes.length[lane] + reach or abs(d) > 20.0:
+        return 0
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    u, v = bodies.velocities[i, 0], bodies.velocities[i, 1]
+    aside = v * cos - u * sin
+    drift = min(max(aside * bodies.time[i], -MAX_SHIFT), MAX_SHIFT)
+    ahead_x, ahead_y = math.cos(heading), math.sin(heading)
+    rear = low = math.inf
+    front = high = -math.inf
+    for corner in range(4):
+        along = half_length if corner < 2 else -half_length
+        left = half_width if corner in (1, 2) else -half_width
+        at, off, _ = project_on(
+            lanes, lane, x + along * ahead_x - left * ahead_y,
+            y + along * ahead_y + left * ahead_x,
+            s + along * (ahead_x * cos + ahead_y * sin), 2)
+        found.corners[n, corner, 0], found.corners[n, corner, 1] = at, off
+        rear, front = min(rear, at), max(front, at)
+        low, high = min(low, off), max(high, off)
+    low, high = low + min(drift, 0.0), high + max(drift, 0.0)
+    claims = bodies.claim[i] == lane
+    if claims:
+        low, high = min(low, -half_width), max(high, half_width)
+    row = int(np.rint(s / lanes.step[lane]))
+    half = lanes.half_width[lanes.first[lane] + min(max(row, 0), lanes.count[lane] - 1)] + BESIDE
+    if not (low < half and high > -half and front > 0.0 and rear < lanes.length[lane]):
+        return 0
+    turn = math.cos(angle_between(heading, yaw))
+    found.lane[n], found.owner[n], found.body[n] = lane, bodies.owner[i], i
+    found.rear[n], found.front[n], found.low[n], found.high[n] = rear, front, low, high
+    found.drift[n], found.aside[n], found.speed[n] = drift, aside, u * cos + v * sin
+    found.acceleration[n] = bodies.acceleration[i] * turn
+    found.crosses[n], found.claims[n] = turn < math.cos(CROSSING), claims
+    return 1
+
+
+@compiled
+def _sorted(found: Entries, count: int) -> Entries:
+    """Sort the first entries by lane, beginning and body."""
+    begin = found.begin
+    for i in range(count):
+        begin[found.lane[i] + 1] += 1
+    for lane in range(len(begin) - 1):
+        begin[lane + 1] += begin[lane]
+    fill = begin.copy()
+    order = np.empty(count, np.int64)
+    for i in range(count):
+        lane = found.lane[i]
+        order[fill[lane]] = i
+        fill[lane] += 1
+    for lane in range(len(begin) - 1):
+        _sort_part(order, found.rear, begin[lane], begin[lane + 1])
+    return Entries(
+        begin, found.lane[order], found.rear[order], found.front[order], found.low[order],
+        found.high[order], found.corners[order], found.drift[order], found.speed[order],
+        found.aside[order], found.acceleration[order], found.crosses[order],
+        found.claims[order], found.owner[order], found.body[order])
+
+
+@compiled
+def _sort_part(order: IntArray, keys: FloatArray, start: int, end: int) -> None:
+    """Sort a part of an order by keys; equal ones stay as they are."""
+    if end - start > FEW:
+        part = order[start:end].copy()
+        order[start:end] = part[np.argsort(keys[part], kind='mergesort')]
+        return
+    for i in range(start + 1, end):
+        moved = order[i]
+        j = i
+        while j > start and keys[order[j - 1]] > keys[moved]:
+            order[j] = order[j - 1]
+            j -= 1
+        order[j] = moved
+
+
+@compiled
+def rear_within(entries: Entries, i: int, low: float, high: float) -> float:
+    """
+    Give where the part of an entry begins that is in the way between two offsets.
+
+    :return: arc length [m], inf where nothing of it is in the way.
+    """
+    low, high = low - max(entries.drift[i], 0.0), high - min(entries.drift[i], 0.0)
+    if entries.high[i] < low or entries.low[i] > high:
+        return math.inf
+    if entries.claims[i]:
+        return float(entries.rear[i])
+    return _cut(entries.corners[i], low, high)
+
+
+@compiled
+def front_within(entries: Entries, i: int, low: float, high: float) -> float:
+    """Give where the part of an entry between two offsets ends, -inf without one [m]."""
+    low, high = low - max(entries.drift[i], 0.0), high - min(entries.drift[i], 0.0)
+    if entries.high[i] < low or entries.low[i] > high:
+        return -math.inf
+    if entries.claims[i]:
+        return float(entries.front[i])
+    corners = entries.corners[i].copy()
+    corners[:, 0] *= -1.0
+    return -_cut(corners, low, high)
+
+
+@compiled
+def _cut(corners: FloatArray, low: float, high: float) -> float:
+    """Give the least arc length of a quadrangle (4, 2) between two offsets, or inf."""
+    result = math.inf
+    for n in range(4):
+        s, d = corners[n, 0], corners[n, 1]
+        after_s, after_d = corners[(n + 1) % 4, 0], corners[(n + 1) % 4, 1]
+        if low <= d <= high:
+            result = min(result, s)
+        for edge in (low, high):
+            if (d < edge) != (after_d < edge):
+                result = min(result, s + (edge - d) / (after_d - d) * (after_s - s))
+    return result

@@ -1,95 +1,86 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Steering agents along their references: pure pursuit and kinematic bicycle, vectorised."""
+"""Steering one agent along its reference: pure pursuit and kinematic bicycle."""
 
-import numpy as np
-from numpy.typing import NDArray
+import math
 
-Array = NDArray[np.float64]
+from crgame_ros.traffic.compiled import compiled
 
 # Below this turn per step the chord of an arc is its length: sin(x) / x is 1 to 4e-18.
 STRAIGHT = 1e-8
+# Time by which the target point is ahead; Snider (2009) tunes it per course, 1 s is steady on
+# straights [s]; and the bounds of its distance [m].
+PURSUIT_TIME, SHORTEST, LONGEST = 1.0, 3.0, 25.0
+# Where the road bends, the chord to the target point leaves it by at most this [m].
+CUT = 0.12
 
 
-def pursuit_distance(speed: Array, time: float = 1.0, shortest: float = 4.0,
-                     longest: float = 25.0) -> Array:
+@compiled
+def pursuit_distance(speed: float, curvature: float) -> float:
     """
     Give how far ahead on the reference the target point of `steer` lies.
 
-    :param speed: (A,) [m/s]
-    :param time: by which it grows with the speed; Snider (2009) tunes it per course, 1 s is
-        steady on straights and cuts curves little (ours) [s]
-    :param shortest: [m]
-    :param longest: [m]
-    :return: (A,) from the rear axle [m]
+    A chord of length l leaves an arc by l^2 |kappa| / 8.
+
+    :param speed: [m/s]
+    :param curvature: of the road between here and there [1/m]
+    :return: from the rear axle [m]
     """
-    return np.clip(time * speed, shortest, longest)
+    straight = min(max(PURSUIT_TIME * speed, SHORTEST), LONGEST)
+    return max(min(straight, math.sqrt(8.0 * CUT / max(abs(curvature), 1e-6))), SHORTEST)
 
 
-def steer(x: Array, y: Array, yaw: Array, target_x: Array, target_y: Array, wheelbase: Array,
-          steering: Array, max_steering: Array | float, max_rate: Array | float,
-          dt_s: float) -> Array:
+@compiled
+def steer(x: float, y: float, yaw: float, target_x: float, target_y: float, wheelbase: float,
+          steering: float, max_steering: float, max_rate: float, dt_s: float) -> float:
     """
-    Steer towards points on the reference: pure pursuit (Snider 2009, section 2.2).
+    Steer towards a point on the reference: pure pursuit (Snider 2009, section 2.2).
 
     The arc through the rear axle, tangent to the heading, and the point has the curvature
     2 y_t / (x_t^2 + y_t^2) with the point's coordinates in the vehicle's frame; the bicycle
     drives it with tan(delta) = L curvature. Exact on circles.
 
-    :param x, y, yaw: (A,) of the rear axles [m], [rad]
-    :param target_x, target_y: (A,) the points, at `pursuit_distance` [m]
-    :param wheelbase: L, (A,) [m]
-    :param steering: (A,) steering angles now [rad]
-    :param max_steering: (A,) their bound [rad]
-    :param max_rate: (A,) bound of their rate [rad/s]
+    :param x, y, yaw: of the rear axle [m], [rad]
+    :param target_x, target_y: the point, at `pursuit_distance` [m]
+    :param wheelbase: L [m]
+    :param steering: angle now [rad]
+    :param max_steering: its bound [rad]
+    :param max_rate: bound of its rate [rad/s]
     :param dt_s: until the next call [s]
-    :return: (A,) steering angles for the step [rad]
+    :return: steering angle for the step [rad]
     """
     dx, dy = target_x - x, target_y - y
-    lateral = dy * np.cos(yaw) - dx * np.sin(yaw)
-    squared = np.maximum(dx * dx + dy * dy, 1e-6)
-    wanted = np.arctan(2.0 * wheelbase * lateral / squared)
+    lateral = dy * math.cos(yaw) - dx * math.sin(yaw)
+    squared = max(dx * dx + dy * dy, 1e-6)
+    wanted = math.atan(2.0 * wheelbase * lateral / squared)
     reach = max_rate * dt_s
-    changed = np.minimum(np.maximum(wanted, steering - reach), steering + reach)
-    return np.minimum(np.maximum(changed, -max_steering), max_steering)
+    changed = min(max(wanted, steering - reach), steering + reach)
+    return min(max(changed, -max_steering), max_steering)
 
 
-def move(x: Array, y: Array, yaw: Array, speed: Array, steering: Array, acceleration: Array,
-         wheelbase: Array, dt_s: float) -> tuple[Array, Array, Array, Array]:
+@compiled
+def move(x: float, y: float, yaw: float, speed: float, steering: float, acceleration: float,
+         wheelbase: float, dt_s: float) -> tuple[float, float, float, float]:
     """
-    Advance kinematic bicycles (CRG 2-4) by one step, exactly.
+    Advance a kinematic bicycle (CRG 2-4) by one step, exactly.
 
     With constant steering angle and acceleration a rear axle drives an arc: the distance ds is
     quadratic in time, the turn is ds tan(delta) / L and the chord ds sin(turn / 2) / (turn / 2).
-    Vehicles that brake to rest within the step stay there; none moves backwards.
+    Who brakes to rest within the step stays there; nobody moves backwards.
 
-    :param x, y, yaw: (A,) of the rear axles [m], [rad]
-    :param speed: (A,) at least 0 [m/s]
-    :param steering: (A,) [rad]
-    :param acceleration: (A,) [m/s^2]
-    :param wheelbase: L, (A,) [m]
-    :return: x, y, yaw (not normalised) and speed after the step, each (A,)
+    :param x, y, yaw: of the rear axle [m], [rad]
+    :param speed: at least 0 [m/s]
+    :param steering: [rad]
+    :param acceleration: [m/s^2]
+    :param wheelbase: L [m]
+    :return: x, y, yaw (not normalised) and speed after the step
     """
-    end_speed = np.maximum(speed + acceleration * dt_s, 0.0)
-    stops = (end_speed == 0.0) & (acceleration < 0.0)
+    end_speed = max(speed + acceleration * dt_s, 0.0)
     driven = 0.5 * (speed + end_speed) * dt_s
-    braking = np.where(stops, -acceleration, 1.0)
-    driven = np.where(stops, 0.5 * speed * speed / braking, driven)
-    half_turn = 0.5 * driven * np.tan(steering) / wheelbase
-    curved = np.abs(half_turn) > STRAIGHT
-    divisor = np.where(curved, half_turn, 1.0)
-    chord = driven * np.where(curved, np.sin(divisor) / divisor, 1.0)
+    if end_speed == 0.0 and acceleration < 0.0:
+        driven = 0.5 * speed * speed / -acceleration
+    half_turn = 0.5 * driven * math.tan(steering) / wheelbase
+    chord = driven * (math.sin(half_turn) / half_turn if abs(half_turn) > STRAIGHT else 1.0)
     middle = yaw + half_turn
-    return (x + chord * np.cos(middle), y + chord * np.sin(middle), middle + half_turn,
+    return (x + chord * math.cos(middle), y + chord * math.sin(middle), middle + half_turn,
             end_speed)
-
-
-def centers(x: Array, y: Array, yaw: Array, rear_to_center: Array) -> tuple[Array, Array]:
-    """
-    Give the centres of vehicles whose rear axles are known.
-
-    :param x, y, yaw: (A,) of the rear axles [m], [rad]
-    :param rear_to_center: (A,) [m]
-    :return: x, y, both (A,) [m]
-    """
-    return x + rear_to_center * np.cos(yaw), y + rear_to_center * np.sin(yaw)

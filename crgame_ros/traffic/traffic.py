@@ -12,24 +12,40 @@ from numpy.typing import NDArray
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.agents import Agents, FREE, NOBODY
 from crgame_ros.traffic.car_following import CAR_FOLLOWING, CarFollowing
 from crgame_ros.traffic.changing import LaneChanges
 from crgame_ros.traffic.conflicts import Conflicts
-from crgame_ros.traffic.courtesy import fade_relief
-from crgame_ros.traffic.crossings import CrossingRules, Crossings
+from crgame_ros.traffic.courtesy import fade_relief, relief_at_change
+from crgame_ros.traffic.crossings import CrossingRules, Crossings, queues, Situation
 from crgame_ros.traffic.halting_lines import HaltingLines
-from crgame_ros.traffic.junctions import agent_arrivals, other_arrivals, passages
+from crgame_ros.traffic.junctions import arrivals, passages
 from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import ahead, LaneOrder, least, look_distance, Pairs, Ways, ways
-from crgame_ros.traffic.longitudinal import changing_pairs, Longitudinal
+from crgame_ros.traffic.leaders import (
+    ahead,
+    Corridors,
+    least,
+    look_distance,
+    nearest,
+    Pairs,
+    Ways,
+    ways,
+)
+from crgame_ros.traffic.longitudinal import (
+    AT_END,
+    AT_LINE,
+    halts_before,
+    Longitudinal,
+    smoothed,
+)
 from crgame_ros.traffic.motion import Motion
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.spawning import Adopted, slot_descriptions, Spawner
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.swerving import Swerving
+from crgame_ros.traffic.waiting import break_circles, hopeless, INSISTS, LAST_RESORT, WAITS
 from crgame_ros.traffic.world import agent_bodies, Others, WorldView
 
 # Slots for arrivals, where the game says nothing: one for so much lane, and at most so many [m].
@@ -41,6 +57,9 @@ TAPER_COST = 250.0
 # Room before a standing obstacle from which one gets into the next lane [m].
 SWING_OUT = 10.0
 CLOSE = 1.3
+# Whoever stands behind somebody who stands, with less than this between them, queues [m].
+QUEUE = 12.0
+NO_REFERENCE = np.empty(0)
 
 
 class Traffic:
@@ -81,6 +100,10 @@ class Traffic:
                                     spec.politeness, spec.cooperative, time_step_s)
         self._crossings = Crossings(self._conflicts, CrossingRules(), time_step_s)
         self._swerving = Swerving(self._graph, self._routes)
+        self._waiting, self._insisting, self._last_resort = (
+            round(seconds / time_step_s) for seconds in (WAITS, INSISTS, LAST_RESORT))
+        # Agents taken off the road because they stood in a circle that nobody could open.
+        self.taken_off = 0
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
         self._spawner = Spawner(self._graph, self._routes, self._conflicts, self._longitudinal,
                                 adopted, spec.flow, spec.speed_factor, spec.speed_spread,
@@ -139,7 +162,7 @@ class Traffic:
         slots = np.flatnonzero(agents.active)
         if len(slots):
             self._lines.show(others.signals)
-            entries = place(self._graph, self._cells, Bodies.join(
+            entries = place(self._graph.table, self._cells.table, Bodies.join(
                 [bodies, agent_bodies(agents)]))
             standing = _standing(entries, self._others.standing(others))
             if spec.swerve:
@@ -157,74 +180,105 @@ class Traffic:
                 standing: NDArray[np.bool_]) -> FloatArray:
         """Give the accelerations (A) of the agents; begin lane changes, enter junctions."""
         agents, model, long = self._agents, self._model, self._longitudinal
+        lanes, following = self._graph.table, self._routes.next
         speed = agents.speed[slots]
-        horizon = look_distance(speed)
-        order = LaneOrder(entries)
-        way = ways(self._graph, self._routes, agents.lane[slots], agents.s[slots],
-                   agents.destination[slots], horizon)
-        desired = long.desired_speed(way, agents.s[slots], agents.factor[slots])
-        pairs = self._ahead(slots, way, entries, order)
-        gap = least(pairs.agent, pairs.gap, len(slots), np.inf)
-        agents.relief[slots] = np.where(np.isinf(gap), 0.0, fade_relief(
-            agents.relief[slots], gap, model.desired_gap(speed), self._time_step_s))
-        acceleration = long.behind(agents, slots, desired, pairs, entries)
-        row, leaving = changing_pairs(self._graph, self._routes, agents, slots, entries, order,
-                                      horizon)
-        if len(row):
-            # Whoever steers out from behind an obstacle gets nearer to it than s0.
-            leaving.gap[standing[leaving.entry]] += CLOSE
-            acceleration[row] = np.minimum(acceleration[row], long.behind(
-                agents, slots[row], desired[row], leaving, entries))
+        way = ways(lanes, following, agents.lane[slots], agents.s[slots],
+                   agents.destination[slots], look_distance(speed))
+        desired, limit = long.speeds(way, agents, slots)
+        corridor = self._corridors(slots)
+        pairs = ahead(lanes, entries, way, corridor, self._swerving.reference)
+        gap = self._follow(slots, pairs, entries)
+        acceleration = np.minimum(limit, long.behind(
+            agents, slots, desired, pairs, entries, (corridor.low, corridor.high)))
+        self._mind_left_lanes(slots, desired, entries, standing, acceleration)
         blocked = least(pairs.agent, np.where(standing[pairs.entry], pairs.gap, np.inf),
                         len(slots), np.inf)
         halt = np.minimum(self._junctions(k, slots, way, entries, pairs, desired),
                           self._before_obstacles(slots, blocked))
-        acceleration = np.minimum(acceleration, long.before_line(speed, desired, halt))
-        acceleration = np.minimum(acceleration, long.before_end(
-            speed, self._lane_ends(way, agents.length[slots])))
+        acceleration = np.minimum(acceleration, halts_before(speed, halt, AT_LINE))
+        acceleration = np.minimum(acceleration, halts_before(
+            speed, self._lane_ends(way, agents.length[slots]), AT_END))
         if self._spec.lane_changes:
             acceleration = np.minimum(acceleration, self._changes.decide(
-                k, agents, slots, desired, acceleration, gap, blocked, standing, entries, order,
-                way))
+                k, agents, slots, desired, acceleration, gap, blocked, standing, entries, way))
+        acceleration = smoothed(agents.acceleration[slots], acceleration, speed,
+                                self._time_step_s)
         acceleration = np.maximum(acceleration, -model.max_deceleration)
         waits = (speed < STANDING) & (acceleration < 0.5)
         agents.waits[slots] = np.where(waits, agents.waits[slots] + 1, 0)
         return acceleration
 
-    def _ahead(self, slots: IntArray, way: Ways, entries: Entries, order: LaneOrder) -> Pairs:
-        """Find what is ahead in the agents' lanes, beside the references that they follow."""
-        agents, reference = self._agents, self._swerving.reference
-        middle = np.clip(0.5 * (entries.rear + entries.front), 0.0,
-                         self._graph.length[entries.lane])
-        shift = reference[self._graph.rows(entries.lane, middle)]
-        here = reference[self._graph.rows(agents.lane[slots], agents.s[slots])]
+    def _corridors(self, slots: IntArray) -> Corridors:
+        """Give what agents take of their lanes, from the references that they follow."""
+        agents, graph = self._agents, self._graph
+        here = self._swerving.reference[graph.rows(agents.lane[slots], agents.s[slots])]
         off, half = agents.d[slots] - here, 0.5 * agents.width[slots]
-        return ahead(entries, order, way, slots, agents.length[slots],
-                     np.minimum(off, 0.0) - half, np.maximum(off, 0.0) + half, shift)
+        length = agents.length[slots]
+        return Corridors(slots, length, agents.rear_to_center[slots] + 0.5 * length,
+                         np.minimum(off, 0.0) - half, np.maximum(off, 0.0) + half)
+
+    def _follow(self, slots: IntArray, pairs: Pairs, entries: Entries) -> FloatArray:
+        """Note who is next ahead, and how much nearer than usual; give the gaps (A) to it."""
+        agents, model = self._agents, self._model
+        speed = agents.speed[slots]
+        gap, leader = nearest(pairs, entries.owner, len(slots))
+        usual = model.desired_gap(speed)
+        relief = np.where(np.isinf(gap), 0.0, fade_relief(
+            agents.relief[slots], gap, usual, self._time_step_s))
+        if self._spec.cooperative:
+            # Somebody has cut in: the gap opens gradually, as after a change that was agreed upon.
+            new = (leader != agents.leader[slots]) & np.isfinite(gap)
+            relief = np.where(new, np.maximum(relief, relief_at_change(gap, usual)), relief)
+        agents.relief[slots] = relief
+        agents.leader[slots] = leader
+        return gap
+
+    def _mind_left_lanes(self, slots: IntArray, desired: FloatArray, entries: Entries,
+                         standing: NDArray[np.bool_], acceleration: FloatArray) -> None:
+        """Let those who change lanes mind who is ahead in the lane that they leave."""
+        agents, long = self._agents, self._longitudinal
+        row = np.flatnonzero((agents.source[slots] != NOBODY)
+                             & (agents.source[slots] != agents.lane[slots]))
+        if not len(row):
+            return
+        who = slots[row]
+        lane, center = agents.source[who], agents.centers()[who]
+        guess = agents.s[who] * self._graph.length[lane] / self._graph.length[agents.lane[who]]
+        s, d, _ = self._graph.project(lane, center[:, 0], center[:, 1], guess)
+        way = ways(self._graph.table, self._routes.next, lane, s, agents.destination[who],
+                   look_distance(agents.speed[who]))
+        half, length = 0.5 * agents.width[who], agents.length[who]
+        low, high = d - half, d + half
+        pairs = ahead(self._graph.table, entries, way, Corridors(
+            who, length, agents.rear_to_center[who] + 0.5 * length, low, high), NO_REFERENCE)
+        # Whoever steers out from behind an obstacle gets nearer to it than s0.
+        pairs.gap[standing[pairs.entry]] += CLOSE
+        acceleration[row] = np.minimum(acceleration[row], long.behind(
+            agents, who, desired[row], pairs, entries, (low, high)))
 
     def _junctions(self, k: int, slots: IntArray, way: Ways, entries: Entries, pairs: Pairs,
                    desired: FloatArray) -> FloatArray:
         """Give the distances (A) of the fronts from lights and junctions to halt at, or inf."""
         agents, graph, conflicts = self._agents, self._graph, self._conflicts
-        speed, length = agents.speed[slots], agents.length[slots]
-        light = self._lines.halts(way, speed, length)
+        light = self._lines.halts(way, agents.speed[slots], agents.length[slots])
         if not len(conflicts):
             return light
-        passage = passages(graph, conflicts, self._lines.line, way, length)
+        passage = passages(conflicts.table, self._lines.line, way, agents.table, slots)
         before = way.lane[np.arange(len(slots)), np.maximum(passage.first - 1, 0)]
         sign = self._lines.stop_sign[before] & (passage.first > 0)
-        arrivals = agent_arrivals(graph, conflicts, way, agents.previous[slots], speed, length)
-        others = other_arrivals(graph, conflicts, entries, self._others.drives)
-        lead = np.maximum(entries.speed[pairs.entry], 0.0)
-        # A leader that drives on makes room itself.
-        stop = np.where(lead > STANDING * 10.0, np.inf, pairs.distance + lead**2 / 6.0)
-        rear_stop = least(pairs.agent, stop, len(slots), np.inf)
-        owner = entries.owner[pairs.entry]
-        waits = np.where(owner >= 0, agents.grant[np.maximum(owner, 0)] < 0,
-                         lead < STANDING * 10.0) & ~entries.crosses[pairs.entry]
-        queued = least(pairs.agent, np.where(waits, pairs.gap, np.inf), len(slots), np.inf)
-        halt = self._crossings.halts(k, agents, slots, way, passage, arrivals, others, desired,
-                                     rear_stop, light, sign, queued)
+        coming = arrivals(graph.table, conflicts.table, way, agents.table, slots, entries,
+                          self._others.drives, self._others.widths)
+        rear_stop, queued = queues(agents.table, slots, pairs, entries)
+        halt = self._crossings.halts(k, agents, way, passage, coming, Situation(
+            slots, desired, rear_stop, light, sign, queued))
+        behind = (agents.blocker[slots] == FREE) & (queued < QUEUE)
+        agents.blocker[slots[behind]] = agents.leader[slots[behind]]
+        agents.blocker[slots[np.isfinite(light)]] = FREE
+        if (agents.waits[slots] > self._waiting).any():
+            break_circles(k, agents.table, slots, self._waiting, self._insisting)
+            stuck = hopeless(agents.table, slots, self._last_resort)
+            agents.remove(stuck, k)
+            self.taken_off += len(stuck)
         return np.minimum(light, halt)
 
     def _before_obstacles(self, slots: IntArray, blocked: FloatArray) -> FloatArray:
@@ -239,9 +293,10 @@ class Traffic:
     def _lane_ends(self, way: Ways, length: FloatArray) -> FloatArray:
         """Give the distances (A) of the fronts from the end of lanes that end on the road."""
         row = np.arange(len(length))
-        last = np.maximum((way.lane >= 0).sum(axis=1) - 1, 0)
-        drops = self._routes.drops[way.lane[row, last]]
-        return np.where(drops, way.reach(self._graph) - 0.5 * length - 1.0, np.inf)
+        last = way.count - 1
+        lane = way.lane[row, last]
+        reach = way.offset[row, last] + self._graph.length[lane]
+        return np.where(self._routes.drops[lane], reach - 0.5 * length - 1.0, np.inf)
 
     def _leave(self, k: int, slots: IntArray) -> None:
         """Take away who has left the map, and give new destinations to who needs one."""
@@ -258,7 +313,7 @@ class Traffic:
 
 def _standing(entries: Entries, standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which entries (E) belong to others that stand for good."""
-    result = np.zeros(len(entries), dtype=bool)
+    result = np.zeros(len(entries.owner), dtype=bool)
     other = entries.owner < 0
     result[other] = standing[-1 - entries.owner[other]]
     return result

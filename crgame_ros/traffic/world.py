@@ -22,6 +22,8 @@ PIECE = 6.0
 # Others that have stood this long are swerved around [s].
 STANDING_TIME = 10.0
 STANDING_SPEED = 0.1
+# Recorded speeds jump; nobody brakes or accelerates by more than this [m/s^2].
+BELIEVED = 8.0
 
 
 @dataclass(frozen=True)
@@ -48,16 +50,19 @@ class Others:
     :param descriptions: what they look like, in the order of every `WorldView`.
     :param time_step_s: Delta t_c [s]
 
-    Attribute `drives` (O): which are vehicles that go where lanes lead.
+    Attributes `drives` (O): which are vehicles that go where lanes lead; `widths` (O) [m].
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription], time_step_s: float) -> None:
         self._descriptions = tuple(descriptions)
         self.drives: NDArray[np.bool_] = np.array(
             [x.role is not Role.STATIC and x.type in VEHICLES for x in descriptions], dtype=bool)
+        self.widths: FloatArray = np.array([x.shape.width for x in descriptions], dtype=float)
         self._parked = np.array([x.role is Role.STATIC or x.type in PARKED
                                  for x in descriptions], dtype=bool)
         self._still = np.zeros(len(self._descriptions), dtype=np.int64)
+        self._time_step_s, self._seen_k = time_step_s, -2**62
+        self._speed = self._acceleration = np.zeros(len(self._descriptions))
         self._long_enough = round(STANDING_TIME / time_step_s)
         of, shift, length = [], [], []
         for number, x in enumerate(descriptions):
@@ -82,8 +87,22 @@ class Others:
         poses = world.poses[of].copy()
         poses[:, 0] += self._shift[piece] * np.cos(poses[:, 2])
         poses[:, 1] += self._shift[piece] * np.sin(poses[:, 2])
-        return Bodies(poses, world.velocities[of], self._length[piece], self._width[piece],
-                      -1 - of, self._time[piece], np.full(len(of), NOBODY))
+        return Bodies(poses, world.velocities[of], self._accelerations(world)[of],
+                      self._length[piece], self._width[piece], -1 - of, self._time[piece],
+                      np.full(len(of), NOBODY))
+
+    def _accelerations(self, world: WorldView) -> FloatArray:
+        """Give how the others (O) speed up along their headings, from one tick to the next."""
+        yaw = world.poses[:, 2]
+        speed = world.velocities[:, 0] * np.cos(yaw) + world.velocities[:, 1] * np.sin(yaw)
+        if world.k == self._seen_k + 1:
+            change = (speed - self._speed) / self._time_step_s
+            self._acceleration = np.where(
+                np.isfinite(change), np.clip(change, -BELIEVED, BELIEVED), 0.0)
+        elif world.k != self._seen_k:
+            self._acceleration = np.zeros(len(speed))
+        self._seen_k, self._speed = world.k, speed
+        return self._acceleration
 
     def standing(self, world: WorldView) -> NDArray[np.bool_]:
         """Tell which others (O) are there and stand for good, as far as one can tell."""
@@ -97,5 +116,6 @@ def agent_bodies(agents: Agents) -> Bodies:
     """Give the bodies of the agents on the road; those changing lanes claim the new one."""
     slots = np.flatnonzero(agents.active)
     claim = np.where(agents.source[slots] != NOBODY, agents.lane[slots], NOBODY)
-    return Bodies(agents.centers()[slots], agents.velocities()[slots], agents.length[slots],
-                  agents.width[slots], slots, np.zeros(len(slots)), claim)
+    return Bodies(agents.centers()[slots], agents.velocities()[slots],
+                  agents.acceleration[slots], agents.length[slots], agents.width[slots], slots,
+                  np.zeros(len(slots)), claim)

@@ -1,0 +1,111 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The lanes as flat tables, and the curvilinear frame of a lane, for compiled loops."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.traffic.compiled import compiled
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+class LaneTable(NamedTuple):
+    """
+    What `LaneGraph` knows, as arrays over lanes (L) and over the points of their centre lines.
+
+    The points of a lane are `first[lane]:first[lane] + count[lane]`, `step[lane]` apart.
+
+    :param first, count: (L) rows of the points.
+    :param length, step: (L) [m]
+    :param limit: (L) speed limit [m/s]
+    :param left, right: (L) neighbours of the same direction, or -1.
+    :param successors, predecessors: (L, S) filled up with -1.
+    :param x, y, yaw, curvature, half_width: of the points [m, rad, 1/m, m]
+    """
+
+    first: IntArray
+    count: IntArray
+    length: FloatArray
+    step: FloatArray
+    limit: FloatArray
+    left: IntArray
+    right: IntArray
+    successors: IntArray
+    predecessors: IntArray
+    x: FloatArray
+    y: FloatArray
+    yaw: FloatArray
+    curvature: FloatArray
+    half_width: FloatArray
+
+
+@compiled
+def nearest_row(lanes: LaneTable, lane: int, s: float) -> int:
+    """Give the row of the point nearest to arc length s."""
+    row = int(np.rint(s / lanes.step[lane]))
+    return int(lanes.first[lane] + min(max(row, 0), lanes.count[lane] - 1))
+
+
+@compiled
+def point_on(lanes: LaneTable, lane: int, s: float) -> tuple[float, float, float]:
+    """Give x, y and heading of a centre line at arc length s; straight on beyond its ends."""
+    share = s / lanes.step[lane]
+    row = int(min(max(math.floor(share), 0.0), lanes.count[lane] - 2.0))
+    share -= row
+    row += lanes.first[lane]
+    inside = min(max(share, 0.0), 1.0)
+    x, y, yaw = lanes.x[row], lanes.y[row], lanes.yaw[row]
+    return (x + share * (lanes.x[row + 1] - x), y + share * (lanes.y[row + 1] - y),
+            yaw + inside * (lanes.yaw[row + 1] - yaw))
+
+
+@compiled
+def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
+               rounds: int) -> tuple[float, float, float]:
+    """
+    Find a position in the coordinates of a lane, near an arc length that is guessed.
+
+    :param rounds: of correction; one is enough for a guess that is off by centimetres.
+    :return: s [m], d [m] and the lane's heading there [rad]
+    """
+    s, d, yaw = guess, 0.0, 0.0
+    for _ in range(rounds):
+        lane_x, lane_y, yaw = point_on(lanes, lane, s)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        east, north = x - lane_x, y - lane_y
+        s += east * cos + north * sin
+        d = north * cos - east * sin
+    return s, d, yaw
+
+
+@compiled
+def angle_between(a: float, b: float) -> float:
+    """Give the angle from b to a in [-pi, pi] [rad]."""
+    turn = a - b
+    return turn - 2.0 * math.pi * float(np.rint(turn / (2.0 * math.pi)))
+
+
+@compiled
+def project_all(lanes: LaneTable, lane: IntArray, x: FloatArray, y: FloatArray,
+                guess: FloatArray, rounds: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Find positions (N) in the coordinates of lanes (N); see `project_on`."""
+    s, d, yaw = np.empty(len(x)), np.empty(len(x)), np.empty(len(x))
+    for i in range(len(x)):
+        s[i], d[i], yaw[i] = project_on(lanes, lane[i], x[i], y[i], guess[i], rounds)
+    return s, d, yaw
+
+
+@compiled
+def poses_on(lanes: LaneTable, lane: IntArray, s: FloatArray, d: FloatArray) -> FloatArray:
+    """Give the poses (N, 3) at arc lengths s and offsets d to the left of lanes (N)."""
+    result = np.empty((len(s), 3))
+    for i in range(len(s)):
+        x, y, yaw = point_on(lanes, lane[i], s[i])
+        result[i, 0], result[i, 1] = x - d[i] * math.sin(yaw), y + d[i] * math.cos(yaw)
+        result[i, 2] = yaw
+    return result

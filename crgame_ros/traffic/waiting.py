@@ -1,0 +1,73 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who waits for whom: circles of waiting are found, and one of each goes first."""
+
+import numpy as np
+
+from crgame_ros.traffic.agents import AgentTable
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.lane_graph import IntArray
+
+# Standing for so many seconds is waiting; who insists does so for so long [s].
+WAITS, INSISTS = 2.0, 6.0
+# Who has stood this long in a circle that nobody can open is taken off the road [s].
+LAST_RESORT = 45.0
+
+
+@compiled
+def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int, insists: int) -> int:
+    """
+    Let one agent of each circle of waiting go first.
+
+    Each standing agent waits for one other at most (`AgentTable.blocker`); following these leads
+    out, or around. In a circle it is the one that has insisted longest ago.
+
+    :param waits: ticks of standing that count as waiting.
+    :param insists: ticks for which it goes first.
+    :return: how many circles there are.
+    """
+    seen = np.full(len(agents.x), -1, np.int64)
+    circles = 0
+    for slot in slots:
+        current = slot
+        while current >= 0 and agents.waits[current] > waits and seen[current] < 0:
+            seen[current] = slot
+            current = agents.blocker[current]
+        if current >= 0 and agents.waits[current] > waits and seen[current] == slot:
+            circles += 1
+            chosen = _least_insistent(k, agents, current)
+            if chosen >= 0:
+                agents.insists_until[chosen] = k + insists
+    return circles
+
+
+@compiled
+def _least_insistent(k: int, agents: AgentTable, start: int) -> int:
+    """Choose who in a circle is to insist: none while one does, nobody who waits for a leader."""
+    chosen, current = -1, start
+    while True:
+        if agents.insists_until[current] > k:
+            return -1
+        if agents.blocker[current] != agents.leader[current] and (
+                chosen < 0 or agents.insists_until[current] < agents.insists_until[chosen]):
+            chosen = current
+        current = agents.blocker[current]
+        if current == start:
+            return int(chosen)
+
+
+@compiled
+def hopeless(agents: AgentTable, slots: IntArray, ticks: int) -> IntArray:
+    """List the agents in circles that have stood for so many ticks, one of each circle."""
+    found = np.empty(len(slots), np.int64)
+    count = 0
+    seen = np.full(len(agents.x), -1, np.int64)
+    for slot in slots:
+        current = slot
+        while current >= 0 and agents.waits[current] > ticks and seen[current] < 0:
+            seen[current] = slot
+            current = agents.blocker[current]
+        if current >= 0 and agents.waits[current] > ticks and seen[current] == slot:
+            found[count] = current
+            count += 1
+    return found[:count]
