@@ -1,0 +1,103 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Driving a scenario with dense traffic and writing down what can be seen of it."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.simulation.traffic_setup import adopted_columns, MOTION_RATE
+from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.spec import TrafficSpec
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world import WorldView
+from judge.history import FloatArray, History, rectangle
+
+
+@dataclass(frozen=True)
+class Drive:
+    """
+    What was driven.
+
+    :param history: what could be seen.
+    :param recording: of all obstacles of the file, as recorded.
+    :param scenario: the file.
+    """
+
+    history: History
+    recording: History | None
+    scenario: LoadedScenario
+
+
+def drive(path: Path, spec: TrafficSpec, seconds: float, seed: int = 0) -> Drive:
+    """
+    Drive a scenario file with traffic alone; recorded vehicles as the spec says.
+
+    What is no agent (pedestrians, parked cars) is where it is recorded, at its time.
+    """
+    loaded = load_scenario(path)
+    network, lights = RoadNetwork(loaded.scenario.lanelet_network), TrafficLights(loaded.scenario)
+    obstacles = ScenarioObstacles(loaded)
+    columns = adopted_columns(spec, obstacles, network)
+    rest = np.array([i for i in range(len(obstacles.descriptions)) if i not in columns],
+                    dtype=np.int64)
+    others = tuple(obstacles.descriptions[i] for i in rest)
+    adopted = [Adopted(obstacles.descriptions[i], obstacles.first_step(i), *obstacles.track(i))
+               for i in columns]
+
+    def world(k: int) -> WorldView:
+        states = obstacles.states_at(k)
+        return WorldView(k, states.poses[rest], states.velocities[rest], lights.states_at(k))
+
+    dt_s, k0 = loaded.time_step_s, min(0, obstacles.first_k)
+    traffic = Traffic(spec, network, loaded.scenario, others, adopted, dt_s,
+                      max(1, round(dt_s * MOTION_RATE)), seed, k0, world(k0))
+    ticks = range(k0, k0 + round(seconds / dt_s) + 1)
+    poses, velocities, shown = [], [], []
+    light_ids = tuple(sorted(lights.states_at(k0)))
+    for k in ticks:
+        seen, states = world(k), traffic.states
+        poses.append(np.concatenate((states.poses, seen.poses)))
+        velocities.append(np.concatenate((states.velocities, seen.velocities)))
+        shown.append([seen.signals[i] for i in light_ids])
+        traffic.advance(seen)
+    descriptions = (*traffic.descriptions, *others)
+    history = _trimmed(_history(dt_s, descriptions, len(traffic.descriptions), np.array(poses),
+                                np.array(velocities)))
+    return Drive(replace(history, light_ids=light_ids, lights=np.array(shown, dtype=np.str_)),
+                 _history(dt_s, obstacles.descriptions, len(obstacles.descriptions),
+                          obstacles.poses, obstacles.velocities), loaded)
+
+
+def _history(dt_s: float, descriptions: tuple[ObjectDescription, ...], agents: int,
+             poses: FloatArray, velocities: FloatArray) -> History:
+    return History(dt_s, tuple(x.id for x in descriptions), tuple(
+        'human' if x.role.is_ego else x.type for x in descriptions), agents,
+        tuple(outline(x.shape) for x in descriptions), poses, velocities)
+
+
+def _trimmed(history: History) -> History:
+    """Leave out who never came."""
+    came = np.flatnonzero(history.present.any(axis=0))
+    return replace(
+        history, ids=tuple(history.ids[i] for i in came),
+        kinds=tuple(history.kinds[i] for i in came), agents=int((came < history.agents).sum()),
+        outlines=tuple(history.outlines[i] for i in came), poses=history.poses[:, came],
+        velocities=history.velocities[:, came])
+
+
+def outline(shape: Shape) -> FloatArray:
+    """Give the corners (n, 2) of a shape around its centre [m]."""
+    if shape.kind == 'polygon':
+        return np.array(shape.vertices)
+    if shape.kind == 'circle':
+        angle = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+        return shape.radius * np.stack((np.cos(angle), np.sin(angle)), axis=-1)
+    return rectangle(shape.length, shape.width)
