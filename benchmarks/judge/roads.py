@@ -24,6 +24,8 @@ BEYOND = 25.0
 # Lanes cross or merge where they share this area [m^2].
 SHARED = 1.0
 ASTRAY = 1.2
+# A lane that begins further from another's end does not follow it [m].
+MEET = 3.0
 
 
 @dataclass(frozen=True)
@@ -61,15 +63,20 @@ class JudgedRoads:
         self.lanes = [Lane.of(x) for x in self.lanelets]
         self.areas = np.array([shapely.make_valid(shapely.Polygon(np.concatenate(
             (x.left_vertices[:, :2], x.right_vertices[::-1, :2])))) for x in self.lanelets])
-        self.successors = [self._known(x.successor) for x in self.lanelets]
-        self.predecessors = [self._known(x.predecessor) for x in self.lanelets]
+        links = sorted({link for i, x in enumerate(self.lanelets) for link in (
+            *((i, self.index.get(j, i)) for j in x.successor),
+            *((self.index.get(j, i), i) for j in x.predecessor)) if self._meet(*link)})
+        self.successors = [[j for i, j in links if i == k] for k in range(len(self.lanelets))]
+        self.predecessors = [[i for i, j in links if j == k] for k in range(len(self.lanelets))]
         self.left = [self._beside(x.adj_left, x.adj_left_same_direction) for x in self.lanelets]
         self.right = [self._beside(x.adj_right, x.adj_right_same_direction)
                       for x in self.lanelets]
         self._drivable = np.array([not x.lanelet_type & NO_LANE for x in self.lanelets])
 
-    def _known(self, ids: list[int]) -> list[int]:
-        return [self.index[i] for i in ids if i in self.index]
+    def _meet(self, lane: int, onto: int) -> bool:
+        """Tell whether a lane does begin where another ends; some files say so of others."""
+        gap = self.lanes[onto].vertices[0] - self.lanes[lane].vertices[-1]
+        return lane != onto and float(np.hypot(*gap)) < MEET
 
     def _beside(self, lanelet: int | None, same: bool | None) -> int:
         return self.index.get(lanelet, -1) if lanelet is not None and same else -1

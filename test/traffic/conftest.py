@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The helpers of the traffic tests are in traffic_support.py beside this file."""
+"""Helpers are in traffic_support.py beside this file, the judge in benchmarks/judge."""
 
 from pathlib import Path
 import sys
@@ -8,6 +8,7 @@ import sys
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'benchmarks'))
 
 
 @pytest.fixture
