@@ -12,7 +12,7 @@ something that is no agent and stands, one is `blocked`, which is told apart.
 
 import numpy as np
 
-from judge.history import Event, FloatArray, History, IntArray
+from judge.history import BoolArray, Event, FloatArray, History, IntArray
 from judge.lights import Stop, stops
 from judge.roads import JudgedRoads
 
@@ -48,7 +48,7 @@ def stands(history: History, roads: JudgedRoads) -> list[Event]:
             counter[moved] = 0.0
         stood[~moved] += tick_s
         waiting = np.flatnonzero(history.present[row, :count] & (stood > 0.0))
-        reasons = _reasons(history, lines, row, waiting, stood, unexplained)
+        reasons = _reasons(history, lines, row, waiting, unexplained)
         for agent, (reason, ahead) in reasons.items():
             unexplained[agent] = 0.0 if reason == EXPLAINED else (
                 unexplained[agent] + (tick_s if reason == FREE else 0.0))
@@ -63,13 +63,11 @@ def stands(history: History, roads: JudgedRoads) -> list[Event]:
 
 
 def _reasons(history: History, lines: list[Stop], row: int, waiting: IntArray,
-             stood: FloatArray, unexplained: FloatArray) -> dict[int, tuple[str, str]]:
+             unexplained: FloatArray) -> dict[int, tuple[str, str]]:
     """Give the state of everybody who stands at a time, and who is ahead."""
-    if not (stood[waiting] > 0.3 * LONG_S).any():
-        return dict.fromkeys(waiting.tolist(), (EXPLAINED, ''))
-    ahead = {agent: _ahead(history, row, agent) for agent in waiting.tolist()}
-    lit = {agent: _at_light(history, lines, row, agent) or _human(history, row, agent)
-           for agent in waiting.tolist()}
+    ahead = dict(zip(waiting.tolist(), _ahead(history, row, waiting).tolist(), strict=True))
+    lit = dict(zip(waiting.tolist(), (_at_light(history, lines, row, waiting) | _human(
+        history, row, waiting)).tolist(), strict=True))
     result = {}
     for agent in waiting.tolist():
         path = [agent]
@@ -97,46 +95,50 @@ def _reasons(history: History, lines: list[Stop], row: int, waiting: IntArray,
     return result
 
 
-def _ahead(history: History, row: int, agent: int) -> int:
-    """Find who stands right ahead, or -1."""
-    x, y, yaw = history.poses[row, agent]
-    off = history.poses[row, :, :2] - (x, y)
-    along = off @ (np.cos(yaw), np.sin(yaw))
-    aside = off @ (-np.sin(yaw), np.cos(yaw))
-    turn = history.poses[row, :, 2] - yaw
+def _ahead(history: History, row: int, agents: IntArray) -> IntArray:
+    """Find who stands right ahead of agents (A), or -1."""
+    poses, here = history.poses[row], np.flatnonzero(
+        history.present[row] & (np.abs(history.speed[row]) < SLOW))
+    along, aside = _seen(poses[agents], poses[here])
+    turn = poses[here, 2] - poses[agents, 2, None]
     cos, sin = np.abs(np.cos(turn)), np.abs(np.sin(turn))
-    gap = along - 0.5 * (history.length[agent] + history.length * cos + history.width * sin)
-    wide = 0.5 * (history.width[agent] + history.width * cos + history.length * sin)
-    with np.errstate(invalid='ignore'):
-        right = (along > 0.0) & (gap < QUEUE_GAP) & (np.abs(aside) < wide + QUEUE_ASIDE) & (
-            np.abs(history.speed[row]) < SLOW)
-    right[agent] = False
-    found = np.flatnonzero(right)
-    return int(found[gap[found].argmin()]) if len(found) else -1
+    length, width = history.length[here], history.width[here]
+    gap = along - 0.5 * (history.length[agents, None] + length * cos + width * sin)
+    wide = 0.5 * (history.width[agents, None] + width * cos + length * sin)
+    gap[(along <= 0.0) | (gap > QUEUE_GAP) | (np.abs(aside) > wide + QUEUE_ASIDE)
+        | (agents[:, None] == here)] = np.inf
+    if not gap.size:
+        return np.full(len(agents), -1)
+    nearest = gap.argmin(axis=1)
+    return np.where(np.isfinite(gap.min(axis=1)), here[nearest], -1)
 
 
-def _at_light(history: History, lines: list[Stop], row: int, agent: int) -> bool:
-    """Tell whether a light that is not green lies ahead."""
-    front, yaw = history.fronts[row, agent], history.poses[row, agent, 2]
+def _at_light(history: History, lines: list[Stop], row: int, agents: IntArray) -> BoolArray:
+    """Tell of agents (A) whether a light that is not green lies ahead."""
+    front, yaw = history.fronts[row, agents], history.poses[row, agents, 2]
+    result = np.zeros(len(agents), dtype=bool)
     for stop in lines:
+        columns = [history.light_ids.index(i) for i, _ in stop.lights if i in history.light_ids]
+        if history.lights is None or not np.isin(
+                history.lights[row, columns], ('red', 'redYellow', 'yellow')).any():
+            continue
         beyond, aside = stop.place(front)
         half = 0.5 * float(np.hypot(*(stop.right - stop.left)))
-        if (-LIGHT_AHEAD < beyond < 1.5 and abs(aside) < half + 1.0
-                and np.cos(yaw) * stop.ahead[0] + np.sin(yaw) * stop.ahead[1] > 0.5):
-            columns = [history.light_ids.index(i) for i, _ in stop.lights
-                       if i in history.light_ids]
-            if history.lights is not None and np.isin(
-                    history.lights[row, columns], ('red', 'redYellow', 'yellow')).any():
-                return True
-    return False
+        agrees = np.cos(yaw) * stop.ahead[0] + np.sin(yaw) * stop.ahead[1] > 0.5
+        result |= (beyond > -LIGHT_AHEAD) & (beyond < 1.5) & (np.abs(aside) < half + 1.0) & agrees
+    return result
 
 
-def _human(history: History, row: int, agent: int) -> bool:
-    """Tell whether a human is near and not behind."""
-    humans = [i for i, kind in enumerate(history.kinds) if kind in HUMANS]
-    x, y, yaw = history.poses[row, agent]
-    for i in humans:
-        off = history.poses[row, i, :2] - (x, y)
-        if np.hypot(*off) < HUMAN_NEAR and off @ (np.cos(yaw), np.sin(yaw)) > 0.0:
-            return True
-    return False
+def _human(history: History, row: int, agents: IntArray) -> BoolArray:
+    """Tell of agents (A) whether a human is near and not behind."""
+    humans = [i for i, kind in enumerate(history.kinds)
+              if kind in HUMANS and history.present[row, i]]
+    along, aside = _seen(history.poses[row, agents], history.poses[row, humans])
+    return np.asarray(((along > 0.0) & (np.hypot(along, aside) < HUMAN_NEAR)).any(axis=1))
+
+
+def _seen(poses: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give places (O, 3) along and aside as seen from poses (A, 3), each (A, O) [m]."""
+    off = others[None, :, :2] - poses[:, None, :2]
+    cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+    return off[..., 0] * cos + off[..., 1] * sin, off[..., 1] * cos - off[..., 0] * sin

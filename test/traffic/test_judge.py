@@ -198,8 +198,11 @@ def test_stands_are_explained_by_lights_queues_and_humans_only() -> None:
                        kinds=['car', 'car', 'pedestrian']), lanes) == []
     parked = stands(seen(second, first, light=none, others=1), lanes)
     assert [(x.what, x.ids) for x in parked] == [('blocked', ('t0',))]
-    briefly = seen(first[:801], second[:801], light=none[:801])
-    assert stands(briefly, lanes) == []
+    # The first stands from 0 s on.
+    for seconds, expected in ((88, 0), (93, 1)):
+        ticks = 10 * seconds + 1
+        assert len(stands(seen(first[:ticks], second[:ticks], light=none[:ticks]),
+                          lanes)) == expected
     # Each has the other's flank right ahead.
     facing = seen(standing(-5.0, 0.0, 120.0), standing(1.0, 0.5, 120.0, np.pi), light=none)
     assert {x.ids for x in stands(facing, lanes)} == {('t0',), ('t1',)}
