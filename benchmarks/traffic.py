@@ -3,30 +3,45 @@
 """
 What traffic costs: time for a scenario time step against the number of agents.
 
-A step is one decision of all agents (10 Hz) and ten steps of their motion (100 Hz). On the
-motorway (three lanes, 25 vehicles per kilometre and lane) vehicles of highway-env start at the
-same places with the same speeds and desired speeds; nothing is drawn. `as it is` is what its
-environments do in 0.1 s at a simulation frequency of 100 Hz: every vehicle decides (IDM, MOBIL
-once a second) at each of the ten steps, and every pair is checked for collision. `at our rates`
-decides once and checks no collisions, as ours. In the town, a grid of streets with crossings,
-there is nothing like ours in highway-env.
+A step is one decision of all agents (10 Hz) and ten steps of their motion (100 Hz), in two
+dimensions: steering, yaw, where every footprint is. On the motorway (three lanes, 25 vehicles per
+kilometre and lane) others start at the same places with the same speeds and desired speeds;
+nothing is drawn; each is timed in a process of its own.
+
+SUMO (its default models at 0.1 s) moves vehicles along lanes: no steering or yaw, lane changes
+in one step, no footprints; nobody else on the road can be anywhere but in a lane. `positions
+read` also reads all positions, as a user has to. Its town is a grid of as many crossings.
+
+highway-env `as it is` is what its environments do in 0.1 s at a simulation frequency of 100 Hz:
+every vehicle decides (IDM, MOBIL once a second) at each of the ten steps, and every pair is
+checked for collision. `at our rates` decides once and checks no collisions, as ours. It has
+nothing like the town.
+
+The others want a Python of their own, which `--others` names:
+
+  python3 -m venv ~/others
+  ~/others/bin/pip install eclipse-sumo==1.28.0 libsumo==1.28.0 highway-env
+  python benchmarks/traffic.py --others ~/others/bin/python
 """
 
 import argparse
 from collections.abc import Callable
 import cProfile
+import json
 import math
 from pathlib import Path
 import pstats
 import statistics
+import subprocess
 import sys
-import time
+from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'scripts'))
 
-from scenario_traffic import LANE_WIDTH, loaded, motorway, town  # noqa: E402
+from scenario_traffic import BLOCK, LANE_WIDTH, loaded, motorway, town  # noqa: E402
+from traffic_others import timed  # noqa: E402
 
 from crgame_ros.geometry.shape import Shape  # noqa: E402
 from crgame_ros.scenario.objects import ObjectDescription, Role  # noqa: E402
@@ -36,16 +51,9 @@ from crgame_ros.traffic.spec import TrafficSpec  # noqa: E402
 from crgame_ros.traffic.traffic import Traffic  # noqa: E402
 from crgame_ros.traffic.world import WorldView  # noqa: E402
 
-try:
-    from highway_env.road.road import Road
-    from highway_env.road.road import RoadNetwork as OtherNetwork
-    from highway_env.vehicle.behavior import IDMVehicle
-except ImportError as error:
-    Road = None
-    print(f'going on without highway-env ({error}): '
-          f'{sys.executable} -m pip install highway-env')
-
-COUNTS = (10, 20, 50, 100, 200, 500, 1000)
+COUNTS = (10, 100, 1000, 10000)
+# Wanted at most, by agents [ms].
+WANTED = {10: 0.4, 1000: 4.0, 10000: 40.0}
 STEP_S, SUBSTEPS, LANES, LIMIT = 0.1, 10, 3, 120.0 / 3.6
 PER_KM_AND_LANE = 25.0
 # Road ahead of the first: nobody leaves it during a measurement [m].
@@ -86,9 +94,14 @@ def our_motorway(start: Start) -> Traffic:
                    scenario, (), adopted, STEP_S, SUBSTEPS, 0, 0)
 
 
+def town_size(count: int) -> int:
+    """Give the crossings along each side of a town for so many vehicles."""
+    return max(1, round(math.sqrt(count / PER_CROSSING)))
+
+
 def our_town(count: int) -> Traffic:
     """Let agents drive through a town; as many come as leave."""
-    scenario = loaded('Town', town(max(1, round(math.sqrt(count / PER_CROSSING))))).scenario
+    scenario = loaded('Town', town(town_size(count))).scenario
     spec = TrafficSpec(agents=count, flow=900.0, capacity=count)
     return Traffic(spec, RoadNetwork(scenario.lanelet_network), scenario, (), (), STEP_S,
                    SUBSTEPS, 0, 0)
@@ -110,47 +123,28 @@ def present(traffic: Traffic) -> int:
     return int(np.isfinite(traffic.states.poses[:, 0]).sum())
 
 
-def other_motorway(start: Start, as_it_is: bool) -> Callable[[], None]:
-    """Give the work of 0.1 s of highway-env with its vehicles where a start has them."""
-    network = OtherNetwork.straight_road_network(
-        LANES, length=float(start.x.max()) + AHEAD, speed_limit=1.5 * LIMIT)
-    road = Road(network=network, np_random=np.random.RandomState(0))
-    for lane, x, speed, desired in zip(start.lane, start.x, start.speed, start.desired,
-                                       strict=True):
-        index = ('0', '1', LANES - 1 - int(lane))
-        vehicle = IDMVehicle(road, network.get_lane(index).position(x, 0.0), speed=speed,
-                             target_lane_index=index, target_speed=desired)
-        vehicle.check_collisions = as_it_is
-        road.vehicles.append(vehicle)
-
-    def step() -> None:
-        for number in range(SUBSTEPS):
-            if as_it_is or number == 0:
-                road.act()
-            road.step(STEP_S / SUBSTEPS)
-
-    return step
+def others(python: str | None, name: str, place: str, given: dict[str, Any],
+           steps: int) -> list[tuple[str, float, list[float]]]:
+    """Time one of the others in its own Python; nothing where there is none."""
+    if python is None:
+        return []
+    done = subprocess.run(
+        [python, str(Path(__file__).with_name('traffic_others.py')), name, place, str(steps)],
+        input=json.dumps(given), capture_output=True, text=True)
+    if done.returncode:
+        lines = done.stderr.strip().splitlines() or ['no word']
+        print(f'going on without {name}: {lines[-1]}')
+        return []
+    return [(str(x), float(count), times) for x, count, times in json.loads(done.stdout)]
 
 
-def milliseconds(step: Callable[[], None], warm_up: int, count: int,
-                 limit_s: float) -> list[float]:
-    """Time steps, at least three and no more than fit into a time."""
-    for _ in range(warm_up):
-        step()
-    times: list[float] = []
-    until_s = time.perf_counter() + limit_s
-    while len(times) < 3 or (len(times) < count and time.perf_counter() < until_s):
-        start = time.perf_counter()
-        step()
-        times.append((time.perf_counter() - start) * 1e3)
-    return times
-
-
-def report(name: str, count: float, times: list[float]) -> float:
+def report(name: str, count: float, times: list[float], ours: float | None = None) -> float:
     """Print a row; give the median [ms]."""
     median = statistics.median(times)
-    print(f'{name:34}{count:7.0f}{min(times):10.2f}{median:10.2f}{max(times):10.2f}'
-          f'{0.1 * median / STEP_S:9.1f} %{len(times):7}', flush=True)
+    beside = '' if ours is None else f'{median / ours:9.2f}'
+    wanted = f'{WANTED[round(count)]:9g}' if ours is None and round(count) in WANTED else ''
+    print(f'{name:34}{count:7.0f}{min(times):10.3f}{median:10.3f}{max(times):10.2f}'
+          f'{len(times):7}{wanted or " " * 9}{beside}', flush=True)
     return median
 
 
@@ -164,28 +158,26 @@ def growth(counts: list[float], times: list[float]) -> str:
     return ', '.join(parts)
 
 
-def motorway_table(counts: tuple[int, ...], steps: int, other_up_to: int) -> None:
-    """Measure on the motorway, ours and highway-env in turns."""
-    ours, ratios = [], []
+def motorway_table(counts: tuple[int, ...], steps: int, python: str | None,
+                   highway_env_up_to: int) -> None:
+    """Measure on the motorway, ours and others in turns."""
+    ours = []
     for count in counts:
         start = Start(count)
-        median = report('motorway, ours', count, milliseconds(
-            stepper(our_motorway(start)), 30, steps, 60.0))
-        ours.append(median)
-        if Road is None or count > other_up_to:
-            continue
-        slow = [report(f'motorway, highway-env {name}', count, milliseconds(
-            other_motorway(start, as_it_is), 1, steps, 8.0))
-            for name, as_it_is in (('as it is', True), ('at our rates', False))]
-        ratios.append(f'{count}: {slow[0] / median:.0f} and {slow[1] / median:.0f}')
+        ours.append(report('motorway, ours', count, timed(
+            stepper(our_motorway(start)), 30, steps, 60.0)))
+        given = {'lane': start.lane.tolist(), 'x': start.x.tolist(), 'lanes': LANES,
+                 'speed': start.speed.tolist(), 'desired': start.desired.tolist(),
+                 'limit': LIMIT, 'length': float(start.x.max()) + AHEAD}
+        for name in ('sumo', 'highway-env'):
+            if name == 'sumo' or count <= highway_env_up_to:
+                for who, present, times in others(python, name, 'motorway', given, steps):
+                    report(f'motorway, {who}', present, times, ours[-1])
     print(f'time ~ n^p on the motorway: {growth([float(n) for n in counts], ours)}')
-    if ratios:
-        print('times the speed of highway-env (as it is, at our rates) at agents '
-              + '; '.join(ratios) + '    wanted: >= 20 at 50')
 
 
-def town_table(counts: tuple[int, ...], steps: int) -> None:
-    """Measure in towns."""
+def town_table(counts: tuple[int, ...], steps: int, python: str | None) -> None:
+    """Measure in towns, ours and SUMO in turns."""
     numbers, medians = [], []
     for count in counts:
         traffic = our_town(count)
@@ -193,9 +185,12 @@ def town_table(counts: tuple[int, ...], steps: int) -> None:
         for _ in range(100):
             step()
         before = present(traffic)
-        times = milliseconds(step, 0, steps, 60.0)
+        times = timed(step, 0, steps, 60.0)
         numbers.append(0.5 * (before + present(traffic)))
         medians.append(report('town, ours', numbers[-1], times))
+        given = {'size': town_size(count), 'block': BLOCK, 'count': count}
+        for who, there, slow in others(python, 'sumo', 'town', given, steps):
+            report(f'town, {who}', there, slow, medians[-1])
     print(f'time ~ n^p in town: {growth(numbers, medians)}')
 
 
@@ -215,10 +210,13 @@ def profile(name: str, traffic: Traffic, steps: int) -> None:
 
 def main() -> None:
     """Run the benchmark."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--counts', type=int, nargs='+', default=list(COUNTS))
     parser.add_argument('--steps', type=int, default=200)
-    parser.add_argument('--other-up-to', type=int, default=100,
+    parser.add_argument('--others', metavar='PYTHON',
+                        help='interpreter that has eclipse-sumo, libsumo and highway-env')
+    parser.add_argument('--highway-env-up-to', type=int, default=100,
                         help='vehicles of highway-env: its time grows with their square')
     parser.add_argument('--only', choices=('motorway', 'town'))
     parser.add_argument('--profile', action='store_true', help='where the time goes, instead')
@@ -231,12 +229,14 @@ def main() -> None:
             if values.only != 'motorway':
                 profile(f'town, {count}', our_town(count), values.steps)
         return
-    print(f'{"a step of 0.1 s":34}{"agents":>7}{"least ms":>10}{"median":>10}{"worst":>10}'
-          f'{"real time":>11}{"steps":>7}  wanted: <= 25 % at 200')
+    if values.others is None:
+        print('without SUMO and highway-env: name a Python that has them, --others (see --help)')
+    print(f'{"a step of 0.1 s [ms]":34}{"agents":>7}{"least":>10}{"median":>10}{"worst":>10}'
+          f'{"steps":>7}{"wanted":>9}{"/ ours":>9}')
     if values.only != 'town':
-        motorway_table(counts, values.steps, values.other_up_to)
+        motorway_table(counts, values.steps, values.others, values.highway_env_up_to)
     if values.only != 'motorway':
-        town_table(counts, values.steps)
+        town_table(counts, values.steps, values.others)
 
 
 if __name__ == '__main__':
