@@ -13,6 +13,7 @@ import shapely
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.movements import LEFT, Movements, UNDECIDED
 
 # Two vehicles meet where their lanes' centres are closer than a vehicle's width and a margin [m].
 WIDTH = 2.6
@@ -84,13 +85,15 @@ class Conflicts:
     The rows of a lane are `first[lane]:first[lane] + count[lane]`. Vehicles keep to the right.
 
     :param graph: the lanes.
+    :param movements: of the lanes; made anew if not given.
 
     Attribute `table`: the rows; its columns for cars are `lane`, `other`, `start`, `end` and
     `priority`.
     """
 
-    def __init__(self, graph: LaneGraph) -> None:
+    def __init__(self, graph: LaneGraph, movements: Movements | None = None) -> None:
         self._graph = graph
+        movements = Movements(graph) if movements is None else movements
         rows: list[tuple[int, int, _Stretch]] = []
         for i, j in _candidates(graph):
             here, there = _stretch(graph, i, j), _stretch(graph, j, i)
@@ -110,7 +113,7 @@ class Conflicts:
         self.first: IntArray = np.cumsum(self.count) - self.count
         self.rank: IntArray = np.array([_rank(graph, i) for i in range(len(graph))])
         self.priority: IntArray = np.array(
-            [_priority(graph, self.rank, r[0], r[1]) for r in rows], dtype=np.int64)
+            [_priority(movements, self.rank, r[0], r[1]) for r in rows], dtype=np.int64)
         # The ways join for good: one goes on behind the other.
         last = self.end > graph.length[self.lane] - 1.0
         self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
@@ -223,17 +226,19 @@ def _rank(graph: LaneGraph, lane: int) -> int:
         seen.add(current)
 
 
-def _priority(graph: LaneGraph, rank: IntArray, i: int, j: int) -> int:
+def _priority(movements: Movements, rank: IntArray, i: int, j: int) -> int:
     """Decide between two lanes: signs, then the left turn yields, then priority to the right."""
     if rank[i] != rank[j]:
         return 1 if rank[i] > rank[j] else -1
-    a, b = int(graph.first[i]), int(graph.first[j])
-    turn = wrap_pi(float(graph.yaw[b] - graph.yaw[a]))
+    # Between the ways over the whole junction: a lanelet may be the end of a turn only.
+    turn = wrap_pi(float(movements.heading[j] - movements.heading[i]))
+    bend = [float(movements.angle[lane]) for lane in (i, j)]
     if abs(turn) > 2.2:
-        left = [graph.turn(lane) > TURN for lane in (i, j)]
+        left = [LEFT == movement if movement != UNDECIDED else angle > TURN
+                for movement, angle in zip(movements.turn[[i, j]], bend, strict=True)]
         return 0 if left[0] == left[1] else -1 if left[0] else 1
     if abs(turn) < 0.6:
-        bend = [abs(graph.turn(lane)) for lane in (i, j)]
+        bend = [abs(angle) for angle in bend]
         return 0 if abs(bend[0] - bend[1]) < 0.2 else 1 if bend[0] < bend[1] else -1
     # Who comes from the right drives to the left.
     return -1 if turn > 0.0 else 1

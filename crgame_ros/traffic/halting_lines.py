@@ -4,60 +4,70 @@
 
 from collections.abc import Mapping
 
-from commonroad.scenario.lanelet import LaneletNetwork
+from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import Ways
+from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, STRAIGHT, UNDECIDED
 
-TURN = 0.45
-RED = ('red', 'redYellow')
+YELLOW, RED = 1, 2
+LEVELS = {'yellow': YELLOW, 'red': RED, 'redYellow': RED}
+ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
 # Hardest braking for a light that is red, and for one that turns yellow [m/s^2].
 RED_BRAKING = 6.0
 YELLOW_BRAKING = 3.0
+# Who brakes already doesn't drive on because that has become a little harder than wanted [m/s^2].
+BRAKES, STILL_BRAKING = -1.0, 4.0
 
 
 class HaltingLines:
     """
     The stop lines and traffic lights of all lanes.
 
+    A light without arrows is for everybody, one with arrows for who goes where they point. What a
+    way does is decided by the first lane on it, from the one with the light on, whose `movement`
+    is. Where no light is for a movement, all are.
+
     :param graph: the lanes.
     :param roads: with the traffic lights and signs.
+    :param movements: of the lanes; made anew if not given.
 
-    Attributes of each lane: `line` (arc length of its stop line [m], infinite without one) and
-    `stop_sign`.
+    Attributes of each lane (L): `line` (arc length of its stop line [m], infinite without one),
+    `stop_sign`, `at` (arc length of its lights' line [m]), `number` (row of its lights in
+    `movement`, -1 without lights) and `shown` (L, 4): 2 for red, 1 for yellow, 0 for any other, by
+    movement; column 0 is for ways that are not decided as far as one looks, and forbids what any
+    movement there is forbidden. `movement` (R, L): what decides ways on from the lane of row R.
     """
 
-    def __init__(self, graph: LaneGraph, roads: LaneletNetwork) -> None:
+    def __init__(self, graph: LaneGraph, roads: LaneletNetwork,
+                 movements: Movements | None = None) -> None:
         self._graph = graph
+        movements = Movements(graph) if movements is None else movements
         count = len(graph)
         self.line: FloatArray = np.full(count, np.inf)
         self.stop_sign: NDArray[np.bool_] = np.zeros(count, dtype=bool)
-        self._at: FloatArray = graph.length.copy()
+        self.at: FloatArray = graph.length.copy()
+        self.number: IntArray = np.full(count, -1, dtype=np.int64)
+        self.shown: IntArray = np.zeros((count, 4), dtype=np.int64)
         self._lights: dict[int, tuple[tuple[int, str], ...]] = {}
+        rows: list[IntArray] = []
         for lane, lanelet_id in enumerate(graph.ids):
             lanelet = roads.find_lanelet_by_id(lanelet_id)
-            lights, signs = set(lanelet.traffic_lights), set(lanelet.traffic_signs)
             if lanelet.stop_line is not None:
-                lights |= lanelet.stop_line.traffic_light_ref or set()
-                signs |= lanelet.stop_line.traffic_sign_ref or set()
-                self.line[lane] = self._at[lane] = self._position(lane, lanelet.stop_line)
-                self.stop_sign[lane] = any(
-                    element.traffic_sign_element_id.name == 'STOP' for sign_id in signs
-                    if (sign := roads.find_traffic_sign_by_id(sign_id)) is not None
-                    for element in sign.traffic_sign_elements)
-            found = [(i, roads.find_traffic_light_by_id(i)) for i in sorted(lights)]
-            shown = tuple((i, 'all' if light.direction is None else light.direction.value.lower())
-                          for i, light in found if light is not None)
-            if shown:
-                self._lights[lane] = shown
+                self.line[lane] = self.at[lane] = self._position(lane, lanelet.stop_line)
+                self.stop_sign[lane] = _has_stop_sign(lanelet, roads)
+            lights = _lights(lanelet, roads)
+            if lights:
+                self._lights[lane] = lights
+                self.number[lane] = len(rows)
+                rows.append(movements.after(lane))
+                if lanelet.stop_line is None and movements.is_first(lane):
+                    # Nobody halts at the far side of the junction.
+                    self.at[lane] = 0.0
+        self.movement: IntArray = np.array(rows, dtype=np.int64).reshape(-1, count)
         self._states: Mapping[int, str] | None = None
-        # What lights show to whoever goes straight on, left, or right: 2 red, 1 yellow.
-        self._shown: IntArray = np.zeros((count, 3), dtype=np.int64)
-        self._turn: IntArray = np.array(
-            [1 if turn > TURN else 2 if turn < -TURN else 0
-             for turn in (graph.turn(lane) for lane in range(count))])
 
     def _position(self, lane: int, line: object) -> float:
         start, end = getattr(line, 'start', None), getattr(line, 'end', None)
@@ -74,29 +84,62 @@ class HaltingLines:
             return
         self._states = dict(signals)
         for lane, lights in self._lights.items():
-            for turn, name in enumerate(('straight', 'left', 'right')):
-                relevant = [i for i, arrow in lights if arrow == 'all' or name in arrow]
-                states = {signals.get(i, 'inactive') for i in relevant or [i for i, _ in lights]}
-                self._shown[lane, turn] = (2 if states & set(RED) else
-                                           1 if 'yellow' in states else 0)
+            level = {i: LEVELS.get(signals.get(i, ''), 0) for i, _ in lights}
+            for movement, arrow in ARROWS.items():
+                for_it = [level[i] for i, arrows in lights if arrows == 'all' or arrow in arrows]
+                self.shown[lane, movement] = max(for_it or level.values())
+            possible = np.unique(self.movement[self.number[lane]])
+            possible = possible[possible != UNDECIDED]
+            self.shown[lane, UNDECIDED] = self.shown[
+                lane, possible if len(possible) else STRAIGHT].max()
 
-    def halts(self, way: Ways, speed: FloatArray, length: FloatArray) -> FloatArray:
+    def halts(self, way: Ways, speed: FloatArray, length: FloatArray,
+              acceleration: FloatArray | None = None) -> FloatArray:
         """
         Give the distance (A) of each agent's front from the first line with a light to heed [m].
 
         Red holds unless braking hard would not suffice, yellow if gentle braking does.
+
+        :param acceleration: (A) so far; who brakes goes on to [m/s^2]
         """
         result = np.full(len(speed), np.inf)
-        if not self._shown.any():
+        if not self.shown.any():
             return result
+        gentle = np.full(len(speed), YELLOW_BRAKING)
+        if acceleration is not None:
+            gentle[acceleration < BRAKES] = STILL_BRAKING
         for step in range(way.depth):
-            lane = np.maximum(way.lane[:, step], 0)
-            onto = way.lane[:, step + 1] if step + 1 < way.depth else np.full(len(lane), -1)
-            turn = np.where(onto >= 0, self._turn[np.maximum(onto, 0)], 0)
-            shown = np.where(way.lane[:, step] >= 0, self._shown[lane, turn], 0)
-            away = way.offset[:, step] + self._at[lane] - 0.5 * length
-            needed = speed**2 / (2.0 * np.maximum(away, 0.1))
-            heeds = (away > -1.0) & (((shown == 2) & (needed < RED_BRAKING)) | (
-                (shown == 1) & (needed < YELLOW_BRAKING)))
-            result = np.where(heeds, np.minimum(result, away), result)
+            row = np.flatnonzero(way.lane[:, step] >= 0)
+            row = row[self.number[way.lane[row, step]] >= 0]
+            lane = way.lane[row, step]
+            shown = self.shown[lane, self._movements(way.lane[row, step:], lane)]
+            away = way.offset[row, step] + self.at[lane] - 0.5 * length[row]
+            needed = speed[row]**2 / (2.0 * np.maximum(away, 0.1))
+            heeds = (away > -1.0) & (((shown == RED) & (needed < RED_BRAKING)) | (
+                (shown == YELLOW) & (needed < gentle[row])))
+            result[row] = np.where(heeds, np.minimum(result[row], away), result[row])
         return result
+
+    def _movements(self, onward: IntArray, lane: IntArray) -> IntArray:
+        """Give the movements (N) at lanes with lights (N) of ways on from there (N, J)."""
+        decided = np.where(onward >= 0, self.movement[
+            self.number[lane][:, None], np.maximum(onward, 0)], UNDECIDED)
+        first = np.argmax(decided != UNDECIDED, axis=1)
+        return np.asarray(decided[np.arange(len(lane)), first])
+
+
+def _has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
+    signs = set(lanelet.traffic_signs) | (lanelet.stop_line.traffic_sign_ref or set())
+    return any(element.traffic_sign_element_id.name == 'STOP' for sign_id in signs
+               if (sign := roads.find_traffic_sign_by_id(sign_id)) is not None
+               for element in sign.traffic_sign_elements)
+
+
+def _lights(lanelet: Lanelet, roads: LaneletNetwork) -> tuple[tuple[int, str], ...]:
+    """List the lights of a lanelet, and the arrows of each in lower case or `all`."""
+    ids = set(lanelet.traffic_lights)
+    if lanelet.stop_line is not None:
+        ids |= lanelet.stop_line.traffic_light_ref or set()
+    found = [(i, roads.find_traffic_light_by_id(i)) for i in sorted(ids)]
+    return tuple((i, 'all' if light.direction is None else light.direction.value.lower())
+                 for i, light in found if light is not None)

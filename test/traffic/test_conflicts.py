@@ -62,6 +62,29 @@ def test_without_signs_who_comes_from_the_right_goes_first() -> None:
     assert conflicts.priority[row_of(graph, conflicts, 1, 2)] == -1
 
 
+def test_a_left_turn_in_pieces_is_one() -> None:
+    # From the west to the north on a radius of 13.75 m, each piece turns by 0.39 rad.
+    angles = np.linspace(0.0, 0.5 * np.pi, 33)
+    turn = [(-12.0 + 13.75 * np.sin(a), 12.0 - 13.75 * np.cos(a)) for a in angles]
+    scenario = support.roads(
+        support.straight_lane(1, -1.75, -80.0, -12.0, successor=[10]),
+        *(support.lane_strip(10 + i, turn[8 * i:8 * i + 9], predecessor=[9 + i if i else 1],
+                             successor=[11 + i if i < 3 else 2]) for i in range(4)),
+        support.lane_strip(2, [(1.75, y) for y in np.linspace(12.0, 80.0, 30)],
+                           predecessor=[13]),
+        support.lane_strip(3, [(x, 1.75) for x in np.linspace(80.0, -80.0, 60)]),
+        support.lane_strip(4, [(-1.75, y) for y in np.linspace(80.0, -80.0, 60)]))
+    graph = LaneGraph(RoadNetwork(scenario.lanelet_network))
+    conflicts = Conflicts(graph)
+    met = {(graph.ids[here], graph.ids[conflicts.lane[other]]): priority for here, other, priority
+           in zip(conflicts.lane, conflicts.other, conflicts.priority, strict=True)}
+    pieces = [pair for pair in met if pair[0] >= 10]
+    assert {other for _, other in pieces} == {3, 4} and len(pieces) >= 4
+    for pair in pieces:
+        # It yields to who comes towards it; who comes from the north is on its left.
+        assert met[pair] == (-1 if pair[1] == 3 else 1), pair
+
+
 def test_conflicts_hold_every_pair_whose_vehicles_touch(maps: Path) -> None:
     # Cars of 1.8 m width swept along the centre lines of lanelets that begin and end apart.
     graph, conflicts = built(maps / 'ZAM_Intersection-1_1_T-1.xml')
