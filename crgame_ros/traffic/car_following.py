@@ -29,6 +29,8 @@ LEAST_ROOM = 0.01
 BRAKES_HARD, GUARD_DECELERATION = -2.0, 3.0
 # What is needed is braked with at once and a little harder, so that less is needed then.
 FORESIGHT = 1.05
+# Behind what is slower, far ahead, nobody brakes harder than this, or than it takes [m/s^2].
+PATIENT = 3.5
 
 
 @vectorized
@@ -71,13 +73,15 @@ def needed_deceleration(speed: float, room: float, lead_speed: float,
 
 @vectorized
 def _limited(wanted: float, speed: float, gap: float, lead_speed: float,
-             lead_acceleration: float, standstill_gap: float, most: float,
+             lead_acceleration: float, patience: float, standstill_gap: float, most: float,
              hardest: float) -> float:
     """Limit what a law wants, and brake as hard as the guard demands."""
     guard = _guard_of(speed, gap, lead_speed, standstill_gap, hardest)
     if lead_acceleration > BRAKES_HARD:
-        guard = min(guard, max(GUARD_DECELERATION, FORESIGHT * needed_deceleration(
-            speed, gap - GUARD_GAP * standstill_gap, lead_speed, lead_acceleration)))
+        demanded = FORESIGHT * needed_deceleration(
+            speed, gap - GUARD_GAP * standstill_gap, lead_speed, lead_acceleration)
+        guard = min(guard, max(GUARD_DECELERATION, demanded))
+        wanted = max(wanted, -max(patience, demanded))
     if guard > 0.0:
         wanted = min(wanted, -guard)
     if speed < STANDING and wanted < START:
@@ -140,8 +144,16 @@ class CarFollowing(ABC):
         spared = _spared(relief, self.desired_gap(speed), gap, self.standstill_gap)
         wanted = self.follow(speed, desired_speed, gap + spared, lead_speed)
         return np.asarray(_limited(
-            wanted, speed, gap, lead_speed, lead_acceleration, self.standstill_gap,
-            self.max_acceleration, self.max_deceleration))
+            wanted, speed, gap, lead_speed, lead_acceleration, self.patience(speed, gap + spared),
+            self.standstill_gap, self.max_acceleration, self.max_deceleration))
+
+    def patience(self, speed: Array, gap: Array) -> Array:
+        """
+        Give how hard the law may brake where physics asks for less [m/s^2].
+
+        :param gap: to a leader that is known not to brake hard [m]
+        """
+        return np.full(np.broadcast_shapes(np.shape(speed), np.shape(gap)), np.inf)
 
     def guard_deceleration(self, speed: Array, gap: Array, lead_speed: Array) -> Array:
         """
@@ -223,6 +235,15 @@ class AdaptiveCruise(CarFollowing):
         return np.asarray(_cruise(
             speed, desired_speed, gap, lead_speed, self.time_gap, self.h, self.gain,
             self.standstill_gap, self._comfortable_deceleration, self._speed_time))
+
+    def patience(self, speed: Array, gap: Array) -> Array:
+        """
+        Give what the missing distance alone asks for.
+
+        The difference of speeds, v / h in FS 3, makes nobody brake harder than it takes.
+        """
+        missing = self.desired_gap(speed) - gap
+        return np.asarray(np.maximum(PATIENT, self.gain * missing / self.h))
 
     def desired_gap(self, speed: Array) -> Array:
         """Give s0 + T v."""

@@ -40,10 +40,14 @@ SLOWEST = 3.0
 PREPARE = 400.0
 # Nobody begins to change lanes this shortly before or in a junction [m].
 NO_CHANGE = 15.0
+# Who changes lanes before a junction can halt before it with this [m/s^2].
+BEFORE_JUNCTION = 2.0
 # Nor this near to an obstacle: the front would hit it; with less than that room the way out of the
 # lane is as short as this allows [m].
 TOO_NEAR = 4.0
 TIGHT = 10.0
+# A change is as long as this, and as so many lengths of the vehicle, at least [m].
+SHORTEST_CHANGE, LENGTHS = 12.0, 2.7
 # Below `SLOWEST` nobody swings out with less room to the one ahead in the own lane [m].
 OUT_OF_QUEUE = 7.0
 # Share of the braking that is needed, with which somebody stops for who stands at a lane's end.
@@ -166,7 +170,8 @@ class LaneChanges:
         has = np.isfinite(self._conflicts.table.entry)
         onto = routes.next[destination, lane]
         junction = has[wide, lane] | ((onto >= 0) & has[wide, np.maximum(onto, 0)] & (
-            graph.length[lane] - agents.s[slots] <= NO_CHANGE))
+            graph.length[lane] - agents.s[slots]
+            <= NO_CHANGE + agents.speed[slots]**2 / (2.0 * BEFORE_JUNCTION)))
         free &= ~junction
         content = agents.content_until[slots] <= k
         content &= (slots * (len(slots) > AT_ONCE) + k) % self._thoughts == 0
@@ -232,7 +237,8 @@ class LaneChanges:
         slot, beside = int(wish.slots[i]), wish.beside
         speed = agents.speed[slot:slot + 1]
         shift, slope = beside.d[i:i + 1], np.tan(beside.turn[i:i + 1])
-        span = look_ahead(speed, np.abs(shift))
+        span = look_ahead(speed, np.abs(shift), shortest=max(
+            SHORTEST_CHANGE, LENGTHS * float(agents.length[slot])))
         if wish.room[i] < TIGHT and speed[0] < SLOWEST:
             span = np.minimum(span, np.maximum(wish.room[i] + 1.0, 1.5 * TOO_NEAR))
         agents.curve[slot] = quintic(shift, slope, np.zeros(1), np.zeros(1), span)[0]

@@ -194,8 +194,9 @@ def _stretch(graph: LaneGraph, i: int, j: int) -> _Stretch | None:
 def _is_fork(graph: LaneGraph, i: int, j: int, first: _Stretch, second: _Stretch) -> bool:
     """Tell whether two lanes only part: they begin together, or one ends where other begins."""
     here, there = (first.start[0], first.end[0]), (second.start[0], second.end[0])
-    starts = here[0] < 1.0 and there[0] < 1.0
     a, b = int(graph.first[i]), int(graph.first[j])
+    between = float(np.hypot(graph.x[a] - graph.x[b], graph.y[a] - graph.y[b]))
+    starts = here[0] < 1.0 and there[0] < 1.0 and between < JOINING
     same = abs(wrap_pi(float(graph.yaw[a] - graph.yaw[b]))) < 0.5
     joined = (here[0] > graph.length[i] - 3.0 and there[1] < 3.0) or (
         there[0] > graph.length[j] - 3.0 and here[1] < 3.0)

@@ -394,7 +394,7 @@ def _inside_halt(k: int, agents: AgentTable, meeting: Meetings, at: Situation,
         if meeting.apart[n] or meeting.into[n] >= result:
             continue
         # Who cannot stop before it any more had better be quick.
-        if agents.speed[slot]**2 > 12.0 * max(meeting.into[n], 0.1):
+        if agents.speed[slot]**2 > 8.0 * max(meeting.into[n], 0.1):
             continue
         if who < 0:
             stops = meeting.inside[n] or meeting.committed[n]

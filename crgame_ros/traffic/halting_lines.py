@@ -3,11 +3,13 @@
 """Where traffic lights and stop signs want agents to halt."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 import numpy as np
 from numpy.typing import NDArray
 
+from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, STRAIGHT, UNDECIDED
@@ -20,6 +22,17 @@ RED_BRAKING = 6.0
 YELLOW_BRAKING = 3.0
 # Who brakes already doesn't drive on because that has become a little harder than wanted [m/s^2].
 BRAKES, STILL_BRAKING = -1.0, 4.0
+# Time until braking has set in [s].
+REACTION = 0.4
+
+
+class LightTable(NamedTuple):
+    """Columns of `HaltingLines` for compiled loops."""
+
+    at: FloatArray
+    number: IntArray
+    shown: IntArray
+    movement: IntArray
 
 
 class HaltingLines:
@@ -68,6 +81,7 @@ class HaltingLines:
                     self.at[lane] = 0.0
         self.movement: IntArray = np.array(rows, dtype=np.int64).reshape(-1, count)
         self._states: Mapping[int, str] | None = None
+        self._any_shown = False
 
     def _position(self, lane: int, line: object) -> float:
         start, end = getattr(line, 'start', None), getattr(line, 'end', None)
@@ -92,6 +106,7 @@ class HaltingLines:
             possible = possible[possible != UNDECIDED]
             self.shown[lane, UNDECIDED] = self.shown[
                 lane, possible if len(possible) else STRAIGHT].max()
+        self._any_shown = bool(self.shown.any())
 
     def halts(self, way: Ways, speed: FloatArray, length: FloatArray,
               acceleration: FloatArray | None = None) -> FloatArray:
@@ -102,30 +117,46 @@ class HaltingLines:
 
         :param acceleration: (A) so far; who brakes goes on to [m/s^2]
         """
-        result = np.full(len(speed), np.inf)
-        if not self.shown.any():
-            return result
-        gentle = np.full(len(speed), YELLOW_BRAKING)
-        if acceleration is not None:
-            gentle[acceleration < BRAKES] = STILL_BRAKING
-        for step in range(way.depth):
-            row = np.flatnonzero(way.lane[:, step] >= 0)
-            row = row[self.number[way.lane[row, step]] >= 0]
-            lane = way.lane[row, step]
-            shown = self.shown[lane, self._movements(way.lane[row, step:], lane)]
-            away = way.offset[row, step] + self.at[lane] - 0.5 * length[row]
-            needed = speed[row]**2 / (2.0 * np.maximum(away, 0.1))
-            heeds = (away > -1.0) & (((shown == RED) & (needed < RED_BRAKING)) | (
-                (shown == YELLOW) & (needed < gentle[row])))
-            result[row] = np.where(heeds, np.minimum(result[row], away), result[row])
-        return result
+        if acceleration is None:
+            acceleration = np.zeros(len(speed))
+        if not self._any_shown:
+            return np.full(len(speed), np.inf)
+        return _halts(LightTable(self.at, self.number, self.shown, self.movement), way, speed,
+                      length, acceleration)
 
-    def _movements(self, onward: IntArray, lane: IntArray) -> IntArray:
-        """Give the movements (N) at lanes with lights (N) of ways on from there (N, J)."""
-        decided = np.where(onward >= 0, self.movement[
-            self.number[lane][:, None], np.maximum(onward, 0)], UNDECIDED)
-        first = np.argmax(decided != UNDECIDED, axis=1)
-        return np.asarray(decided[np.arange(len(lane)), first])
+
+@compiled
+def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
+           acceleration: FloatArray) -> FloatArray:
+    result = np.full(len(speed), np.inf)
+    for i in range(len(speed)):
+        gentle = STILL_BRAKING if acceleration[i] < BRAKES else YELLOW_BRAKING
+        for step in range(way.count[i]):
+            lane = way.lane[i, step]
+            if lights.number[lane] < 0:
+                continue
+            shown = lights.shown[lane, movement_of(lights, way, i, step)]
+            away = way.offset[i, step] + lights.at[lane] - 0.5 * length[i]
+            # Braking takes a moment to set in.
+            room = max(away - REACTION * speed[i], 0.1) if acceleration[i] >= BRAKES else max(
+                away, 0.1)
+            needed = speed[i]**2 / (2.0 * room)
+            heeds = (shown == RED and needed < RED_BRAKING) or (
+                shown == YELLOW and needed < gentle)
+            if away > -1.0 and heeds:
+                result[i] = min(result[i], away)
+    return result
+
+
+@compiled
+def movement_of(lights: LightTable, way: Ways, i: int, step: int) -> int:
+    """Give the movement of a way at the lights of its lane: what is decided first counts."""
+    row = lights.number[way.lane[i, step]]
+    for onward in range(step, way.count[i]):
+        movement = lights.movement[row, way.lane[i, onward]]
+        if movement != UNDECIDED:
+            return int(movement)
+    return UNDECIDED
 
 
 def _has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:

@@ -4,7 +4,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
@@ -28,9 +28,12 @@ class Routes:
 
     :param graph: the lanes.
     :param costly: (L) what driving along a lane costs besides its length [m]
+    :param tight: (L) which lanes are too tight for long vehicles. The tables have a second row
+        for each destination then, D further on, with the ways of these.
     """
 
-    def __init__(self, graph: LaneGraph, costly: FloatArray | None = None) -> None:
+    def __init__(self, graph: LaneGraph, costly: FloatArray | None = None,
+                 tight: NDArray[np.bool_] | None = None) -> None:
         self._graph = graph
         self._length = graph.length if costly is None else graph.length + costly
         lanes = np.arange(len(graph))
@@ -54,6 +57,12 @@ class Routes:
         loops = self._loop_destinations(both, np.asarray(~reached))
         self.groups += [group for group, _ in loops]
         costs += [cost for _, cost in loops]
+        if tight is not None:
+            wide = diags_array((~tight).astype(np.float64)).tocsr()
+            # Links from and to tight lanes are cut.
+            without = (wide @ both @ wide).tocsr()
+            without.eliminate_zeros()
+            costs += [np.where(tight, np.inf, _cost(without, members)) for members in self.groups]
         self.cost: FloatArray = np.array(costs)
         self._choose()
 
@@ -79,7 +88,7 @@ class Routes:
 
     def _choose(self) -> None:
         """Tabulate the best successor, and where the lane has to be left for another."""
-        graph, count = self._graph, len(self.groups)
+        graph, count = self._graph, len(self.cost)
         rows = np.arange(count)[:, None]
         succ = graph.successors
         onward = np.where(succ >= 0, self.cost[:, np.maximum(succ, 0)], np.inf)
@@ -103,18 +112,27 @@ class Routes:
                 further, self.remaining[rows, following], 0.0)
             self.remaining = np.minimum(self.remaining, 1000.0)
 
-    def reachable(self, lane: int) -> IntArray:
-        """List the destinations that a lane leads to."""
-        return np.flatnonzero(np.isfinite(self.cost[:, lane]))
+    def reachable(self, lane: int, long: bool = False) -> IntArray:
+        """List the destinations that a lane leads to, for long vehicles those ways that fit."""
+        count = len(self.groups)
+        rows = np.arange(count, len(self.cost)) if long else np.arange(count)
+        return rows[np.isfinite(self.cost[rows, lane])]
 
-    def draw(self, lane: int, generator: np.random.Generator) -> int:
-        """Draw one of the destinations that a lane leads to, each as likely."""
-        choice = self.reachable(lane)
+    def draw(self, lane: int, generator: np.random.Generator, long: bool = False) -> int:
+        """
+        Draw one of the destinations that a lane leads to, each as likely.
+
+        Long vehicles to whom no way is wide enough take the ways of others.
+        """
+        choice = self.reachable(lane, long)
+        if long and not len(choice):
+            choice = self.reachable(lane)
         return int(choice[generator.integers(len(choice))]) if len(choice) else 0
 
-    def towards(self, lane: int, target: int) -> int | None:
+    def towards(self, lane: int, target: int, long: bool = False) -> int | None:
         """Find a destination behind a lane that the way from another leads through, if any."""
-        for destination in np.argsort(self.cost[:, target], kind='stable'):
+        choice = self.reachable(lane, long)
+        for destination in choice[np.argsort(self.cost[choice, target], kind='stable')]:
             if not np.isfinite(self.cost[destination, [lane, target]]).all():
                 continue
             current = lane

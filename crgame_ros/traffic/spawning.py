@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.agents import Agents, NOBODY, REAR_TO_CENTER
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
 from crgame_ros.traffic.longitudinal import Longitudinal
@@ -25,6 +26,8 @@ PARKED = 2.0
 ASTRAY = 0.8
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
 TRIES = 40
+# Longer vehicles take wide ways, which they leave by so much at most [m].
+LONG, SPARE = 6.5, 0.15
 # Between agents at the start, besides s0 [m] and at their speeds [s].
 START_GAP = 3.0
 START_TIME = 1.2
@@ -32,6 +35,10 @@ SIDE_GAP = 0.6
 LANE = 3.5
 # With which a newcomer could stop before what lies ahead [m/s^2].
 EASY = 1.5
+# With which those who were recorded get behind who is ahead [m/s^2], and the gap that they leave [m].
+FIRM, STOP_GAP = 2.0, 2.0
+# Nor nearer than so long at their speeds [s].
+CLOSE_TIME = 0.25
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,17 @@ def _fits(network: RoadNetwork, lane: int, pose: FloatArray) -> bool:
     s, _ = network.locate(lanelet, float(pose[0]), float(pose[1]))
     yaw = network.pose_on(lanelet, s)[2]
     return bool(abs(heading_difference(pose[2:3], np.array([yaw]))[0]) < ASTRAY)
+
+
+def is_long(length: float) -> bool:
+    """Tell whether a vehicle needs ways that are wide enough [m]."""
+    return length > LONG
+
+
+def tight_lanes(graph: LaneGraph) -> NDArray[np.bool_]:
+    """Tell which lanes (L) the trucks here cannot drive along."""
+    front = (REAR_TO_CENTER + 0.5) * TRUCK.length
+    return graph.is_tight(TRUCK.width, front, SPARE)
 
 
 def slot_descriptions(count: int, truck_share: float,
@@ -133,7 +151,7 @@ class Spawner:
                 lane = int(usable[np.searchsorted(np.cumsum(weight), self._random.random(),
                                                   side='right').clip(0, len(usable) - 1)])
                 half = 0.5 * float(agents.length[slot]) + 1.0
-                if graph.length[lane] < 2.0 * half:
+                if graph.length[lane] < 2.0 * half or not self._fits_into(agents, slot, lane):
                     continue
                 s = self._random.uniform(half, float(graph.length[lane]) - half)
                 speed = self._speed(lane, s, float(agents.factor[slot]))
@@ -147,7 +165,11 @@ class Spawner:
             free = self._free(agents, k)
             if not len(free):
                 return
-            slot, lane = int(free[0]), int(self.entries[number])
+            lane = int(self.entries[number])
+            fitting = [slot for slot in free.tolist() if self._fits_into(agents, slot, lane)]
+            if not fitting:
+                continue
+            slot = fitting[0]
             self._character(agents, slot)
             s = 0.5 * float(agents.length[slot])
             wanted = self._speed(lane, s, float(agents.factor[slot]))
@@ -180,7 +202,8 @@ class Spawner:
                 self._character(agents, slot)
                 agents.put(slot, lane, float(s[0]), float(d[0]), (x, y, yaw),
                            float(np.hypot(velocities[slot, 0], velocities[slot, 1])))
-                agents.destination[slot] = self._routes.draw(lane, self._random)
+                agents.destination[slot] = self._routes.draw(
+                    lane, self._random, is_long(float(agents.length[slot])))
 
     def _appear(self, k: int, agents: Agents, slot: int, found: Adopted, row: int,
                 others: Bodies) -> bool:
@@ -191,18 +214,23 @@ class Spawner:
         s, d = graph.nearest(lane, pose[:1], pose[1:2])
         velocity = found.velocities[row]
         speed = float(np.hypot(velocity[0], velocity[1]))
-        if not _is_free(pose, speed, agents.length[slot], agents.width[slot], agents, others,
-                        close=True):
+        safe = _safe_speed(pose, agents.length[slot], agents.width[slot], agents, others)
+        if not _is_free(pose, min(speed, safe), agents.length[slot], agents.width[slot], agents,
+                        others, close=True):
             return False
+        speed = min(speed, safe)
         recorded = np.hypot(found.velocities[:, 0], found.velocities[:, 1])
         fastest = float(np.nanmax(recorded)) / float(graph.limit[lane])
         self._character(agents, slot)
         agents.factor[slot] = np.clip(fastest, 0.5, 1.5)
         agents.put(slot, lane, float(s[0]), float(d[0]), (pose[0], pose[1], pose[2]), speed)
         goal = self._lane_at(found.poses[-1])
-        towards = None if goal is None else self._routes.towards(lane, goal)
-        agents.destination[slot] = (self._routes.draw(lane, self._random) if towards is None
-                                    else towards)
+        long = is_long(float(agents.length[slot]))
+        towards = None if goal is None else self._routes.towards(lane, goal, long)
+        if towards is None and goal is not None and long:
+            towards = self._routes.towards(lane, goal)
+        agents.destination[slot] = (self._routes.draw(lane, self._random, long)
+                                    if towards is None else towards)
         return True
 
     def _lane_at(self, pose: FloatArray) -> int | None:
@@ -237,8 +265,34 @@ class Spawner:
                         agents, others):
             return False
         agents.put(slot, lane, s, 0.0, (float(x), float(y), float(yaw)), speed)
-        agents.destination[slot] = self._routes.draw(lane, self._random)
+        agents.destination[slot] = self._routes.draw(
+            lane, self._random, is_long(float(agents.length[slot])))
         return True
+
+    def _fits_into(self, agents: Agents, slot: int, lane: int) -> bool:
+        """Tell whether a vehicle of an agent's size gets on from a lane."""
+        long = is_long(float(agents.length[slot]))
+        return not long or len(self._routes.reachable(lane, long)) > 0
+
+
+def _safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
+                others: Bodies) -> float:
+    """Give the speed from which a newcomer gets behind everybody ahead with firm braking."""
+    here = np.flatnonzero(agents.active)
+    poses = np.concatenate((agents.centers()[here], others.poses))
+    lengths = np.concatenate((agents.length[here], others.length))
+    widths = np.concatenate((agents.width[here], others.width))
+    velocities = np.concatenate((agents.velocities()[here], others.velocities))
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    east, north = poses[:, 0] - pose[0], poses[:, 1] - pose[1]
+    ahead, aside = east * cos + north * sin, np.abs(north * cos - east * sin)
+    turn = poses[:, 2] - pose[2]
+    wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
+    gap = ahead - 0.5 * (length + lengths) - STOP_GAP
+    along = np.maximum(velocities[:, 0] * cos + velocities[:, 1] * sin, 0.0)
+    before = (ahead > 0.0) & (aside < wide + SIDE_GAP)
+    safe = np.sqrt(along[before]**2 + 2.0 * FIRM * np.maximum(gap[before], 0.0))
+    return float(safe.min(initial=np.inf))
 
 
 def _is_free(pose: FloatArray, speed: float, length: float, width: float, agents: Agents,
@@ -270,5 +324,10 @@ def _is_free(pose: FloatArray, speed: float, length: float, width: float, agents
         # Whoever is faster and behind has to slow down.
         faster = np.where(ahead > 0.0, speed**2 - speeds**2, speeds**2 - speed**2)
         gap = gap + np.maximum(faster, 0.0) / (2.0 * EASY)
+    else:
+        # Nor must anybody behind brake hard for whoever was recorded.
+        closing = np.where(ahead < 0.0, np.maximum(speeds**2 - speed**2, 0.0), 0.0)
+        gap = gap + closing / (2.0 * FIRM) + CLOSE_TIME * np.where(
+            ahead < 0.0, speeds, np.minimum(speeds, speed))
     side = 0.2 if close else SIDE_GAP
     return bool(((along > long + gap) | (aside > wide + side)).all())

@@ -36,13 +36,21 @@ from crgame_ros.traffic.longitudinal import (
     AT_END,
     AT_LINE,
     halts_before,
+    LINE_GAP,
     Longitudinal,
     smoothed,
 )
 from crgame_ros.traffic.motion import Motion
+from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.spawning import Adopted, slot_descriptions, Spawner
+from crgame_ros.traffic.spawning import (
+    Adopted,
+    is_long,
+    slot_descriptions,
+    Spawner,
+    tight_lanes,
+)
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.swerving import Swerving
 from crgame_ros.traffic.waiting import break_circles, hopeless, INSISTS, LAST_RESORT, WAITS
@@ -89,11 +97,13 @@ class Traffic:
         self._random = np.random.Generator(np.random.PCG64(
             seed if spec.seed is None else spec.seed))
         self._graph = LaneGraph(network, spec.lateral_acceleration)
-        self._conflicts = Conflicts(self._graph)
+        movements = Movements(self._graph)
+        self._conflicts = Conflicts(self._graph, movements)
         self._cells = LaneCells(self._graph)
         self._routes = Routes(
-            self._graph, np.where(self._conflicts.tapers(), TAPER_COST, 0.0))
-        self._lines = HaltingLines(self._graph, scenario.lanelet_network)
+            self._graph, np.where(self._conflicts.tapers(), TAPER_COST, 0.0),
+            tight_lanes(self._graph))
+        self._lines = HaltingLines(self._graph, scenario.lanelet_network, movements)
         self._model: CarFollowing = CAR_FOLLOWING.create(spec.model, spec.options, 'traffic')
         self._longitudinal = Longitudinal(self._graph, self._model)
         self._changes = LaneChanges(self._graph, self._routes, self._conflicts, self._model,
@@ -168,7 +178,6 @@ class Traffic:
             if spec.swerve:
                 self._swerving.update(entries.take(np.flatnonzero(standing)))
             acceleration = self._decide(others.k, slots, entries, standing)
-            slots = np.flatnonzero(agents.active)
             self._motion.move(agents, slots, acceleration, self._swerving.reference,
                               self._substeps)
             self._changes.finish(others.k, agents)
@@ -260,9 +269,10 @@ class Traffic:
                    desired: FloatArray) -> FloatArray:
         """Give the distances (A) of the fronts from lights and junctions to halt at, or inf."""
         agents, graph, conflicts = self._agents, self._graph, self._conflicts
-        light = self._lines.halts(way, agents.speed[slots], agents.length[slots])
+        light = self._lines.halts(way, agents.speed[slots], agents.length[slots],
+                                  agents.acceleration[slots])
         if not len(conflicts):
-            return light
+            return light - LINE_GAP
         passage = passages(conflicts.table, self._lines.line, way, agents.table, slots)
         before = way.lane[np.arange(len(slots)), np.maximum(passage.first - 1, 0)]
         sign = self._lines.stop_sign[before] & (passage.first > 0)
@@ -276,10 +286,7 @@ class Traffic:
         agents.blocker[slots[np.isfinite(light)]] = FREE
         if (agents.waits[slots] > self._waiting).any():
             break_circles(k, agents.table, slots, self._waiting, self._insisting)
-            stuck = hopeless(agents.table, slots, self._last_resort)
-            agents.remove(stuck, k)
-            self.taken_off += len(stuck)
-        return np.minimum(light, halt)
+        return np.minimum(light - LINE_GAP, halt)
 
     def _before_obstacles(self, slots: IntArray, blocked: FloatArray) -> FloatArray:
         """Give the distances (A) to halt at so that there is room to change lanes, or inf."""
@@ -305,10 +312,14 @@ class Traffic:
         gone = (routes.next[agents.destination[slots], lane] < 0) & (
             s > self._graph.length[lane] + 0.5 * agents.length[slots])
         agents.remove(slots[gone], k)
+        stuck = hopeless(agents.table, slots, self._last_resort)
+        agents.remove(stuck, k)
+        self.taken_off += len(stuck)
         cost = routes.cost[agents.destination[slots], lane]
         lost = ~gone & (~np.isfinite(cost) | ((cost <= 0.0) & ~routes.is_exit[lane]))
         for slot in slots[lost].tolist():
-            agents.destination[slot] = routes.draw(int(agents.lane[slot]), self._random)
+            agents.destination[slot] = routes.draw(
+                int(agents.lane[slot]), self._random, is_long(float(agents.length[slot])))
 
 
 def _standing(entries: Entries, standing: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -36,7 +36,7 @@ class Free(AdaptiveCruise):
 
     name = 'free'
 
-    def acceleration(self, speed, desired_speed, gap, lead_speed, relief=0.0):
+    def acceleration(self, speed, desired_speed, gap, lead_speed, *_):
         return super().acceleration(speed, desired_speed, np.full_like(gap, np.inf), speed)
 '''
 

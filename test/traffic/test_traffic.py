@@ -31,9 +31,9 @@ class FreeDriving(CarFollowing):
                lead_speed: np.ndarray) -> np.ndarray:
         return 0.5 * (desired_speed - speed)
 
-    def needed_deceleration(self, speed: np.ndarray, gap: np.ndarray,
-                            lead_speed: np.ndarray) -> np.ndarray:
-        return np.zeros_like(speed)
+    def acceleration(self, speed: np.ndarray, desired_speed: np.ndarray, gap: np.ndarray,
+                     *_: object) -> np.ndarray:
+        return np.clip(self.follow(speed, desired_speed, gap, speed), -8.0, 1.5)
 
     def desired_gap(self, speed: np.ndarray) -> np.ndarray:
         return 2.0 + 1.5 * speed
