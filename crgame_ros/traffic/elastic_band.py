@@ -81,11 +81,14 @@ class ElasticBand:
     :param min_band_length: shortest m (ours) [m]
     :param max_curvature: a band that needs more is blocked: about that of a car's turning circle
         of 12 m [1/m]
+    :param wide_half_width: of the widest vehicles: the band is theirs too wherever there is room
+        for them with the least clearance; None without such [m]
     """
 
     def __init__(self, step: float = 1.0, clearance: float = 0.5, min_clearance: float = 0.2,
                  half_width: float = 1.0, half_length: float = 2.5, band_time: float = 1.2,
-                 min_band_length: float = 4.0, max_curvature: float = 0.15) -> None:
+                 min_band_length: float = 4.0, max_curvature: float = 0.15,
+                 wide_half_width: float | None = None) -> None:
         for name, value in (('step', step), ('half_width', half_width),
                             ('half_length', half_length), ('band_time', band_time),
                             ('min_band_length', min_band_length),
@@ -97,7 +100,8 @@ class ElasticBand:
             raise InputError(f'"min_clearance" {min_clearance:g} and "clearance" {clearance:g} '
                              'do not fit', 'elastic band', 'give 0 <= min_clearance <= clearance')
         self.step = step
-        self._rules = PassageRules(clearance, min_clearance, half_width, half_length)
+        self._rules = PassageRules(clearance, min_clearance, half_width, half_length,
+                                   max(half_width, wide_half_width or 0.0))
         self._band_time = band_time
         self._min_band_length = min_band_length
         self._max_curvature = max_curvature
@@ -135,8 +139,8 @@ class ElasticBand:
                      (wide[:, 2:] - 2.0 * d + wide[:, :-2]) / self.step ** 2,
                      np.array(lanes, dtype=np.intp), np.array(places, dtype=np.float64))
 
-    def _relax_lane(self, left: Array, right: Array, speed: float,
-                    obstacles: Obstacles) -> tuple[Array, list[float]]:
+    def _relax_lane(self, left: Array, right: Array, speed: float, obstacles: Obstacles,
+                    for_wide: bool = True) -> tuple[Array, list[float]]:
         """Give the offsets of one lane and where it is blocked."""
         passages: list[Passage] = []
         blocked: list[float] = []
@@ -144,7 +148,7 @@ class ElasticBand:
         reach = obstacles.half_length + self._rules.half_length
         on_grid = (obstacles.s + reach >= 0.0) & (obstacles.s - reach <= end)
         for group in self._rules.groups(obstacles.take(on_grid), self.step):
-            passage = self._rules.choose(group, self.step, left, right)
+            passage = self._rules.choose(group, self.step, left, right, for_wide)
             if passage is not None:
                 passages.append(passage)
             else:
@@ -154,6 +158,9 @@ class ElasticBand:
             d, worst = self._solve(left, right, length, passages)
             if worst is None:
                 return d, sorted(blocked)
+            if for_wide and self._rules.wide_half_width > self._rules.half_width:
+                # What bends too much for the widest may do for the others.
+                return self._relax_lane(left, right, speed, obstacles, False)
             nearest = min(passages, key=lambda passage: max(
                 passage.first - worst, worst - passage.first - len(passage.low), 0))
             passages.remove(nearest)

@@ -67,16 +67,19 @@ class PassageRules:
     :param min_clearance: with less the lane is blocked [m]
     :param half_width: of the vehicles [m]
     :param half_length: of the vehicles, added before and behind each obstacle [m]
+    :param wide_half_width: of the widest ones, for whom the same way is made wherever there is
+        room for them; `half_width` at least [m]
     """
 
     clearance: float
     min_clearance: float
     half_width: float
     half_length: float
+    wide_half_width: float
 
     def in_the_way(self, obstacles: Obstacles) -> NDArray[np.bool_]:
         """Tell which of them are nearer to the centre line than a vehicle and its clearance."""
-        reach = obstacles.half_width + self.half_width + self.clearance
+        reach = obstacles.half_width + self.wide_half_width + self.clearance
         return np.abs(obstacles.d) < reach
 
     def groups(self, obstacles: Obstacles, step: float) -> list[Obstacles]:
@@ -92,8 +95,8 @@ class PassageRules:
         splits = np.flatnonzero(begin[1:] > end[:-1] + 3.0 * step) + 1
         return [obstacles.take(part) for part in np.split(np.arange(len(begin)), splits)]
 
-    def choose(self, group: Obstacles, step: float, left: Array,
-               right: Array) -> Passage | None:
+    def choose(self, group: Obstacles, step: float, left: Array, right: Array,
+               for_wide: bool = True) -> Passage | None:
         """
         Choose the way past a group: through which of the slots between neighbours across.
 
@@ -103,15 +106,24 @@ class PassageRules:
         :param step: of the grid [m]
         :param left: (S,) room to the left of the centre line at the nodes [m]
         :param right: (S,) to the right [m]
+        :param for_wide: whether to look for one for the widest vehicles first.
         :return: None where no way leaves the least clearance.
         """
         group = group.take(np.argsort(group.d, kind='stable'))
+        best = None
+        if for_wide and self.wide_half_width > self.half_width:
+            best = self._best(group, self.wide_half_width, step, left, right)
+        return best or self._best(group, self.half_width, step, left, right)
+
+    def _best(self, group: Obstacles, half_width: float, step: float, left: Array,
+              right: Array) -> Passage | None:
+        """Choose the way for vehicles of a width; the group is sorted by d."""
         reach = group.half_length + self.half_length
         first = max(math.floor((group.s - reach).min() / step), 0)
         last = min(math.ceil((group.s + reach).max() / step), len(left) - 1)
-        lows, highs = self._slots(group, step * np.arange(first, last + 1), 0.5 * step)
-        edge_high = np.maximum(left[first:last + 1] - self.half_width, 0.0)
-        edge_low = -np.maximum(right[first:last + 1] - self.half_width, 0.0)
+        lows, highs = self._slots(group, half_width, step * np.arange(first, last + 1), 0.5 * step)
+        edge_high = np.maximum(left[first:last + 1] - half_width, 0.0)
+        edge_low = -np.maximum(right[first:last + 1] - half_width, 0.0)
         room = np.minimum(np.minimum(edge_high - lows, highs - edge_low),
                           0.5 * (highs - lows)).min(axis=1)
         best, best_key = None, (True, math.inf, math.inf)
@@ -133,7 +145,8 @@ class PassageRules:
                 best = Passage(first, low, high, float((group.s - group.half_length).min()))
         return best
 
-    def _slots(self, group: Obstacles, nodes: Array, margin: float) -> tuple[Array, Array]:
+    def _slots(self, group: Obstacles, half_width: float, nodes: Array,
+               margin: float) -> tuple[Array, Array]:
         """
         Bound the offset in each slot: slot j passes left of the first j, right of the others.
 
@@ -143,8 +156,8 @@ class PassageRules:
         """
         reach = group.half_length + self.half_length + margin
         beside = np.abs(nodes - group.s[:, None]) <= reach[:, None]
-        above = np.where(beside, (group.d + group.half_width + self.half_width)[:, None], -np.inf)
-        below = np.where(beside, (group.d - group.half_width - self.half_width)[:, None], np.inf)
+        above = np.where(beside, (group.d + group.half_width + half_width)[:, None], -np.inf)
+        below = np.where(beside, (group.d - group.half_width - half_width)[:, None], np.inf)
         nobody = np.full((1, len(nodes)), np.inf)
         lows = np.maximum.accumulate(np.concatenate((-nobody, above)), axis=0)
         highs = np.minimum.accumulate(np.concatenate((below, nobody))[::-1], axis=0)[::-1]

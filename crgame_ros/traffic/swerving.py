@@ -3,32 +3,56 @@
 """One reference per lane around what stands in it, shared by all agents there (FS M1)."""
 
 import numpy as np
+from scipy.signal import bilinear, lfilter
 
 from crgame_ros.traffic.elastic_band import ElasticBand
-from crgame_ros.traffic.lane_graph import FloatArray, LaneGraph
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.tracking import pursuit_distance
 
 # A swerve begins and ends within this distance of its obstacle [m].
 REACH = 80.0
+# As wide as a truck may be in most countries [m].
+WIDEST = 2.55
+# Slower than this agents needn't be in any curve [m/s].
+SLOWEST = 2.0
+# Cutting a swerve may take so much of the clearance [m].
+CUT = 0.1
+# What is in front of the rear axles of cars and trucks, whose fronts swing out [m].
+FRONTS = (0.0, 3.5, 6.0)
+# Speeds at which cutting is looked at [m/s]; below, agents steer for the same distance ahead.
+SPEEDS = (4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0)
 
 
 class Swerving:
     """
     The references of all lanes: offsets from their centre lines.
 
+    One band for all widths: it is made for the widest vehicles wherever these have room, which
+    gives cars more clearance than they ask for, and for cars elsewhere.
+
     :param graph: the lanes.
     :param routes: their straightest continuations.
+    :param lateral_acceleration: comfortable in curves [m/s^2]
+    :param widest: vehicle that drives there [m]
 
-    Attribute `reference`: offset at each row of the lanes' tables [m].
+    Attributes at each row of the lanes' tables: `reference`, offset [m]; `curvature`, of the band,
+    to be added to the lane's [1/m]; `speed`, at which agents follow it, infinite where they drive
+    on the centre line [m/s]. `version` counts the plans.
     """
 
-    def __init__(self, graph: LaneGraph, routes: Routes) -> None:
+    def __init__(self, graph: LaneGraph, routes: Routes, lateral_acceleration: float = 2.0,
+                 widest: float = WIDEST) -> None:
         self._graph = graph
         self._routes = routes
-        self._band = ElasticBand()
+        self._band = ElasticBand(wide_half_width=0.5 * widest)
+        self._lateral_acceleration = lateral_acceleration
         self.reference: FloatArray = np.zeros(len(graph.x))
+        self.curvature: FloatArray = np.zeros(len(graph.x))
+        self.speed: FloatArray = np.full(len(graph.x), np.inf)
+        self.version = 0
         self._seen: bytes = b''
 
     def update(self, standing: Entries) -> None:
@@ -42,7 +66,10 @@ class Swerving:
         if seen == self._seen:
             return
         self._seen = seen
+        self.version += 1
         self.reference[:] = 0.0
+        self.curvature[:] = 0.0
+        self.speed[:] = np.inf
         planned: set[int] = set()
         for lane in np.unique(standing.lane).tolist():
             if lane not in planned:
@@ -57,21 +84,23 @@ class Swerving:
         at = np.clip(np.searchsorted(starts, grid, side='right') - 1, 0, len(chain) - 1)
         of = np.array(chain)[at]
         half = graph.half_width[graph.rows(of, grid - starts[at])]
-        parts = [np.flatnonzero(standing.lane == i) for i in chain]
-        number = np.repeat(np.arange(len(chain)), [len(p) for p in parts])
-        row = np.concatenate(parts)
-        s = 0.5 * (standing.rear[row] + standing.front[row]) + starts[number]
-        obstacles = Obstacles(
-            np.zeros(len(row), dtype=np.intp), s, 0.5 * (standing.low[row] + standing.high[row]),
-            0.5 * (standing.front[row] - standing.rear[row]),
-            0.5 * (standing.high[row] - standing.low[row]))
+        obstacles = _along(chain, starts, standing)
         bands = self._band.relax(half[None, :], half[None, :],
                                  graph.limit[[lane]], obstacles)
+        d, curvature = bands.d[0], bands.curvature[0]
+        cut = self._lateral_acceleration / cutting_speed(d, step, obstacles)**2
         for i, begin in zip(chain, starts, strict=False):
             if i not in planned:
                 rows = slice(int(graph.first[i]), int(graph.first[i] + graph.count[i]))
                 own = np.arange(int(graph.count[i])) * graph.step[i] + begin
-                self.reference[rows] = np.interp(own, grid, bands.d[0])
+                self.reference[rows] = np.interp(own, grid, d)
+                self.curvature[rows] = np.interp(own, grid, curvature)
+                bend = np.where(np.abs(self.reference[rows]) < 1e-3, 0.0, np.abs(
+                    self.curvature[rows] + graph.curvature[rows]))
+                bend = np.maximum(bend, np.interp(own, grid, cut))
+                with np.errstate(divide='ignore'):
+                    self.speed[rows] = np.maximum(
+                        np.sqrt(self._lateral_acceleration / bend), SLOWEST)
         return set(chain)
 
     def _chain(self, lane: int) -> list[int]:
@@ -93,3 +122,55 @@ class Swerving:
             chain.insert(0, before[0])
             length += float(graph.length[before[0]])
         return chain
+
+
+def _along(chain: list[int], starts: FloatArray, standing: Entries) -> Obstacles:
+    """Give what stands in a chain of lanes, by the distance from its beginning."""
+    parts = [np.flatnonzero(standing.lane == i) for i in chain]
+    number: IntArray = np.repeat(np.arange(len(chain)), [len(p) for p in parts])
+    row = np.concatenate(parts)
+    return Obstacles(
+        np.zeros(len(row), dtype=np.intp),
+        0.5 * (standing.rear[row] + standing.front[row]) + starts[number],
+        0.5 * (standing.low[row] + standing.high[row]),
+        0.5 * (standing.front[row] - standing.rear[row]),
+        0.5 * (standing.high[row] - standing.low[row]))
+
+
+def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArray:
+    """
+    Give the speeds at which agents that steer as `tracking.steer` does keep to a band's clearance.
+
+    They steer for a point that is farther ahead the faster they drive, and so cut what is shorter
+    than that. On small angles a rear axle that steers for the point at the distance l moves as
+    l^2 y'' / 2 + l y' + y = d(s + l), and what is f in front of it is at y + f y'.
+
+    :param d: (S,) offsets at s = 0, step, ... [m]
+    :return: (S,) infinite away from obstacles [m/s]
+    """
+    result = np.full(len(d), np.inf)
+    if not len(obstacles.s) or not np.abs(d).max() > CUT:
+        return result
+    s = step * np.arange(len(d))
+    beside = np.abs(s[:, None] - obstacles.s) <= obstacles.half_length + step
+    side = np.sign(np.interp(obstacles.s, s, d) - obstacles.d)
+    allowed = np.full(len(obstacles.s), SPEEDS[0])
+    fine = np.ones(len(obstacles.s), dtype=bool)
+    for speed in SPEEDS:
+        distance = float(pursuit_distance(np.array(speed)))
+        driven = lfilter(*bilinear([2.0], [distance**2, 2.0 * distance, 2.0], 1.0 / step),
+                         np.interp(s + distance, s, d))
+        slope = np.gradient(driven, step)
+        lost = np.max([d - np.interp(s - front, s, driven + front * slope)
+                       for front in FRONTS], axis=0)[:, None]
+        gained = np.min([d - np.interp(s - front, s, driven + front * slope)
+                         for front in FRONTS], axis=0)[:, None]
+        worst = np.where(beside, np.where(side > 0.0, lost, -gained), -np.inf).max(axis=0)
+        fine &= worst < CUT
+        allowed[fine] = speed
+    allowed[fine] = np.inf
+    for at, length, speed in zip(obstacles.s, obstacles.half_length, allowed, strict=True):
+        near = (s > at - length - max(FRONTS) - 2.0 * min(speed, SPEEDS[-1])) & (
+            s < at + length + max(FRONTS))
+        result[near] = np.minimum(result[near], speed)
+    return result

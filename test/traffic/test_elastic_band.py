@@ -226,6 +226,33 @@ def test_random_obstacles_are_avoided_or_the_lane_is_blocked() -> None:
     assert passed > 200
 
 
+@pytest.mark.parametrize(('side', 'clearance'), [
+    # An obstacle leaves 3.25, 3.15, 2.85 or 2.55 m of a lane: of what 2.5 m leave over the
+    # clearance is up to 0.5 m; where less than 0.2 m are left the band is for cars.
+    (-1.375, {2.5: 0.5, 2.0: 0.75}), (-1.275, {2.5: 0.5, 2.0: 0.75}),
+    (-0.975, {2.5: 0.35, 2.0: 0.6}), (-0.675, {2.0: 0.5}), (0.0, {})])
+def test_a_band_is_for_the_widest_where_they_have_room(side: float,
+                                                       clearance: dict[float, float]) -> None:
+    found = obstacles((0, 150.0, side - 0.5, 2.0, 0.5))
+    for wide in (True, False):
+        band = ElasticBand(wide_half_width=1.25) if wide else ElasticBand()
+        bands = one_lane(band, found, left=1.875, right=1.875)
+        assert len(bands.blocked_s) == (not clearance)
+        beside = bands.d[0, 146:155].min() - side
+        for width, least in clearance.items() if wide else ():
+            assert beside - 0.5 * width == pytest.approx(least, abs=0.02)
+
+
+def test_what_is_too_tight_for_the_widest_is_left_to_cars() -> None:
+    # A slalom that a way for 2 m of width bends through; for 3 m its curvature would be 0.12 / m.
+    found = obstacles(*((0, 130.0 + 9.0 * i, (-1) ** i * 2.3, 0.3, 1.1) for i in range(4)))
+    cars, both = (one_lane(ElasticBand(max_curvature=0.1, wide_half_width=half), found, left=3.4,
+                           right=3.4) for half in (None, 1.5))
+    assert len(cars.blocked_s) == 0 and np.abs(cars.d).max() > 1.0
+    np.testing.assert_array_equal(both.d, cars.d)
+    np.testing.assert_array_equal(both.blocked_s, cars.blocked_s)
+
+
 def test_the_same_question_has_the_same_answer() -> None:
     """Bit for bit, asked again, by a new band, and after another question in between."""
     first, second = obstacles((0, 150.0, 0.0, 2.0, 0.8)), obstacles((0, 160.0, 0.0, 2.0, 0.8))
