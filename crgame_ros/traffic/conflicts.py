@@ -12,8 +12,9 @@ import shapely
 
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.driving_side import DrivingSide, RIGHT_HAND
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.movements import LEFT, Movements, UNDECIDED
+from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, UNDECIDED
 
 # Two vehicles meet where their lanes' centres are closer than a vehicle's width and a margin [m].
 WIDTH = 2.6
@@ -82,16 +83,18 @@ class Conflicts:
     """
     Pairs of lanes that cross, merge or overlap; each is two rows, one seen from either lane.
 
-    The rows of a lane are `first[lane]:first[lane] + count[lane]`. Vehicles keep to the right.
+    The rows of a lane are `first[lane]:first[lane] + count[lane]`.
 
     :param graph: the lanes.
     :param movements: of the lanes; made anew if not given.
+    :param side: on which vehicles keep.
 
     Attribute `table`: the rows; its columns for cars are `lane`, `other`, `start`, `end` and
     `priority`.
     """
 
-    def __init__(self, graph: LaneGraph, movements: Movements | None = None) -> None:
+    def __init__(self, graph: LaneGraph, movements: Movements | None = None,
+                 side: DrivingSide = RIGHT_HAND) -> None:
         self._graph = graph
         movements = Movements(graph) if movements is None else movements
         rows: list[tuple[int, int, _Stretch]] = []
@@ -113,7 +116,7 @@ class Conflicts:
         self.first: IntArray = np.cumsum(self.count) - self.count
         self.rank: IntArray = np.array([_rank(graph, i) for i in range(len(graph))])
         self.priority: IntArray = np.array(
-            [_priority(movements, self.rank, r[0], r[1]) for r in rows], dtype=np.int64)
+            [_priority(movements, side, self.rank, r[0], r[1]) for r in rows], dtype=np.int64)
         # The ways join for good: one goes on behind the other.
         last = self.end > graph.length[self.lane] - 1.0
         self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
@@ -227,19 +230,25 @@ def _rank(graph: LaneGraph, lane: int) -> int:
         seen.add(current)
 
 
-def _priority(movements: Movements, rank: IntArray, i: int, j: int) -> int:
-    """Decide between two lanes: signs, then the left turn yields, then priority to the right."""
+def _priority(movements: Movements, side: DrivingSide, rank: IntArray, i: int, j: int) -> int:
+    """Decide between two lanes: signs, then the turn across yields, then priority to the right."""
     if rank[i] != rank[j]:
         return 1 if rank[i] > rank[j] else -1
     # Between the ways over the whole junction: a lanelet may be the end of a turn only.
     turn = wrap_pi(float(movements.heading[j] - movements.heading[i]))
-    bend = [float(movements.angle[lane]) for lane in (i, j)]
     if abs(turn) > 2.2:
-        left = [LEFT == movement if movement != UNDECIDED else angle > TURN
-                for movement, angle in zip(movements.turn[[i, j]], bend, strict=True)]
-        return 0 if left[0] == left[1] else -1 if left[0] else 1
+        across = [_turns_across(movements, side, lane) for lane in (i, j)]
+        return 0 if across[0] == across[1] else -1 if across[0] else 1
     if abs(turn) < 0.6:
-        bend = [abs(angle) for angle in bend]
+        bend = [abs(float(movements.angle[lane])) for lane in (i, j)]
         return 0 if abs(bend[0] - bend[1]) < 0.2 else 1 if bend[0] < bend[1] else -1
     # Who comes from the right drives to the left.
-    return -1 if turn > 0.0 else 1
+    return -1 if (turn > 0.0) is not side.priority_to_left else 1
+
+
+def _turns_across(movements: Movements, side: DrivingSide, lane: int) -> bool:
+    """Tell whether a lane belongs to a turn over the lanes of oncoming traffic."""
+    if movements.turn[lane] == UNDECIDED:
+        angle = float(movements.angle[lane])
+        return (-angle if side.keeps_left else angle) > TURN
+    return bool(movements.turn[lane] == (RIGHT if side.keeps_left else LEFT))

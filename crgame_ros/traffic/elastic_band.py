@@ -83,12 +83,13 @@ class ElasticBand:
         of 12 m [1/m]
     :param wide_half_width: of the widest vehicles: the band is theirs too wherever there is room
         for them with the least clearance; None without such [m]
+    :param keeps_left: whether traffic does; between equal sides the band takes the road's middle
     """
 
     def __init__(self, step: float = 1.0, clearance: float = 0.5, min_clearance: float = 0.2,
                  half_width: float = 1.0, half_length: float = 2.5, band_time: float = 1.2,
                  min_band_length: float = 4.0, max_curvature: float = 0.15,
-                 wide_half_width: float | None = None) -> None:
+                 wide_half_width: float | None = None, keeps_left: bool = False) -> None:
         for name, value in (('step', step), ('half_width', half_width),
                             ('half_length', half_length), ('band_time', band_time),
                             ('min_band_length', min_band_length),
@@ -101,7 +102,7 @@ class ElasticBand:
                              'do not fit', 'elastic band', 'give 0 <= min_clearance <= clearance')
         self.step = step
         self._rules = PassageRules(clearance, min_clearance, half_width, half_length,
-                                   max(half_width, wide_half_width or 0.0))
+                                   max(half_width, wide_half_width or 0.0), not keeps_left)
         self._band_time = band_time
         self._min_band_length = min_band_length
         self._max_curvature = max_curvature

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Sides whose offsets differ by less are equal: the one with more room is taken, then the left.
+# Sides whose offsets differ by less are equal: the one with more room is taken, then the middle's.
 TIE = 0.05
 # The band gives way to an obstacle by less than this.
 SLACK = 1e-3
@@ -76,6 +76,7 @@ class PassageRules:
     half_width: float
     half_length: float
     wide_half_width: float
+    left_first: bool = True
 
     def in_the_way(self, obstacles: Obstacles) -> NDArray[np.bool_]:
         """Tell which of them are nearer to the centre line than a vehicle and its clearance."""
@@ -101,7 +102,7 @@ class PassageRules:
         Choose the way past a group: through which of the slots between neighbours across.
 
         A way with full clearance goes before one without, then the smaller offset, then more
-        room, then the left.
+        room, then the side that goes first.
 
         :param step: of the grid [m]
         :param left: (S,) room to the left of the centre line at the nodes [m]
@@ -127,8 +128,9 @@ class PassageRules:
         room = np.minimum(np.minimum(edge_high - lows, highs - edge_low),
                           0.5 * (highs - lows)).min(axis=1)
         best, best_key = None, (True, math.inf, math.inf)
-        # From the left, which so wins a tie.
-        for slot in range(len(room) - 1, -1, -1):
+        slots = range(len(room))
+        # The side that goes first so wins a tie.
+        for slot in reversed(slots) if self.left_first else slots:
             if room[slot] < self.min_clearance - EQUAL:
                 continue
             margin = min(room[slot], self.clearance) + SLACK

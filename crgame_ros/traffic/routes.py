@@ -30,11 +30,13 @@ class Routes:
     :param costly: (L) what driving along a lane costs besides its length [m]
     :param tight: (L) which lanes are too tight for long vehicles. The tables have a second row
         for each destination then, D further on, with the ways of these.
+    :param keeps_left: whether traffic does; where both sides lead on it takes the inner one.
     """
 
     def __init__(self, graph: LaneGraph, costly: FloatArray | None = None,
-                 tight: NDArray[np.bool_] | None = None) -> None:
+                 tight: NDArray[np.bool_] | None = None, keeps_left: bool = False) -> None:
         self._graph = graph
+        self._keeps_left = keeps_left
         self._length = graph.length if costly is None else graph.length + costly
         lanes = np.arange(len(graph))
         stay, change = _edges(graph, self._length)
@@ -102,7 +104,8 @@ class Routes:
             for side in (graph.left, graph.right)])
         better = np.min(aside, axis=0) + DETOUR < stay
         # 1: to the left, -1: to the right, 0: this lane leads there.
-        self.change: IntArray = np.where(better, np.where(aside[0] <= aside[1], 1, -1), 0)
+        to_left = aside[0] < aside[1] if self._keeps_left else aside[0] <= aside[1]
+        self.change: IntArray = np.where(better, np.where(to_left, 1, -1), 0)
         self.remaining: FloatArray = np.repeat(graph.length[None, :], count, axis=0)
         for _ in range(8):
             following = np.maximum(self.next, 0)

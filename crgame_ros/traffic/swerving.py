@@ -37,6 +37,7 @@ class Swerving:
     :param routes: their straightest continuations.
     :param lateral_acceleration: comfortable in curves [m/s^2]
     :param widest: vehicle that drives there [m]
+    :param keeps_left: whether traffic does.
 
     Attributes at each row of the lanes' tables: `reference`, offset [m]; `curvature`, of the band,
     to be added to the lane's [1/m]; `speed`, at which agents follow it, infinite where they drive
@@ -44,10 +45,10 @@ class Swerving:
     """
 
     def __init__(self, graph: LaneGraph, routes: Routes, lateral_acceleration: float = 2.0,
-                 widest: float = WIDEST) -> None:
+                 widest: float = WIDEST, keeps_left: bool = False) -> None:
         self._graph = graph
         self._routes = routes
-        self._band = ElasticBand(wide_half_width=0.5 * widest)
+        self._band = ElasticBand(wide_half_width=0.5 * widest, keeps_left=keeps_left)
         self._lateral_acceleration = lateral_acceleration
         self.reference: FloatArray = np.zeros(len(graph.x))
         self.curvature: FloatArray = np.zeros(len(graph.x))
