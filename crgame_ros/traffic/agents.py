@@ -41,8 +41,8 @@ class AgentTable(Protocol):
     :param calm_until: tick before which it does not think of changing lanes again;
         `content_until` the same for changes for speed alone.
     :param waits: ticks for which it has been standing.
-    :param grant: tick at which it was let into a junction, or -1; entered, until: the lanes with
-        which that one begins and ends.
+    :param grant: tick at which it was let into a junction, or -1; until: the lane with which that one
+        ends; grant_left: how far away that is [m].
     :param previous: lane before its present one, or -1.
     :param side: 1 while it changes to the left, -1 to the right.
     :param relief: how much of its desired gap it forgoes for now [m].
@@ -79,8 +79,8 @@ class AgentTable(Protocol):
     content_until: IntArray
     waits: IntArray
     grant: IntArray
-    entered: IntArray
     until: IntArray
+    grant_left: FloatArray
     previous: IntArray
     side: IntArray
     relief: FloatArray
@@ -120,7 +120,7 @@ class Agents:
         self.rear_to_center[:] = REAR_TO_CENTER * self.length
         self.top[:] = [TOP_SPEED.get(x.type, np.inf) for x in descriptions]
         self.factor[:] = 1.0
-        for name in ('source', 'grant', 'until', 'entered', 'previous'):
+        for name in ('source', 'grant', 'until', 'previous'):
             getattr(self, name)[:] = NOBODY
         self.leader[:] = self.blocker[:] = FREE
 
@@ -155,7 +155,7 @@ class Agents:
     source: IntArray
     grant: IntArray
     until: IntArray
-    entered: IntArray
+    grant_left: FloatArray
     previous: IntArray
     side: IntArray
     leader: IntArray
@@ -195,7 +195,7 @@ class Agents:
             zero[slot] = 0
         self.content_until[slot] = self.insists_until[slot] = 0
         self.leader[slot] = self.blocker[slot] = FREE
-        for none in (self.source, self.grant, self.until, self.entered, self.previous):
+        for none in (self.source, self.grant, self.until, self.previous):
             none[slot] = NOBODY
 
     def remove(self, slots: IntArray, k: int) -> None:

@@ -106,6 +106,11 @@ class LaneChanges:
         self._courtesy = CourtesyRules()
         self._patience = max(1, round(self._courtesy.patience / time_step_s))
 
+    @staticmethod
+    def no_change(speed: FloatArray) -> FloatArray:
+        """Give how far before a junction or a line nobody changes lanes any more [m]."""
+        return np.asarray(NO_CHANGE + speed**2 / (2.0 * BEFORE_JUNCTION))
+
     def finish(self, k: int, agents: Agents) -> None:
         """End the changes that have come to their end, and those that come to nothing."""
         done = agents.s - agents.from_s
@@ -123,7 +128,8 @@ class LaneChanges:
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
                acceleration: FloatArray, gap: FloatArray, blocked: FloatArray,
-               standing: BoolArray, entries: Entries, way: Ways) -> FloatArray:
+               standing: BoolArray, entries: Entries, way: Ways,
+               halts: BoolArray) -> FloatArray:
         """
         Begin lane changes, and say how those brake who make room.
 
@@ -134,10 +140,11 @@ class LaneChanges:
         :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
         :param standing: (E) which entries are such obstacles.
         :param way: of the agents.
+        :param halts: (A) whether one is about to halt at a light or junction.
         :return: (A) accelerations that courtesy allows, inf where it asks for nothing.
         """
         yielding = np.full(agents.count, np.inf)
-        wish = self._wishes(k, agents, slots, gap, blocked, entries)
+        wish = self._wishes(k, agents, slots, gap, blocked, entries, halts)
         if wish is None:
             return yielding[slots]
         wish = wish.take(~_blocked(wish, standing))
@@ -155,7 +162,7 @@ class LaneChanges:
         return yielding[slots]
 
     def _wishes(self, k: int, agents: Agents, slots: IntArray, gap: FloatArray,
-                blocked: FloatArray, entries: Entries) -> Wish | None:
+                blocked: FloatArray, entries: Entries, halts: BoolArray) -> Wish | None:
         """List who may want to change to which side; urgency -1 is for speed alone."""
         graph, routes, found = self._graph, self._routes, []
         lane, destination = agents.lane[slots], agents.destination[slots]
@@ -170,9 +177,8 @@ class LaneChanges:
         has = np.isfinite(self._conflicts.table.entry)
         onto = routes.next[destination, lane]
         junction = has[wide, lane] | ((onto >= 0) & has[wide, np.maximum(onto, 0)] & (
-            graph.length[lane] - agents.s[slots]
-            <= NO_CHANGE + agents.speed[slots]**2 / (2.0 * BEFORE_JUNCTION)))
-        free &= ~junction
+            graph.length[lane] - agents.s[slots] <= self.no_change(agents.speed[slots])))
+        free &= ~junction & ~halts
         content = agents.content_until[slots] <= k
         content &= (slots * (len(slots) > AT_ONCE) + k) % self._thoughts == 0
         for side, table in ((1, graph.left), (-1, graph.right)):

@@ -21,6 +21,8 @@ BoolArray = NDArray[np.bool_]
 STANDING = 0.05
 # A leader that is faster drives on [m/s].
 DRIVES_ON = 3.0
+# A grant ends so far behind its junction [m].
+PASSED = 1.0
 # What others are expected to bear at most [m/s^2], and how fast agents get to and out of
 # conflicts when they hurry, go steadily, and take their time [m/s^2].
 HURRY, TIMID = 1.8, 0.7
@@ -117,6 +119,7 @@ class Crossings:
     def __init__(self, conflicts: Conflicts, rules: CrossingRules, time_step_s: float) -> None:
         self._conflicts = conflicts.table
         self._rules = rules
+        self._time_step_s = time_step_s
         self._ticks = np.array([max(1, round(seconds / time_step_s)) for seconds in (
             rules.patience, rules.zipper, 1.0)])
 
@@ -128,8 +131,8 @@ class Crossings:
         :return: (A) distance of the front from where it has to halt, or inf [m]; for whom is
             noted in `Agents.blocker`.
         """
-        return _halts(self._conflicts, self._rules, self._ticks, k, agents.table, way, passage,
-                      arrivals, situation)
+        return _halts(self._conflicts, self._rules, self._ticks, self._time_step_s, k,
+                      agents.table, way, passage, arrivals, situation)
 
 
 @compiled
@@ -154,11 +157,11 @@ def queues(agents: AgentTable, slots: IntArray, pairs: Pairs,
 
 
 @compiled
-def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, k: int,
+def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s: float, k: int,
            agents: AgentTable, way: Ways, passage: Passages, arrivals: Arrivals,
            at: Situation) -> FloatArray:
     slots, count = at.slots, len(at.slots)
-    _release(agents, slots, way, passage)
+    _release(agents, slots, way, dt_s)
     stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     for i in range(count):
         # Nobody is let in past somebody who waits before the same junction.
@@ -172,13 +175,14 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, k: i
             agents.grant[slot] = NOBODY
     for i in _in_turn(k, agents, slots):
         slot = slots[i]
-        if passage.first[i] < 0 or agents.grant[slot] >= 0:
+        if passage.first[i] < 0 or (
+                agents.grant[slot] >= 0 and _covers(agents, slot, way, passage, i)):
             continue
         inside = passage.hold[i] < -1.0
         if inside or _may_enter(rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
             agents.grant[slot] = k
             agents.until[slot] = way.lane[i, passage.last[i]]
-            agents.entered[slot] = way.lane[i, passage.first[i]]
+            agents.grant_left[slot] = passage.end[i] + 0.5 * agents.length[slot]
     halt = np.full(count, math.inf)
     for i, slot in enumerate(slots):
         if passage.first[i] >= 0:
@@ -196,20 +200,27 @@ def _is_near(speed: float, hold: float) -> bool:
 
 
 @compiled
-def _release(agents: AgentTable, slots: IntArray, way: Ways, passage: Passages) -> None:
+def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> None:
     """Take back what agents were granted that have passed their junction."""
     for i, slot in enumerate(slots):
         if agents.grant[slot] < 0:
             continue
+        # A lane may be on the way again later: how far it is counts as well.
+        agents.grant_left[slot] -= agents.speed[slot] * dt_s
         ahead = False
         for step in range(way.count[i]):
             ahead |= way.lane[i, step] == agents.until[slot]
-        first = passage.first[i]
-        # A lane may be on the way again later: then its beginning is the next junction's.
-        again = first > 0 and passage.hold[i] > 0.0 and (
-            way.lane[i, first] != agents.entered[slot])
-        if not ahead or first < 0 or again:
+        if not ahead or agents.grant_left[slot] < -PASSED:
             agents.grant[slot] = NOBODY
+
+
+@compiled
+def _covers(agents: AgentTable, slot: int, way: Ways, passage: Passages, i: int) -> bool:
+    """Tell whether what an agent was granted holds for all of the junction ahead."""
+    for step in range(passage.last[i], way.count[i]):
+        if way.lane[i, step] == agents.until[slot]:
+            return True
+    return False
 
 
 @compiled

@@ -3,9 +3,11 @@
 """Where traffic lights and stop signs want agents to halt."""
 
 from collections.abc import Mapping
+import math
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
+from commonroad.scenario.traffic_light import TrafficLight, TrafficLightDirection
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,8 @@ from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, STRAIGHT, UNDEC
 YELLOW, RED = 1, 2
 LEVELS = {'yellow': YELLOW, 'red': RED, 'redYellow': RED}
 ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
+# Cycles of several lights are compared over so many time steps.
+LONGEST_CYCLE = 20_000
 # Hardest braking for a light that is red, and for one that turns yellow [m/s^2].
 RED_BRAKING = 6.0
 YELLOW_BRAKING = 3.0
@@ -41,7 +45,8 @@ class HaltingLines:
 
     A light without arrows is for everybody, one with arrows for who goes where they point. What a
     way does is decided by the first lane on it, from the one with the light on, whose `movement`
-    is. Where no light is for a movement, all are.
+    is. Where no light is for a movement, all are; where those for it would never all be free, the
+    arrows alone.
 
     :param graph: the lanes.
     :param roads: with the traffic lights and signs.
@@ -64,7 +69,8 @@ class HaltingLines:
         self.at: FloatArray = graph.length.copy()
         self.number: IntArray = np.full(count, -1, dtype=np.int64)
         self.shown: IntArray = np.zeros((count, 4), dtype=np.int64)
-        self._lights: dict[int, tuple[tuple[int, str], ...]] = {}
+        # Ids of the lights for each movement, by lane.
+        self._lights: dict[int, dict[int, tuple[int, ...]]] = {}
         rows: list[IntArray] = []
         for lane, lanelet_id in enumerate(graph.ids):
             lanelet = roads.find_lanelet_by_id(lanelet_id)
@@ -73,7 +79,8 @@ class HaltingLines:
                 self.stop_sign[lane] = _has_stop_sign(lanelet, roads)
             lights = _lights(lanelet, roads)
             if lights:
-                self._lights[lane] = lights
+                self._lights[lane] = {movement: _governing(lights, arrow)
+                                      for movement, arrow in ARROWS.items()}
                 self.number[lane] = len(rows)
                 rows.append(movements.after(lane))
                 if lanelet.stop_line is None and movements.is_first(lane):
@@ -98,10 +105,8 @@ class HaltingLines:
             return
         self._states = dict(signals)
         for lane, lights in self._lights.items():
-            level = {i: LEVELS.get(signals.get(i, ''), 0) for i, _ in lights}
-            for movement, arrow in ARROWS.items():
-                for_it = [level[i] for i, arrows in lights if arrows == 'all' or arrow in arrows]
-                self.shown[lane, movement] = max(for_it or level.values())
+            for movement, ids in lights.items():
+                self.shown[lane, movement] = max(LEVELS.get(signals.get(i, ''), 0) for i in ids)
             possible = np.unique(self.movement[self.number[lane]])
             possible = possible[possible != UNDECIDED]
             self.shown[lane, UNDECIDED] = self.shown[
@@ -166,11 +171,38 @@ def _has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
                for element in sign.traffic_sign_elements)
 
 
-def _lights(lanelet: Lanelet, roads: LaneletNetwork) -> tuple[tuple[int, str], ...]:
-    """List the lights of a lanelet, and the arrows of each in lower case or `all`."""
+def _lights(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:
+    """List the lights of a lanelet and of its stop line."""
     ids = set(lanelet.traffic_lights)
     if lanelet.stop_line is not None:
         ids |= lanelet.stop_line.traffic_light_ref or set()
-    found = [(i, roads.find_traffic_light_by_id(i)) for i in sorted(ids)]
-    return tuple((i, 'all' if light.direction is None else light.direction.value.lower())
-                 for i, light in found if light is not None)
+    found = (roads.find_traffic_light_by_id(i) for i in sorted(ids))
+    return [light for light in found if light is not None]
+
+
+def _governing(lights: list[TrafficLight], arrow: str) -> tuple[int, ...]:
+    """Give the ids of the lights that are for a movement."""
+    everybody = [x for x in lights if x.direction in (None, TrafficLightDirection.ALL)]
+    arrows = [x for x in lights if x not in everybody and arrow in x.direction.value.lower()]
+    chosen = everybody + arrows or lights
+    if everybody and arrows and _is_never_free(chosen):
+        chosen = arrows
+    return tuple(x.traffic_light_id for x in chosen)
+
+
+def _is_never_free(lights: list[TrafficLight]) -> bool:
+    """Tell whether at any time one of some lights is red."""
+    red = [_red_steps(light) for light in lights]
+    step = np.arange(min(math.lcm(*(len(x) for x in red)), LONGEST_CYCLE))
+    return bool(np.any([x[step % len(x)] for x in red], axis=0).all())
+
+
+def _red_steps(light: TrafficLight) -> NDArray[np.bool_]:
+    """Tell for the time steps of a light's cycle whether it is red."""
+    cycle = light.traffic_light_cycle
+    elements = cycle.cycle_elements if cycle is not None and light.active else []
+    steps = np.repeat([LEVELS.get(x.state.value, 0) == RED for x in elements],
+                      [max(x.duration, 0) for x in elements])
+    if not len(steps):
+        return np.zeros(1, dtype=bool)
+    return np.asarray(np.roll(steps, int(cycle.time_offset or 0)))

@@ -74,7 +74,7 @@ class Corridors(NamedTuple):
 
 def look_distance(speed: FloatArray) -> FloatArray:
     """Give how far ahead an agent looks: it stops in half of that, comfortably [m]."""
-    return np.asarray(30.0 + 3.0 * speed + speed**2 / 4.0)
+    return np.asarray(50.0 + 3.0 * speed + speed**2 / 4.0)
 
 
 @compiled

@@ -18,6 +18,7 @@ from crgame_ros.traffic.changing import LaneChanges
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fade_relief, relief_at_change
 from crgame_ros.traffic.crossings import CrossingRules, Crossings, queues, Situation
+from crgame_ros.traffic.driving_side import driving_side
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
 from crgame_ros.traffic.lane_cells import LaneCells
@@ -97,19 +98,21 @@ class Traffic:
         self._random = np.random.Generator(np.random.PCG64(
             seed if spec.seed is None else spec.seed))
         self._graph = LaneGraph(network, spec.lateral_acceleration)
-        movements = Movements(self._graph)
-        self._conflicts = Conflicts(self._graph, movements)
+        side, movements = driving_side(scenario), Movements(self._graph)
+        self._conflicts = Conflicts(self._graph, movements, side)
         self._cells = LaneCells(self._graph)
         self._routes = Routes(
             self._graph, np.where(self._conflicts.tapers(), TAPER_COST, 0.0),
-            tight_lanes(self._graph))
+            tight_lanes(self._graph), side.keeps_left)
         self._lines = HaltingLines(self._graph, scenario.lanelet_network, movements)
         self._model: CarFollowing = CAR_FOLLOWING.create(spec.model, spec.options, 'traffic')
         self._longitudinal = Longitudinal(self._graph, self._model)
         self._changes = LaneChanges(self._graph, self._routes, self._conflicts, self._model,
                                     spec.politeness, spec.cooperative, time_step_s)
         self._crossings = Crossings(self._conflicts, CrossingRules(), time_step_s)
-        self._swerving = Swerving(self._graph, self._routes)
+        self._swerving = Swerving(self._graph, self._routes, spec.lateral_acceleration,
+                                  keeps_left=side.keeps_left)
+        self._slowed = self._swerving.version
         self._waiting, self._insisting, self._last_resort = (
             round(seconds / time_step_s) for seconds in (WAITS, INSISTS, LAST_RESORT))
         # Agents taken off the road because they stood in a circle that nobody could open.
@@ -177,6 +180,9 @@ class Traffic:
             standing = _standing(entries, self._others.standing(others))
             if spec.swerve:
                 self._swerving.update(entries.take(np.flatnonzero(standing)))
+                if self._swerving.version != self._slowed:
+                    self._slowed = self._swerving.version
+                    self._longitudinal.slow_for(self._swerving.speed)
             acceleration = self._decide(others.k, slots, entries, standing)
             self._motion.move(agents, slots, acceleration, self._swerving.reference,
                               self._substeps)
@@ -209,7 +215,8 @@ class Traffic:
             speed, self._lane_ends(way, agents.length[slots]), AT_END))
         if self._spec.lane_changes:
             acceleration = np.minimum(acceleration, self._changes.decide(
-                k, agents, slots, desired, acceleration, gap, blocked, standing, entries, way))
+                k, agents, slots, desired, acceleration, gap, blocked, standing, entries, way,
+                halt < self._changes.no_change(speed)))
         acceleration = smoothed(agents.acceleration[slots], acceleration, speed,
                                 self._time_step_s)
         acceleration = np.maximum(acceleration, -model.max_deceleration)
@@ -281,7 +288,8 @@ class Traffic:
         rear_stop, queued = queues(agents.table, slots, pairs, entries)
         halt = self._crossings.halts(k, agents, way, passage, coming, Situation(
             slots, desired, rear_stop, light, sign, queued))
-        behind = (agents.blocker[slots] == FREE) & (queued < QUEUE)
+        behind = (agents.blocker[slots] == FREE) & (nearest(
+            pairs, entries.owner, len(slots))[0] < QUEUE)
         agents.blocker[slots[behind]] = agents.leader[slots[behind]]
         agents.blocker[slots[np.isfinite(light)]] = FREE
         if (agents.waits[slots] > self._waiting).any():

@@ -177,6 +177,26 @@ def test_the_names_of_the_file_go_before_the_geometry() -> None:
         assert halt(graph, scenario, {50: 'red', 51: 'red', movement: 'green'}, ids) == np.inf
 
 
+@pytest.mark.parametrize(('own', 'waits'), [
+    # Beside a light for everybody that is red from 30 to 100: an arrow that is green (or has no
+    # more to say) meanwhile frees nobody, but for one who could otherwise never go.
+    (((TrafficLightState.GREEN, 60), (TrafficLightState.INACTIVE, 40)), True),
+    (((TrafficLightState.RED, 20), (TrafficLightState.GREEN, 80)), True),
+    (((TrafficLightState.RED, 40), (TrafficLightState.GREEN, 60)), False)], ids=str)
+def test_a_green_arrow_frees_only_who_would_wait_for_ever(
+        own: tuple[tuple[TrafficLightState, int], ...], waits: bool) -> None:
+    everybody, arrow = light(50), light(51, TrafficLightDirection.LEFT)
+    everybody.traffic_light_cycle = TrafficLightCycle([
+        TrafficLightCycleElement(TrafficLightState.GREEN, 30),
+        TrafficLightCycleElement(TrafficLightState.RED, 70)], time_offset=100)
+    arrow.traffic_light_cycle = TrafficLightCycle([TrafficLightCycleElement(*x) for x in own])
+    graph, scenario = fork(everybody, arrow, names=SHARED_FIRST)
+    assert halt(graph, scenario, {50: 'red', 51: 'green'}, [1, 2, 4, 7]) == (
+        48.0 if waits else np.inf)
+    assert halt(graph, scenario, {50: 'green', 51: 'red'}, [1, 2, 4, 7]) == 48.0
+    assert halt(graph, scenario, {50: 'red', 51: 'green'}, [1, 2, 3, 6]) == 48.0
+
+
 @pytest.mark.parametrize(('shown', 'speed', 'acceleration', 'halts'), [
     ('red', 8.0, 0.0, True), ('redYellow', 8.0, 0.0, True), ('yellow', 8.0, 0.0, True),
     ('green', 8.0, 0.0, False), ('inactive', 8.0, 0.0, False),
