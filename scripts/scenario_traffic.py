@@ -24,6 +24,8 @@ BLOCK = 160.0
 MOUTH = 15.0
 # Ids of one crossing's lanelets are this far from those of the next.
 BLOCK_IDS = 100
+# Beyond those of all lanelets.
+SIGN_IDS = 1000000
 WEST, SOUTH, EAST, NORTH = math.pi, -0.5 * math.pi, 0.0, 0.5 * math.pi
 
 
@@ -93,7 +95,7 @@ def town(size: int) -> RoadMap:
 
 def _place(roads: RoadMap, single: RoadMap, first: int, at: tuple[float, float]) -> None:
     """Add a copy of a crossing, its ids from `first` on, its middle elsewhere [m]."""
-    shift, signs = np.array(at), first * 1000
+    shift, signs = np.array(at), SIGN_IDS + first * 1000
     roads.signs += [replace(sign, id=sign.id - SIGN_ID + signs, position=(
         sign.position[0] + at[0], sign.position[1] + at[1])) for sign in single.signs]
     for x in single.lanelets.values():
