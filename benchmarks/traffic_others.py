@@ -25,15 +25,19 @@ VEHICLE = 'length="4.5" width="1.8" minGap="2" speedDev="0"'
 
 
 def timed(step: Callable[[], object], warm_up: int, count: int, limit_s: float) -> list[float]:
-    """Time steps [ms], at least three and no more than fit into a time."""
+    """
+    Time steps [ms], at least three and no more than fit into a time.
+
+    In processor time: whatever else runs on the machine does not count.
+    """
     for _ in range(warm_up):
         step()
     times: list[float] = []
     until_s = time.perf_counter() + limit_s
     while len(times) < 3 or (len(times) < count and time.perf_counter() < until_s):
-        start = time.perf_counter()
+        start = time.process_time()
         step()
-        times.append((time.perf_counter() - start) * 1e3)
+        times.append((time.process_time() - start) * 1e3)
     return times
 
 
