@@ -27,9 +27,9 @@ from pathlib import Path
 import sys
 import time
 
-from judge.driving import drive
 from judge.roads import JudgedRoads
 from judge.verdict import judge, Verdict
+from traffic_drive import drive
 
 from crgame_ros.traffic.spec import TrafficSpec
 
@@ -47,16 +47,17 @@ def default_files() -> list[Path]:
             *sorted((ROOT / 'scenarios').glob('*.xml'))]
 
 
-Task = tuple[Path, TrafficSpec, float, int]
+# File, traffic, duration [s], seed, whether what is recorded takes part.
+Task = tuple[Path, TrafficSpec, float, int, bool]
 Done = tuple[Task, Verdict | None, str, float, float]
 
 
 def run(task: Task) -> Done:
     """Drive and judge one file with one seed."""
-    path, spec, seconds, seed = task
+    path, spec, seconds, seed, recorded = task
     start = time.perf_counter()
     try:
-        driven = drive(path, spec, seconds, seed)
+        driven = drive(path, spec, seconds, seed, recorded)
         middle = time.perf_counter()
         verdict = judge(driven.history, JudgedRoads(driven.scenario.scenario.lanelet_network),
                         driven.recording)
@@ -99,7 +100,7 @@ def total(verdicts: list[Verdict]) -> str:
 
 def report(done: Done, verbose: bool) -> None:
     """Print a run."""
-    (path, _, _, seed), found, error, drive_s, judge_s = done
+    (path, _, _, seed, _), found, error, drive_s, judge_s = done
     if found is None:
         print(f'{path.stem:34}{seed:5}  {error[:150]}', flush=True)
         return
@@ -123,7 +124,8 @@ def arguments() -> argparse.Namespace:
                         help='arrivals an hour at each lane that begins at the edge')
     parser.add_argument('--minutes', type=float, default=5.0)
     parser.add_argument('--seeds', default='0,1,2')
-    parser.add_argument('--recorded', choices=('reactive', 'replayed'), default='reactive')
+    parser.add_argument('--recorded', choices=('reactive', 'replayed', 'absent'),
+                        default='reactive', help='what becomes of recorded vehicles')
     parser.add_argument('--model', default='acc')
     parser.add_argument('--jobs', type=int, default=1)
     parser.add_argument('--verbose', action='store_true', help='print every event')
@@ -134,9 +136,11 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     """Run the benchmark."""
     values = arguments()
-    spec = TrafficSpec(recorded=values.recorded, agents=values.agents, flow=values.flow,
+    recorded = 'reactive' if values.recorded == 'reactive' else 'replayed'
+    spec = TrafficSpec(recorded=recorded, agents=values.agents, flow=values.flow,
                        model=values.model)
-    tasks: list[Task] = [(path, spec, 60.0 * values.minutes, int(seed))
+    tasks: list[Task] = [(path, spec, 60.0 * values.minutes, int(seed),
+                          values.recorded != 'absent')
                          for path in values.files or default_files()
                          for seed in values.seeds.split(',')]
     os.environ.setdefault('OMP_NUM_THREADS', '1')
@@ -159,7 +163,7 @@ def main() -> int:
         values.json.write_text(json.dumps([
             {'file': str(path), 'seed': seed, 'error': error,
              'verdict': None if found is None else {**asdict(found), 'broken': found.broken}}
-            for (path, _, _, seed), found, error, _, _ in results], indent=1), encoding='utf-8')
+            for (path, _, _, seed, _), found, error, _, _ in results], indent=1), encoding='utf-8')
     return 1 if bad else 0
 
 

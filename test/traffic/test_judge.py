@@ -4,6 +4,9 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
+import subprocess
+import sys
 
 from commonroad.scenario.intersection import Intersection, IntersectionIncomingElement
 from commonroad.scenario.scenario import Scenario
@@ -251,6 +254,14 @@ def test_a_change_taken_back_within_12_s_is_undone(straight: JudgedRoads) -> Non
     assert found.changes == 2 and found.count('undone') == 1
     slowly = judge(seen(there[::1][:100]), straight)
     assert slowly.changes == 1 and slowly.count('undone') == 0
+
+
+def test_the_judge_uses_no_code_of_ours(project_root: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', 'import judge.verdict, sys; print(sorted('
+         'x for x in sys.modules if x.startswith("crgame_ros")))'],
+        cwd=project_root / 'benchmarks', capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == '[]'
 
 
 def test_clean_traffic_breaks_nothing(straight: JudgedRoads) -> None:

@@ -5,11 +5,12 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from judge.history import FloatArray, History, rectangle
 import numpy as np
 
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.signals import TrafficLights
@@ -18,7 +19,6 @@ from crgame_ros.traffic.spawning import Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world import WorldView
-from judge.history import FloatArray, History, rectangle
 
 
 @dataclass(frozen=True)
@@ -36,18 +36,21 @@ class Drive:
     scenario: LoadedScenario
 
 
-def drive(path: Path, spec: TrafficSpec, seconds: float, seed: int = 0) -> Drive:
+def drive(path: Path, spec: TrafficSpec, seconds: float, seed: int = 0,
+          recorded: bool = True) -> Drive:
     """
     Drive a scenario file with traffic alone; recorded vehicles as the spec says.
 
     What is no agent (pedestrians, parked cars) is where it is recorded, at its time.
+
+    :param recorded: False leaves out whatever moves in the recording.
     """
     loaded = load_scenario(path)
     network, lights = RoadNetwork(loaded.scenario.lanelet_network), TrafficLights(loaded.scenario)
     obstacles = ScenarioObstacles(loaded)
-    columns = adopted_columns(spec, obstacles, network)
-    rest = np.array([i for i in range(len(obstacles.descriptions)) if i not in columns],
-                    dtype=np.int64)
+    columns = adopted_columns(spec, obstacles, network) if recorded else ()
+    rest = np.array([i for i, x in enumerate(obstacles.descriptions) if i not in columns
+                     and (recorded or x.role is Role.STATIC)], dtype=np.int64)
     others = tuple(obstacles.descriptions[i] for i in rest)
     adopted = [Adopted(obstacles.descriptions[i], obstacles.first_step(i), *obstacles.track(i))
                for i in columns]
