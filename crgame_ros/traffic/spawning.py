@@ -4,6 +4,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,8 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.agents import Agents, NOBODY, REAR_TO_CENTER
-from crgame_ros.traffic.conflicts import Conflicts
+from crgame_ros.traffic.conflicts import Conflicts, NARROW
+from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
 from crgame_ros.traffic.longitudinal import Longitudinal
 from crgame_ros.traffic.placement import Bodies
@@ -39,6 +41,8 @@ EASY = 1.5
 FIRM, STOP_GAP = 2.0, 2.0
 # Nor nearer than so long at their speeds [s].
 CLOSE_TIME = 0.25
+# What a newcomer may have to stop for is looked for as far as this [m].
+FARTHEST = 150.0
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,7 @@ class Spawner:
     :param routes: where agents go.
     :param conflicts: nobody is placed inside a junction.
     :param speeds: that are allowed somewhere.
+    :param lines: with the lights as they are.
     :param adopted: recorded obstacles; they have the first slots.
     :param flow: arrivals at each lane that begins at the edge of the map [1/h]
     :param speed_factor: mean of desired speed over speed limit; `speed_spread` its deviation.
@@ -121,11 +126,11 @@ class Spawner:
     """
 
     def __init__(self, graph: LaneGraph, routes: Routes, conflicts: Conflicts,
-                 speeds: Longitudinal, adopted: Sequence[Adopted], flow: float,
+                 speeds: Longitudinal, lines: HaltingLines, adopted: Sequence[Adopted], flow: float,
                  speed_factor: float, speed_spread: float, time_step_s: float,
                  generator: np.random.Generator) -> None:
         self._graph, self._routes, self._conflicts = graph, routes, conflicts
-        self._speeds = speeds
+        self._speeds, self._lines = speeds, lines
         self._adopted = tuple(adopted)
         self._waiting = list(range(len(adopted)))
         self._factor, self._spread = speed_factor, speed_spread
@@ -154,7 +159,8 @@ class Spawner:
                 if graph.length[lane] < 2.0 * half or not self._fits_into(agents, slot, lane):
                     continue
                 s = self._random.uniform(half, float(graph.length[lane]) - half)
-                speed = self._speed(lane, s, float(agents.factor[slot]))
+                self._choose_destination(agents, slot, lane)
+                speed = self._speed(lane, s, agents, slot)
                 if self._try(agents, slot, lane, s, speed, others):
                     break
 
@@ -172,7 +178,8 @@ class Spawner:
             slot = fitting[0]
             self._character(agents, slot)
             s = 0.5 * float(agents.length[slot])
-            wanted = self._speed(lane, s, float(agents.factor[slot]))
+            self._choose_destination(agents, slot, lane)
+            wanted = self._speed(lane, s, agents, slot)
             for share in (1.0, 0.6, 0.3):
                 if self._try(agents, slot, lane, s, share * wanted, others):
                     self._due[number] += self._random.exponential(self._mean_s)
@@ -202,8 +209,7 @@ class Spawner:
                 self._character(agents, slot)
                 agents.put(slot, lane, float(s[0]), float(d[0]), (x, y, yaw),
                            float(np.hypot(velocities[slot, 0], velocities[slot, 1])))
-                agents.destination[slot] = self._routes.draw(
-                    lane, self._random, is_long(float(agents.length[slot])))
+                self._choose_destination(agents, slot, lane)
 
     def _appear(self, k: int, agents: Agents, slot: int, found: Adopted, row: int,
                 others: Bodies) -> bool:
@@ -249,14 +255,33 @@ class Spawner:
         agents.factor[slot] = max(0.1, self._factor * (1.0 + self._spread * deviation))
         agents.aggressivity[slot] = self._random.random()
 
-    def _speed(self, lane: int, s: float, factor: float) -> float:
-        """Give the speed at which a newcomer drives: it could still stop before a junction."""
-        graph = self._graph
-        speed = self._speeds.allowed(lane, s, factor)
-        onto = graph.successors[lane]
-        ends = self._routes.drops[lane] or (self._conflicts.count[onto[onto >= 0]] > 0).any()
-        rest = max(float(graph.length[lane]) - s - 5.0, 0.0)
-        return min(speed, float(np.sqrt(2.0 * EASY * rest))) if ends else speed
+    def _speed(self, lane: int, s: float, agents: Agents, slot: int) -> float:
+        """
+        Give the speed at which a newcomer drives.
+
+        It could still stop before a junction, the end of the lane or a light that is not green.
+        """
+        graph, routes = self._graph, self._routes
+        speed = min(self._speeds.allowed(lane, s, float(agents.factor[slot])),
+                    float(agents.top[slot]))
+        entry = self._conflicts.table.entry[int(agents.width[slot] > NARROW)]
+        offset, destination = -s - 0.5 * float(agents.length[slot]) - STOP_GAP, int(
+            agents.destination[slot])
+        while offset < FARTHEST:
+            rest = np.inf
+            if entry[lane] < np.inf:
+                rest = offset + float(entry[lane])
+            if routes.drops[lane]:
+                rest = min(rest, offset + float(graph.length[lane]))
+            if self._lines.shown[lane].any():
+                rest = min(rest, offset + float(self._lines.at[lane]))
+            if rest < np.inf:
+                return min(speed, math.sqrt(2.0 * EASY * max(rest, 0.0)))
+            offset += float(graph.length[lane])
+            lane = int(routes.next[destination, lane])
+            if lane < 0:
+                break
+        return speed
 
     def _try(self, agents: Agents, slot: int, lane: int, s: float, speed: float,
              others: Bodies) -> bool:
@@ -265,9 +290,11 @@ class Spawner:
                         agents, others):
             return False
         agents.put(slot, lane, s, 0.0, (float(x), float(y), float(yaw)), speed)
+        return True
+
+    def _choose_destination(self, agents: Agents, slot: int, lane: int) -> None:
         agents.destination[slot] = self._routes.draw(
             lane, self._random, is_long(float(agents.length[slot])))
-        return True
 
     def _fits_into(self, agents: Agents, slot: int, lane: int) -> bool:
         """Tell whether a vehicle of an agent's size gets on from a lane."""

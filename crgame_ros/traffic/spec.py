@@ -11,7 +11,7 @@ from typing import Any, Literal
 from crgame_ros.errors import InputError
 from crgame_ros.scenario.checked_values import build, named_file
 
-MAX_AGENTS = 5000
+MAX_AGENTS = 20_000
 # Lower and upper bounds of the numbers below.
 BOUNDS: dict[str, tuple[float, float]] = {
     'agents': (0, MAX_AGENTS), 'flow': (0.0, 3600.0), 'capacity': (0, MAX_AGENTS),

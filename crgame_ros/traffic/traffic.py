@@ -119,7 +119,7 @@ class Traffic:
         self.taken_off = 0
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
         self._spawner = Spawner(self._graph, self._routes, self._conflicts, self._longitudinal,
-                                adopted, spec.flow, spec.speed_factor, spec.speed_spread,
+                                self._lines, adopted, spec.flow, spec.speed_factor, spec.speed_spread,
                                 time_step_s, self._random)
         self.descriptions: tuple[ObjectDescription, ...] = (
             *(replace(x.description, role=Role.TRAFFIC) for x in adopted),
@@ -130,6 +130,7 @@ class Traffic:
             nowhere = np.full((len(others), 3), np.nan)
             world = WorldView(k0, nowhere, nowhere)
         bodies = self._others.bodies(world)
+        self._lines.show(world.signals)
         self._spawner.adopt(k0, self._agents, bodies)
         self._spawner.place_at_random(self._agents, spec.agents, bodies)
 

@@ -1,0 +1,101 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Compile everything that traffic runs, before it is needed: `python -m …traffic.warm_up`."""
+
+from collections.abc import Callable
+from pathlib import Path
+import sys
+import time
+
+from commonroad.common.common_lanelet import LineMarking
+from commonroad.scenario.lanelet import Lanelet, StopLine
+from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.traffic_light import (
+    TrafficLight,
+    TrafficLightCycle,
+    TrafficLightCycleElement,
+    TrafficLightState,
+)
+import numpy as np
+
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.compiled import cache_root, digest
+from crgame_ros.traffic.spec import TrafficSpec
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world import WorldView
+
+TICKS = 200
+LIGHT = 9001
+
+
+def marker() -> Path:
+    """Tell where it is noted that all is compiled."""
+    return cache_root() / f'compiled-{digest("traffic")}.done'
+
+
+def ensure_compiled(say: Callable[[str], None]) -> None:
+    """Compile what is not compiled yet; this takes about a minute, once."""
+    if marker().exists():
+        return
+    say('compiling traffic: this happens once and takes about a minute')
+    start = time.monotonic()
+    drive_everything()
+    try:
+        marker().parent.mkdir(parents=True, exist_ok=True)
+        marker().touch()
+    except OSError:
+        say('note: compiled code cannot be kept; set NUMBA_CACHE_DIR to a folder that is '
+            'writable')
+    say(f'compiled traffic in {time.monotonic() - start:.0f} s')
+
+
+def drive_everything() -> None:
+    """Drive where everything happens: a light, a crossing, a wreck, a parked car, people."""
+    scenario = crossroads()
+    others = [ObjectDescription('wreck', 'parkedVehicle', Role.STATIC, Shape.rectangle(4.5, 1.8)),
+              ObjectDescription('edge', 'parkedVehicle', Role.STATIC, Shape.rectangle(4.0, 1.0)),
+              ObjectDescription('walker', 'pedestrian', Role.RECORDED, Shape.rectangle(0.5, 0.5)),
+              ObjectDescription('driver', 'car', Role.HUMAN, Shape.rectangle(4.5, 1.8))]
+
+    def world(k: int) -> WorldView:
+        poses = np.array([[-60.0, -3.5, 0.3], [60.0, 1.7, 0.0], [20.0, -8.0 + 0.1 * k, 1.57],
+                          [-190.0 + 0.6 * k, 0.0, 0.0]])
+        velocities = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0],
+                               [6.0, 0.0, 0.0]])
+        return WorldView(k, poses, velocities, {LIGHT: 'red' if k < 60 else 'green'})
+
+    traffic = Traffic(TrafficSpec(agents=14, flow=1800.0, capacity=40),
+                      RoadNetwork(scenario.lanelet_network), scenario, others, (), 0.1, 10, 0, 0,
+                      world(0))
+    for k in range(TICKS):
+        traffic.advance(world(k))
+
+
+def crossroads() -> Scenario:
+    """Make two parallel lanes to the east, the right one with a light, and one to the north."""
+    result = Scenario(0.1)
+    x = np.linspace(-200.0, 200.0, 81)
+    level = np.zeros_like(x)
+    right = _lanelet(1, x, level - 3.5, adjacent_left=2, adjacent_left_same_direction=True)
+    right.stop_line = StopLine(np.array([-20.0, -1.75]), np.array([-20.0, -5.25]),
+                               LineMarking.SOLID, set(), {LIGHT})
+    right.add_traffic_light_to_lanelet(LIGHT)
+    left = _lanelet(2, x, level, adjacent_right=1, adjacent_right_same_direction=True)
+    result.add_objects([right, left, _lanelet(3, level, x)])
+    cycle = TrafficLightCycle([TrafficLightCycleElement(TrafficLightState.GREEN, 10)], 0, True)
+    result.add_objects(TrafficLight(LIGHT, np.array([-15.0, -6.0]), cycle), {1})
+    return result
+
+
+def _lanelet(number: int, x: np.ndarray, y: np.ndarray, **links: object) -> Lanelet:
+    points = np.stack((x, y), axis=-1)
+    tangent = np.gradient(points, axis=0)
+    normal = 1.75 * np.stack((-tangent[:, 1], tangent[:, 0]), axis=-1) / np.hypot(
+        *tangent.T)[:, None]
+    return Lanelet(points + normal, points, points - normal, number, **links)
+
+
+if __name__ == '__main__':
+    ensure_compiled(lambda text: print(f'crgame: {text}', file=sys.stderr, flush=True))
