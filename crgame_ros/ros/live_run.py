@@ -256,7 +256,9 @@ class LiveRun:
         deadline_ns = self._controller.deadline_ns()
         self._sleep_from_ns = time.monotonic_ns()
         left_ns = deadline_ns - self._sleep_from_ns
-        if left_ns > self._service_slack_ns and self.simulation.n % self._service_every == 0:
+        due = left_ns > self._service_slack_ns and self.simulation.n % self._service_every == 0
+        # A loop that is late all the time must be stoppable too.
+        if due or self._controller.serves_orders_now:
             self._executor.spin_once(timeout_sec=0)
             left_ns = deadline_ns - time.monotonic_ns()
         if left_ns > WAKE_UP_NS:

@@ -163,7 +163,7 @@ class TimingSpec:
     :param skip_threshold: lag above which frames are skipped [s].
     :param reset_threshold: lag above which the schedule is re-anchored [s].
     :param warm_up_steps: steps without reset at the start.
-    :param max_catch_up_steps: late steps run without pause before a wait of one step.
+    :param max_catch_up_steps: late steps in a row after which orders are served all the same.
     :param realign: `time` follows the request's stamp, `nearest` is CRG 16.
     :param sample: `interpolate` between plan states, `floor` is CRG 15.
     """

@@ -57,16 +57,21 @@ class TimeController:
         self._start_ns = 0
         self._error_s = 0.0
         self._carry_s = 0.0
-        self._late = 0
+        self._late_in_a_row = 0
         self.n = 0
         self.resets = 0
         self.dropped_s = 0.0
-        self.catch_up_steps = 0
 
     @property
     def real_time_factor(self) -> float:
         """Simulated seconds per wall second."""
         return self._factor
+
+    @property
+    def serves_orders_now(self) -> bool:
+        """Tell whether so many steps in a row were late that orders must not wait longer."""
+        late = self._late_in_a_row
+        return late > 0 and late % self._spec.max_catch_up_steps == 0
 
     def start(self, now_ns: int) -> None:
         """Anchor the schedule: t0 is now and step 0 has begun."""
@@ -106,25 +111,23 @@ class TimeController:
         self._start_ns = now_ns
         ideal_s = self.n * self._dt_s
         self._error_s = (now_ns - self._anchor_ns) * NS * self._factor - ideal_s
-        self._late = self._late + 1 if self._error_s > self._dt_s else 0
-        self.catch_up_steps += self._late > 0
+        self._late_in_a_row = self._late_in_a_row + 1 if self._error_s > self._dt_s else 0
         moved_s = self._reset_if_due()
         return Cycle(self.n, ideal_s + self.dropped_s, ideal_s + self.dropped_s + self._error_s,
                      measured_s - self._dt_s, self._error_s,
                      self._effective(measured_s - moved_s), self.resets, self.dropped_s)
 
     def _reset_if_due(self) -> float:
-        """Re-anchor after too large a lag; return the time dropped [s]."""
+        """Re-anchor after too large a lag, the only reason; return the time dropped [s]."""
         spec = self._spec
-        too_late = abs(self._error_s) > spec.reset_threshold \
-            or self._late >= spec.max_catch_up_steps
-        if not (spec.drift_reset and too_late and self.n > spec.warm_up_steps):
+        if not (spec.drift_reset and abs(self._error_s) > spec.reset_threshold
+                and self.n > spec.warm_up_steps):
             return 0.0
         dropped = self._error_s
         self._anchor_ns += dropped / self._factor / NS
         self.dropped_s += dropped
         self.resets += 1
-        self._error_s, self._late = 0.0, 0
+        self._error_s, self._late_in_a_row = 0.0, 0
         return dropped
 
     def _effective(self, measured_s: float) -> float:

@@ -52,6 +52,7 @@ class TimingSummary:
     :param rate_hz: steps per second over the run [Hz]
     :param resets: drift resets
     :param dropped_ms: time by which all resets moved the schedule [ms]
+    :param catch_up_steps: cycles that began more than one step behind the schedule in force
     :param worst_lag_ms: largest lag behind the schedule in force when the cycle began [ms]
     :param step_error_p50_ms: median of |e_n| [ms]
     :param step_error_p99_ms: 99th percentile of |e_n| [ms]
@@ -71,6 +72,7 @@ class TimingSummary:
     rate_hz: float
     resets: int
     dropped_ms: float
+    catch_up_steps: int
     worst_lag_ms: float
     step_error_p50_ms: float
     step_error_p99_ms: float
@@ -111,6 +113,7 @@ class TimingMetrics:
         self._ratio_min = math.inf
         self._max_error = 0.0
         self._worst_lag = 0.0
+        self._late = 0
         self._step_errors = LogHistogram()
         self._busy = LogHistogram()
 
@@ -136,7 +139,7 @@ class TimingMetrics:
             self._add_step(scheduled, actual_s, dropped_s)
         else:
             self._first = (scheduled, actual_s)
-            self._worst_lag = max(0.0, actual_s - ideal_s)
+            self._add_lag(actual_s - ideal_s)
         self._cycles += 1
         self._timeouts += busy_s > self.dt_s
         self._max_error = max(self._max_error, abs(actual_s - scheduled))
@@ -152,7 +155,7 @@ class TimingMetrics:
         step = scheduled - last_scheduled
         error = abs(interval - step)
         self._resets += dropped_s != last_dropped
-        self._worst_lag = max(self._worst_lag, actual_s - scheduled - last_dropped)
+        self._add_lag(actual_s - scheduled - last_dropped)
         self._step_error_sum += error
         self._step_errors.add(error)
         if interval > 0.0:
@@ -161,6 +164,10 @@ class TimingMetrics:
         if elapsed > 0.0:
             self._ratio_sum += (scheduled - self._first[0]) / elapsed
             self._ratio_count += 1
+
+    def _add_lag(self, lag_s: float) -> None:
+        self._worst_lag = max(self._worst_lag, lag_s)
+        self._late += lag_s > self.dt_s
 
     def add_rows(self, rows: NDArray[np.float64]) -> None:
         """
@@ -182,7 +189,7 @@ class TimingMetrics:
             before = np.array(self._last)[:, np.newaxis]
         else:
             self._first = (float(scheduled[0]), float(actual[0]))
-            self._worst_lag = max(0.0, float(actual[0] - ideal[0]))
+            self._add_lag(float(actual[0] - ideal[0]))
             before = np.empty((3, 0))
         self._add_steps(np.hstack((before, np.stack((scheduled, actual, dropped)))))
         self._cycles += len(rows)
@@ -202,6 +209,7 @@ class TimingMetrics:
         self._resets += int(np.count_nonzero(drops))
         lags = columns[1, 1:] - columns[0, 1:] - columns[2, :-1]
         self._worst_lag = max(self._worst_lag, float(lags.max()))
+        self._late += int(np.count_nonzero(lags > self.dt_s))
         self._step_error_sum = _running_sum(self._step_error_sum, errors)
         self._step_errors.add_all(errors)
         moved = intervals > 0.0
@@ -241,6 +249,7 @@ class TimingMetrics:
             rate_hz=steps / duration,
             resets=self._resets,
             dropped_ms=1e3 * self._last[2],
+            catch_up_steps=self._late,
             worst_lag_ms=1e3 * self._worst_lag,
             step_error_p50_ms=1e3 * self._step_errors.quantile(0.5),
             step_error_p99_ms=1e3 * self._step_errors.quantile(0.99),

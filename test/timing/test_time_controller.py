@@ -11,6 +11,7 @@ import pytest
 from crgame_ros.errors import InputError
 from crgame_ros.scenario.game import TimingSpec
 from crgame_ros.timing.time_controller import Cycle, TimeController
+from crgame_ros.timing.timing_metrics import TimingMetrics
 
 DT = 0.01
 START_NS = 5_000_000_000
@@ -88,11 +89,11 @@ def test_stall_is_caught_up() -> None:
 
 
 def test_catch_up_steps_are_counted() -> None:
-    """A cycle counts as catching up while the lag exceeds one step."""
-    controller = TimeController(SPEC, DT)
-    busy_loop(controller, lambda n: 60 * MS if n == 100 else MS, 200)
-    # Lags of 50, 41, 32, 23 and 14 ms.
-    assert controller.catch_up_steps == 5
+    """A cycle counts as catching up while the lag exceeds one step: 50, 41, 32, 23 and 14 ms."""
+    metrics = TimingMetrics(DT)
+    for cycle in busy_loop(TimeController(SPEC, DT), lambda n: 60 * MS if n == 100 else MS, 200):
+        metrics.add(cycle.ideal_s, cycle.actual_s, 0.001, cycle.dropped_s)
+    assert metrics.summary().catch_up_steps == 5
 
 
 def stall_intervals(spec: TimingSpec, stall_ms: int) -> np.ndarray:
@@ -201,15 +202,37 @@ def test_warm_up_suppresses_the_reset() -> None:
     assert controller.dropped_s == pytest.approx(0.39 - 5 * 0.009)
 
 
-def test_catch_up_is_bounded() -> None:
-    """Cycles that take 10.6 ms: after 50 late ones in a row the schedule moves, not earlier."""
+def test_late_steps_in_a_row_are_no_reason_for_a_reset() -> None:
+    """Cycles of 10.5 ms lag by 0.5 ms more each: 250 ms are exceeded at every 501st, never before."""
     controller = TimeController(SPEC, DT)
-    cycles = busy_loop(controller, lambda n: 10_600_000, 200)
-    # E_n exceeds one step from n = 17 on; its 50th late cycle is n = 66 with 39.6 ms of lag.
+    cycles = busy_loop(controller, lambda n: 10_500_000, 2000)
     resets = [cycle.n for before, cycle in zip(cycles, cycles[1:], strict=False)
               if cycle.resets > before.resets]
-    assert resets == [66, 132, 198]
-    assert controller.dropped_s == pytest.approx(3 * 0.0396)
+    assert resets == [501, 1002, 1503]
+    assert controller.dropped_s == pytest.approx(3 * 0.2505)
+    controller = TimeController(replace(SPEC, drift_reset=False), DT)
+    cycles = busy_loop(controller, lambda n: 10_700_000, 2000)
+    assert cycles[-1].cumulative_error_s == pytest.approx(1.4)
+    metrics = TimingMetrics(DT)
+    for cycle in cycles:
+        metrics.add(cycle.ideal_s, cycle.actual_s, 0.0107, cycle.dropped_s)
+    # The lag exceeds one step from the 15th cycle on.
+    assert metrics.summary().catch_up_steps == 1986
+
+
+def test_orders_are_served_after_a_bounded_number_of_late_steps() -> None:
+    """A loop that is late all the time has no moment left: each 8th late step makes one."""
+    controller = TimeController(replace(SPEC, max_catch_up_steps=8), DT)
+    controller.start(START_NS)
+    served = []
+    for n in range(1, 61):
+        controller.begin_cycle(START_NS + n * 11 * MS)
+        if controller.serves_orders_now:
+            served.append(n)
+    # The lag exceeds one step from n = 11 on.
+    assert served == [18, 26, 34, 42, 50, 58]
+    late_by(controller, [0])
+    assert not controller.serves_orders_now
 
 
 @pytest.mark.parametrize('factor', [0.1, 0.5, 2.0, 10.0])

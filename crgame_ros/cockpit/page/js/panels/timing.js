@@ -37,6 +37,7 @@ const MORE = [
   ['rate_hz', 'Rate', 'steps per second', (value) => `${fixed(value, 1)} Hz`],
   ['worst_lag_ms', 'Worst lag', 'behind the schedule in force when a cycle began', ms(1),
     (value, step) => value > LATE_STEPS * step],
+  ['catch_up_steps', 'Caught up', 'cycles that began more than a step late', count],
   ['step_error_p50_ms', 'Step error, median', 'of |e_n|', ms(3)],
   ['step_error_p99_ms', 'Step error, 99 %', '99th percentile of |e_n|', ms(3)],
   ['busy_p50_ms', 'Computing, median', 'busy time of a cycle', ms(2),
