@@ -156,7 +156,10 @@ def _offline(values: argparse.Namespace) -> int:
                    for event in result.fired],
         'violations': [{'vehicle': item.vehicle_id, 'n': item.n, 'hit': list(item.hit),
                         'off_road': item.off_road}
-                       for item in result.violations if not item.is_valid]}
+                       for item in result.violations if not item.is_valid],
+        'stop': None if result.stop is None else {
+            'vehicle': result.stop.vehicle_id, 'violation_n': result.stop.n,
+            'stop_n': len(result.vehicle_states) - 1}}
     print(json.dumps(report, indent=2))
     if values.out is not None:
         values.out.mkdir(parents=True, exist_ok=True)

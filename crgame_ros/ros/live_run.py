@@ -166,11 +166,26 @@ class LiveRun:
 
     def _ordered_end(self) -> Outcome | None:
         control = self._control
+        self._look_for_violation()
         if control.stop_wanted or self._stop.requested:
             return Outcome.STOPPED
         if control.reset_wanted:
             return Outcome.RESET
         return None
+
+    def _look_for_violation(self) -> None:
+        """End the run if a human's violation says so, and record where it did."""
+        stop = self._inputs.stop_request()
+        if stop is None:
+            return
+        vehicle_id, violation_n = stop
+        n = self.simulation.n
+        self._outputs.publish_diagnostics(
+            'stop', DiagnosticStatus.ERROR, f'{vehicle_id} violates drivability',
+            {'violation_n': violation_n, 'stop_n': n}, self.simulation.scheduler.stamp_ns(n))
+        self._node.get_logger().warning(
+            f'{vehicle_id} violates drivability (n = {violation_n}): stopping at n = {n}')
+        self._control.stop_wanted = True
 
     def _take_plan(self, av_id: str) -> bool:
         """Offer an AV the plan that has come for it; tell whether it was accepted."""
@@ -212,12 +227,13 @@ class LiveRun:
         while self.simulation.n != self._last_n:
             if self._stands_still():
                 self._stay_paused()
-            outcome = self._ordered_end()
-            if outcome is not None:
-                return outcome
             if self._control.real_time_factor != self._controller.real_time_factor:
                 self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
             self._wait()
+            # Looked at last, so that a verdict on state n ends the run at n.
+            outcome = self._ordered_end()
+            if outcome is not None:
+                return outcome
             # A pause ordered while waiting holds from this very step on.
             if not self._stands_still():
                 self._cycle()
@@ -301,15 +317,5 @@ class LiveRun:
         order = self._inputs.frame_skip_order()
         if order is not None:
             self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping
-        stop = self._inputs.stop_request()
-        if stop is not None:
-            vehicle_id, n = stop
-            self._outputs.publish_diagnostics(
-                'stop', DiagnosticStatus.ERROR, f'{vehicle_id} violates drivability',
-                {'violation_n': n, 'stop_n': result.n},
-                self.simulation.scheduler.stamp_ns(result.n))
-            self._node.get_logger().warning(
-                f'{vehicle_id} violates drivability (n = {n}): stopping at n = {result.n}')
-            self._control.stop_wanted = True
         if result.n % self._second < self.simulation.scheduler.steps_per_tick:
             self._diagnostics.publish(result.n)

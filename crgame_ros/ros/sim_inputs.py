@@ -12,7 +12,7 @@ from rclpy.node import Node
 from crgame_ros.errors import InputError
 from crgame_ros.planner.joints import JointSeries
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_joint_trajectory
+from crgame_ros.ros.messages import from_joint_trajectory, from_time
 from crgame_ros.ros.request_head import request_head
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.setup import Setup
@@ -34,6 +34,7 @@ class SimInputs:
     def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
                  seat_sources: MutableMapping[str, str]) -> None:
         self._node = node
+        self._clock_offset_ns = clock_offset_ns
         endpoints = Endpoints(node)
         self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources)
         # Orders to a planner to go or stop, until the loop takes them.
@@ -107,6 +108,9 @@ class SimInputs:
         """Give (vehicle, n) of a violation that asks for a stop, None if there is none."""
         for vehicle_id, slot in self._drivability.items():
             while (message := slot.take()) is not None:
+                if from_time(message.header.stamp) < self._clock_offset_ns:
+                    # A verdict on the run before a reset.
+                    continue
                 for status in message.status:
                     values = {item.key: item.value for item in status.values}
                     if values.get('stop') == 'true':

@@ -67,6 +67,8 @@ class OfflineResult:
     :param planners: what each AV's planner did.
     :param violations: changes of the vehicles' drivability, in order.
     :param fired: events that took effect, in order.
+    :param stop: the human's violation that ended the run, where the game has it so; its n is that
+        of the last state.
     """
 
     setup: Setup
@@ -78,6 +80,7 @@ class OfflineResult:
     planners: Mapping[str, PlannerRecord]
     violations: tuple[VehicleDrivability, ...] = field(default=())
     fired: tuple[FiredEvent, ...] = ()
+    stop: VehicleDrivability | None = None
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """Give the states (n + 1, 8) of one driven vehicle."""
@@ -145,7 +148,8 @@ def run_offline(
     :param drivers: drivers of humans by id, instead of the game's own; of AVs: they take it over.
     :param intervals_s: Delta t_eff of each step, as recorded; the nominal step where None and
         beyond their end [s]
-    :param check_drivability: run the monitor in lockstep.
+    :param check_drivability: run the monitor in lockstep; a game that stops at violations has it
+        run in any case.
     :param clock_s: clock that times the planners, which the result doesn't depend on.
     :param triggers: simulation step n and name of the events that somebody triggers; each takes
         effect at the first tick from n on.
@@ -167,17 +171,15 @@ def run_offline(
     perceive_every = steps_between_messages(setup.game.timing.rate)
     for _ in range(steps):
         if perceiving and simulation.n % perceive_every == 0:
-            states = published_states(simulation.states)
-            for perception in perceiving:
-                perception.observe(
-                    simulation.n, states, simulation.objects.poses,
-                    simulation.objects.velocities, simulation.scheduler.since_tick_s(simulation.n))
+            _perceive(simulation, perceiving)
         for seat in seats:
             seat.crew.apply([event.name for event in result.fired])
             if seat.id in result.requests:
                 seat.ask(result.requests[seat.id])
             seat.deliver()
         trace.add(simulation, result)
+        if trace.stop is not None:
+            break
         n = simulation.n
         commands = [
             *(hand.command(n, dt_s) for hand in hands),
@@ -186,11 +188,22 @@ def run_offline(
         effective_s = intervals[simulation.n] if simulation.n < len(intervals) else dt_s
         _trigger(simulation, triggers, simulation.n + 1)
         result = simulation.step(effective_s, commands)
-    trace.add(simulation, result)
+    else:
+        trace.add(simulation, result)
+    count = simulation.n + 1
     return OfflineResult(
-        setup, simulation.state_hash(), trace.vehicles, np.array(trace.objects),
-        np.array(trace.object_velocities), trace.commands,
-        {seat.id: seat.record() for seat in seats}, tuple(trace.violations), simulation.fired)
+        setup, simulation.state_hash(), trace.vehicles[:count], np.array(trace.objects),
+        np.array(trace.object_velocities), trace.commands[:count],
+        {seat.id: seat.record() for seat in seats}, tuple(trace.violations), simulation.fired,
+        trace.stop)
+
+
+def _perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
+    """Let every perception see what is published of the present state."""
+    states, objects = published_states(simulation.states), simulation.objects
+    since_tick_s = simulation.scheduler.since_tick_s(simulation.n)
+    for perception in perceiving:
+        perception.observe(simulation.n, states, objects.poses, objects.velocities, since_tick_s)
 
 
 def _trigger(simulation: Simulation, triggers: Sequence[tuple[int, str]], n: int) -> None:
@@ -218,12 +231,15 @@ class _Trace:
         self.objects: list[NDArray[np.float64]] = []
         self.object_velocities: list[NDArray[np.float64]] = []
         self.violations: list[VehicleDrivability] = []
+        self.stop: VehicleDrivability | None = None
         self._tick_n = 0
+        # The steps whose states a live run publishes, and so its monitor sees.
+        self._check_every = steps_between_messages(setup.game.timing.rate)
         self._previous: tuple[VehicleDrivability, ...] = ()
         self._monitor = DrivabilityMonitor(
             setup.vehicle_descriptions, setup.obstacles.descriptions,
             setup.loaded.scenario.lanelet_network, setup.game.drivability,
-            occupancy=setup.open_occupancy()) if check else None
+            occupancy=setup.open_occupancy()) if check or setup.game.drivability.stop else None
         if self._monitor is not None:
             self._monitor.prepare(np.array([
                 vehicle.state for vehicle in setup.vehicles]))
@@ -239,8 +255,9 @@ class _Trace:
             self._tick_n = n
             if self._monitor is not None:
                 self._monitor.set_objects(n, result.objects)
-        if self._monitor is not None:
+        if self._monitor is not None and (result.tick or n % self._check_every == 0):
             since_s = (n - self._tick_n) * simulation.scheduler.dt_s
             current = self._monitor.check(n, since_s, self.vehicles[n])
             self.violations.extend(changes(self._previous, current))
             self._previous = current
+            self.stop = next((item for item in current if item.stop_requested), None)

@@ -203,7 +203,7 @@ def test_warm_up_suppresses_the_reset() -> None:
 
 
 def test_late_steps_in_a_row_are_no_reason_for_a_reset() -> None:
-    """Cycles of 10.5 ms lag by 0.5 ms more each: 250 ms are exceeded at every 501st, never before."""
+    """Cycles of 10.5 ms lag by 0.5 ms more each: 250 ms are exceeded at every 501st."""
     controller = TimeController(SPEC, DT)
     cycles = busy_loop(controller, lambda n: 10_500_000, 2000)
     resets = [cycle.n for before, cycle in zip(cycles, cycles[1:], strict=False)
