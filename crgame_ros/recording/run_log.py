@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run was, on the grid of its scenario's time steps, and what its humans did."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,11 +14,13 @@ from crgame_ros.errors import InputError
 from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicles_from_joints
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.resampling import moved_intervals, resample
 from crgame_ros.scenario.objects import ObjectDescription
 from crgame_ros.simulation.documents import game_document, GameDocument, parse_game_document
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CycleTable
-from crgame_ros.vehicle.state import STATE_WIDTH
+from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.vehicle.state import StateColumn
 
 VEHICLES_TOPIC = '/vehicles/state'
 OBJECT_STATES_TOPIC = '/traffic/objects'
@@ -39,8 +41,8 @@ class RunLog:
     :param game: the game; its scheduler holds k0 and both time grids.
     :param descriptions: V driven vehicles (humans, then AVs), then M other objects.
     :param ks: (K) consecutive scenario steps.
-    :param vehicle_states: (K, V, 8) rear-axle states at n = (k - k0) N exactly, columns as in
-        `StateColumn`.
+    :param vehicle_states: (K, V, 8) rear-axle states at the time (k - k0) Delta t_c of their own
+        motion (`resampling`), columns as in `StateColumn`.
     :param object_poses: (K, M, 3) centre poses [m, m, rad]; NaN where absent.
     :param object_velocities: (K, M, 3) their derivatives; NaN where absent.
     :param notices: what of the run is not in here, one line each.
@@ -104,20 +106,24 @@ def read_run_log(path: Path, epoch: int | None = None) -> RunLog:
                               {VEHICLES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects})
         notices = list(reader.notices)
     ticks = _usable_ticks(points, bool(objects), run, path, notices)
-    states = np.array([points[VEHICLES_TOPIC][tick] for tick in ticks])
-    states = states.reshape(len(ticks), 3, len(vehicles), 4)
-    others = np.array([points[OBJECT_STATES_TOPIC][tick] for tick in ticks]) if objects \
+    ns = np.array(sorted(points[VEHICLES_TOPIC]))
+    joints = np.array([points[VEHICLES_TOPIC][n] for n in ns.tolist()])
+    joints = joints.reshape(len(ns), 3, len(vehicles), 4)
+    intervals_s = _intervals(path, run, vehicles, int(ns[-1]), notices)
+    states, ticks = _on_ticks(
+        vehicles_from_joints(joints[:, 0], joints[:, 1], joints[:, 2]), ns, intervals_s,
+        run.game.scheduler, ticks, notices)
+    others = np.array([points[OBJECT_STATES_TOPIC][n] for n in ticks.tolist()]) if objects \
         else np.empty((len(ticks), 3, 0))
     others = others.reshape(len(ticks), 3, len(objects), 3)
     return RunLog(
-        run.xml_text, run.game, run.descriptions, run.game.scheduler.k0 + np.array(ticks),
-        vehicles_from_joints(states[:, 0], states[:, 1], states[:, 2]), others[:, 0],
-        others[:, 1], tuple(notices))
+        run.xml_text, run.game, run.descriptions, _ks(run.game.scheduler, ticks), states,
+        others[:, 0], others[:, 1], tuple(notices))
 
 
 def _read_points(reader: BagReader, run: Epoch, ids: Mapping[str, list[str]],
                  ) -> dict[str, dict[int, FloatArray]]:
-    """Read by topic and tick k - k0: (3, joints) positions, velocities, accelerations."""
+    """Read by topic and step n: (3, joints) positions, velocities, accelerations."""
     scheduler = run.game.scheduler
     wanted = {
         VEHICLES_TOPIC: [name for item in ids[VEHICLES_TOPIC]
@@ -128,11 +134,9 @@ def _read_points(reader: BagReader, run: Epoch, ids: Mapping[str, list[str]],
     orders: dict[tuple[str, ...], list[int]] = {}
     for topic, _, log_time_ns, message in reader.decoded(wanted):
         stamp_ns = stamp_of(message)
-        n = scheduler.tick_of_stamp(stamp_ns)
-        if n is None or not run.holds(stamp_ns, log_time_ns):
-            continue
-        points[topic][n // scheduler.steps_per_tick] = first_point(
-            message, wanted[topic], topic, reader, orders)
+        n = scheduler.step_of_stamp(stamp_ns)
+        if run.holds(stamp_ns, log_time_ns) and scheduler.stamp_ns(n) == stamp_ns:
+            points[topic][n] = first_point(message, wanted[topic], topic, reader, orders)
     return points
 
 
@@ -176,13 +180,12 @@ def first_point(message: Any, wanted: list[str], topic: str, reader: BagReader,
 
 
 def _usable_ticks(points: Mapping[str, Mapping[int, FloatArray]], with_objects: bool, run: Epoch,
-                  path: Path, notices: list[str]) -> list[int]:
-    """Choose the ticks up to the first that is missing."""
-    found = set(points[VEHICLES_TOPIC])
-    last_seen = max(found, default=0)
-    if with_objects:
-        last_seen = max(last_seen, *points[OBJECT_STATES_TOPIC], 0)
-        found &= set(points[OBJECT_STATES_TOPIC])
+                  path: Path, notices: list[str]) -> NDArray[np.int64]:
+    """Choose the steps n of the ticks up to the first that is missing."""
+    per_tick = run.game.scheduler.steps_per_tick
+    topics = [VEHICLES_TOPIC, *([OBJECT_STATES_TOPIC] if with_objects else [])]
+    seen = [{n // per_tick for n in points[topic] if n % per_tick == 0} for topic in topics]
+    found, last_seen = set.intersection(*seen), max((0, *set.union(*seen)))
     if not found:
         raise InputError('no scenario step of the run is in it', str(path),
                          'record from before the start of the run')
@@ -196,21 +199,56 @@ def _usable_ticks(points: Mapping[str, Mapping[int, FloatArray]], with_objects: 
     if last_seen > end:
         notices.append(f'scenario step {k0 + end} was not recorded: the run is taken up to '
                        f'{k0 + end - 1} of {k0 + last_seen}')
-    return list(range(first, end))
+    return per_tick * np.arange(first, end)
+
+
+def _intervals(path: Path, run: Epoch, vehicles: Sequence[str], last_n: int,
+               notices: list[str]) -> FloatArray:
+    """Read the intervals over which each vehicle was moved, nominal where unknown (n + 1, V)."""
+    dt_s = run.game.scheduler.dt_s
+    try:
+        table = read_cycles(path, run.game.epoch)
+    except InputError as error:
+        notices.append(f'{error}; motion is as it was stamped, through stalls too')
+        return np.full((last_n + 1, len(vehicles)), dt_s)
+    ns = table.column('n')
+    missing = int(ns[-1] - ns[0]) + 1 - len(ns)
+    if missing:
+        notices.append(f'{missing} cycles were not recorded: their intervals are taken as nominal')
+    return moved_intervals(table, vehicles, [item['id'] for item in run.game.humans], dt_s, last_n)
+
+
+def _on_ticks(states: FloatArray, ns: NDArray[np.int64], intervals_s: FloatArray,
+              scheduler: ScenarioScheduler, ticks: NDArray[np.int64],
+              notices: list[str]) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Resample at the ticks n that every vehicle has reached on its own time; give them too."""
+    found = resample(states, ns, intervals_s, scheduler.dt_s, ticks)
+    reached = int(np.isfinite(found[:, :, StateColumn.X]).all(axis=1).sum())
+    if reached < len(ticks):
+        notices.append(f'{len(ticks) - reached} scenario steps at the end are left out: the '
+                       'intervals that moved the humans add up to less than the simulated time')
+    return found[:reached], ticks[:reached]
+
+
+def _ks(scheduler: ScenarioScheduler, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
+    return scheduler.k0 + ticks // scheduler.steps_per_tick
 
 
 def run_log_of(result: OfflineResult) -> RunLog:
     """Give the log of an offline run."""
     setup = result.setup
     scheduler = setup.scheduler
-    states = result.vehicle_states[::scheduler.steps_per_tick]
-    ks = scheduler.k0 + np.arange(len(states))
+    notices: list[str] = []
+    ns = np.arange(len(result.vehicle_states))
+    states, ticks = _on_ticks(result.vehicle_states, ns, result.intervals_s, scheduler,
+                              ns[::scheduler.steps_per_tick], notices)
+    ks = _ks(scheduler, ticks)
     game = parse_game_document(
         game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
     return RunLog(
-        setup.loaded.xml_text, game, setup.descriptions, ks,
-        states.reshape(len(ks), -1, STATE_WIDTH), result.object_poses.reshape(len(ks), -1, 3),
-        result.object_velocities.reshape(len(ks), -1, 3))
+        setup.loaded.xml_text, game, setup.descriptions, ks, states,
+        result.object_poses[:len(ks)].reshape(len(ks), -1, 3),
+        result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(notices))
 
 
 def read_cycles(path: Path, epoch: int | None = None) -> CycleTable:

@@ -64,6 +64,8 @@ class OfflineResult:
     :param object_velocities: (ticks, M, 3) their derivatives.
     :param commands: (n + 1, H, 4) throttle, brake, steering and reverse; row i was consumed by
         the step that led to state i, row 0 by none.
+    :param intervals_s: (n + 1, V) interval over which each vehicle was moved in that step: Delta
+        t_eff where somebody drives it, else the nominal step [s]
     :param planners: what each AV's planner did.
     :param violations: changes of the vehicles' drivability, in order.
     :param fired: events that took effect, in order.
@@ -77,6 +79,7 @@ class OfflineResult:
     object_poses: NDArray[np.float64]
     object_velocities: NDArray[np.float64]
     commands: NDArray[np.float64]
+    intervals_s: NDArray[np.float64]
     planners: Mapping[str, PlannerRecord]
     violations: tuple[VehicleDrivability, ...] = field(default=())
     fired: tuple[FiredEvent, ...] = ()
@@ -164,7 +167,7 @@ def run_offline(
              for index in range(len(setup.avs))]
     trace = _Trace(setup, steps, check_drivability)
     dt_s = simulation.scheduler.dt_s
-    intervals: list[float] = [] if intervals_s is None else intervals_s.tolist()
+    effective_s, intervals = dt_s, [] if intervals_s is None else intervals_s.tolist()
     _trigger(simulation, triggers, 0)
     result = simulation.begin()
     perceiving = [seat.perception for seat in seats if seat.perception is not None]
@@ -177,7 +180,7 @@ def run_offline(
             if seat.id in result.requests:
                 seat.ask(result.requests[seat.id])
             seat.deliver()
-        trace.add(simulation, result)
+        trace.add(simulation, result, effective_s)
         if trace.stop is not None:
             break
         n = simulation.n
@@ -189,13 +192,8 @@ def run_offline(
         _trigger(simulation, triggers, simulation.n + 1)
         result = simulation.step(effective_s, commands)
     else:
-        trace.add(simulation, result)
-    count = simulation.n + 1
-    return OfflineResult(
-        setup, simulation.state_hash(), trace.vehicles[:count], np.array(trace.objects),
-        np.array(trace.object_velocities), trace.commands[:count],
-        {seat.id: seat.record() for seat in seats}, tuple(trace.violations), simulation.fired,
-        trace.stop)
+        trace.add(simulation, result, effective_s)
+    return trace.result(simulation, {seat.id: seat.record() for seat in seats})
 
 
 def _perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
@@ -228,6 +226,7 @@ class _Trace:
     def __init__(self, setup: Setup, steps: int, check: bool) -> None:
         self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), 8))
         self.commands = np.zeros((steps + 1, len(setup.humans), 4))
+        self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
         self.object_velocities: list[NDArray[np.float64]] = []
         self.violations: list[VehicleDrivability] = []
@@ -244,8 +243,21 @@ class _Trace:
             self._monitor.prepare(np.array([
                 vehicle.state for vehicle in setup.vehicles]))
 
-    def add(self, simulation: Simulation, result: StepResult) -> None:
+    def result(self, simulation: Simulation,
+               planners: Mapping[str, PlannerRecord]) -> OfflineResult:
+        count = simulation.n + 1
+        return OfflineResult(
+            simulation.setup, simulation.state_hash(), self.vehicles[:count],
+            np.array(self.objects), np.array(self.object_velocities), self.commands[:count],
+            self.intervals_s[:count], planners, tuple(self.violations), simulation.fired,
+            self.stop)
+
+    def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
+        """Take a state and the interval of the step that led to it [s]."""
         n = simulation.n
+        for index, command in enumerate(simulation.commands):
+            if command is not None:
+                self.intervals_s[n, index] = effective_s
         self.vehicles[n] = simulation.states
         for index in range(self.commands.shape[1]):
             self.commands[n, index] = simulation.commands[index] or RELEASED

@@ -121,3 +121,9 @@ class CycleTable:
             raise InputError(f'{vehicle_id} took no part', '/timing/cycle',
                              'choose one of the vehicles of this recording')
         return self.rows[:, [self._place[name] for name in names]]
+
+    def drove(self, vehicle_id: str) -> NDArray[np.bool_]:
+        """Tell for each row (R) whether somebody drove a vehicle, which may have taken no part."""
+        place = self._place.get(f'{vehicle_id}/{COMMAND_COLUMNS[0]}')
+        return np.zeros(len(self.rows), dtype=bool) if place is None \
+            else np.isfinite(self.rows[:, place])

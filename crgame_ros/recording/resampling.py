@@ -1,0 +1,116 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A run's motion at the times that its stamps say.
+
+State n is stamped n dt, while who is driven by hand has been integrated over measured intervals
+(CRG 13): around a stall it is ahead of its stamp by up to the stall, and differences of positions
+disagree with speeds. Whoever exports or measures motion takes it from here.
+"""
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.timing.cycle_rows import CycleTable
+from crgame_ros.vehicle.state import StateColumn
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: float,
+             wanted_ns: IntArray) -> FloatArray:
+    """
+    Give the states of vehicles at the time n dt of their own motion: at the sum of its intervals.
+
+    Where that sum is n dt exactly, so without any measured interval, it is the state n itself.
+    Between two states positions and heading are cubic by their rates at both ends, all else is
+    linear; ahead of the first and up to dt beyond the last a vehicle keeps its speed and yaw rate.
+
+    :param states: (S, V, 8) rear-axle states, columns as in `StateColumn`, S >= 1
+    :param ns: (S) their simulation steps, increasing
+    :param intervals_s: (n + 1, V) interval over which each vehicle was moved in the step that led
+        to state n [s]; row 0 means nothing
+    :param dt_s: nominal step [s]
+    :param wanted_ns: (K) simulation steps n
+    :return: (K, V, 8) states at n dt; NaN where a vehicle has not driven so far, as whatever the
+        clip of CRG 13 drops is missing at the end.
+    """
+    # Summed as differences, nominal intervals add up to exactly nothing.
+    leads_s = np.cumsum(intervals_s - dt_s, axis=0)
+    leads_s -= leads_s[:1]
+    wanted_s = np.multiply(wanted_ns, dt_s, dtype=np.float64)
+    found = np.empty((len(wanted_ns), states.shape[1], states.shape[2]))
+    for column in range(states.shape[1]):
+        times_s = ns * dt_s + leads_s[ns, column]
+        found[:, column] = _at(states[:, column], times_s, wanted_s)
+        found[wanted_s > times_s[-1] + 1.5 * dt_s, column] = np.nan
+    return found
+
+
+def moved_intervals(table: CycleTable, vehicles: Sequence[str], humans: Collection[str],
+                    dt_s: float, last_n: int) -> FloatArray:
+    """
+    Give the intervals over which each vehicle was moved in each step, as `resample` takes them.
+
+    A human is moved over Delta t_eff, and so is an AV while somebody drives it; an AV on its plan
+    and a step that was not recorded take the nominal step.
+
+    :param table: the recorded cycles.
+    :param vehicles: (V) ids.
+    :param humans: which of them are humans.
+    :param dt_s: nominal step [s]
+    :return: (last_n + 1, V) intervals [s]
+    """
+    intervals_s = np.full((last_n + 1, len(vehicles)), dt_s)
+    ns = table.column('n').astype(np.int64)
+    known = (ns >= 0) & (ns <= last_n)
+    for column, vehicle in enumerate(vehicles):
+        driven = known
+        if vehicle not in humans:
+            driven = known & table.drove(vehicle)
+        intervals_s[ns[driven], column] = table.column('dt_eff_s')[driven]
+    return intervals_s
+
+
+def _at(states: FloatArray, times_s: FloatArray, wanted_s: FloatArray) -> FloatArray:
+    """Interpolate one vehicle's states (S, 8) at increasing times: (K, 8)."""
+    after = np.clip(np.searchsorted(times_s, wanted_s), 0, len(states) - 1)
+    before = np.maximum(after - 1, 0)
+    first, second = states[before], states[after]
+    length = (times_s[after] - times_s[before])[:, np.newaxis]
+    inside = (length[:, 0] > 0.0) & (wanted_s <= times_s[after])
+    share = np.zeros_like(length)
+    share[inside] = (wanted_s - times_s[before])[inside, np.newaxis] / length[inside]
+    found = first + share * (second - first)
+    turn = wrap_pi_array(second[:, 2] - first[:, 2])
+    displacement = np.column_stack((second[:, :2] - first[:, :2], turn))
+    found[:, :3] = first[:, :3] + _cubic(share, length, displacement, _rates(first),
+                                         _rates(second))
+    # Nothing was recorded so early or so late: the vehicle goes on as it was.
+    beyond_s = (wanted_s - times_s[after])[:, np.newaxis]
+    found = np.where(inside[:, np.newaxis], found, second)
+    found[:, :3] += np.where(inside[:, np.newaxis], 0.0, beyond_s * _rates(second))
+    found[:, 2] = wrap_pi_array(found[:, 2])
+    # What was recorded for that very time stays as it is to the last bit.
+    exact = times_s[after] == wanted_s
+    found[exact] = second[exact]
+    return found
+
+
+def _cubic(share: FloatArray, length: FloatArray, displacement: FloatArray,
+           start_rates: FloatArray, end_rates: FloatArray) -> FloatArray:
+    """Evaluate Hermite polynomials that start at 0: (K, 3) displacements."""
+    rest = 1.0 - share
+    return (share * share * (3.0 - 2.0 * share) * displacement
+            + share * rest * length * (rest * start_rates - share * end_rates))
+
+
+def _rates(states: FloatArray) -> FloatArray:
+    """Give the rates (K, 3) of x, y and yaw [m/s, m/s, rad/s]."""
+    yaw, speed = states[:, StateColumn.YAW], states[:, StateColumn.SPEED]
+    return np.column_stack((speed * np.cos(yaw), speed * np.sin(yaw),
+                            states[:, StateColumn.YAW_RATE]))
