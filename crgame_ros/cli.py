@@ -149,8 +149,9 @@ def _offline(values: argparse.Namespace) -> int:
                     'fallbacks': record.statistics.fallbacks,
                     'reasons': dict(record.statistics.reasons),
                     **({} if record.tracking is None else {'worst_tracking_errors': {
-                        key: round(value, 4)
-                        for key, value in record.tracking._asdict().items()}})}
+                        key: round(value, 4) for key, value in {
+                            'lane': record.lane_error or 0.0,
+                            **record.tracking._asdict()}.items()}})}
             for av_id, record in result.planners.items()},
         'events': [{'name': event.name, 'n': event.n, 'k': event.k, 'by': event.by}
                    for event in result.fired],

@@ -11,7 +11,7 @@ OK, ERROR = 0, 2
 # Late traffic is told at each late tick, and never that it is in time again [s].
 LATE_TRAFFIC_S = 2.0
 TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')
-                 for name in ('lateral', 'along', 'heading', 'speed'))
+                 for name in ('lane', 'lateral', 'along', 'heading', 'speed'))
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """An AV that tracks its plan with a controller and a vehicle instead of being on it (FS II-C)."""
 
+from collections import deque
 from math import copysign, cos, sin, sqrt
 from typing import NamedTuple
 
+from crgame_ros.control.planned_track import PlannedTrack
 from crgame_ros.control.tracker import Control, Reference, Tracker
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.vehicle.models import VehicleModel
@@ -13,11 +15,15 @@ from crgame_ros.vehicle.state import VehicleState
 
 # Braking where there is no plan [m/s^2]: firm, well within a dry road's friction.
 EXHAUSTED_DECELERATION = 4.0
+# Age of the plan against which errors are measured [s]. The newest one starts at the vehicle ten
+# times a second, so that nobody is ever far from it.
+ERROR_PLAN_AGE_S = 1.0
+_ROUNDING_S = 1e-9
 
 
 class TrackingErrors(NamedTuple):
     """
-    The true state against the planned one of the same time.
+    The true state against what a plan of at least `ERROR_PLAN_AGE_S` wanted for the same time.
 
     :param lateral: positive to the left of the plan [m]
     :param along: positive ahead of the plan, along its heading [m]
@@ -74,12 +80,14 @@ class TrackedExecution:
         """
         if reference is None or reference.used_up:
             self._errors = None
+            self._plans.clear()
             return self._moved(state, self._braking(state))
         if state.speed == 0.0:
             self.model.gear = int(reference.track.direction(reference.since_s))
         moved = self._moved(
             state, self.tracker.control(state if pose is None else pose, reference))
-        self._measure(moved, reference)
+        self._remember(reference)
+        self._measure(moved)
         return moved
 
     @property
@@ -100,6 +108,8 @@ class TrackedExecution:
 
     def _forget(self) -> None:
         self._errors = None
+        # Plans with the time since the first state of each, the oldest first.
+        self._plans: deque[tuple[PlannedTrack, float]] = deque()
         self._worst = [0.0, 0.0, 0.0, 0.0]
         self._squares = [0.0, 0.0, 0.0, 0.0]
         self._count = 0
@@ -113,8 +123,25 @@ class TrackedExecution:
     def _moved(self, state: VehicleState, control: Control) -> VehicleState:
         return self.model.step(state, control.steering_angle, control.acceleration, self.dt_s)
 
-    def _measure(self, state: VehicleState, reference: Reference) -> None:
-        planned = reference.track.at(reference.since_s + self.dt_s)
+    def _remember(self, reference: Reference) -> None:
+        """
+        Let plans grow older by a step, and forget those that are not measured against any more.
+
+        The first is the youngest that is old enough, at the start the oldest there is; it has not
+        come to its end, or there would be nothing to compare with.
+        """
+        plans = self._plans
+        if not plans or plans[-1][0] is not reference.track:
+            plans.append((reference.track, reference.since_s))
+        for index, (track, since_s) in enumerate(plans):
+            plans[index] = (track, since_s + self.dt_s)
+        while len(plans) > 1 and (plans[1][1] >= ERROR_PLAN_AGE_S - _ROUNDING_S
+                                  or plans[0][1] > plans[0][0].end_s + _ROUNDING_S):
+            plans.popleft()
+
+    def _measure(self, state: VehicleState) -> None:
+        track, since_s = self._plans[0]
+        planned = track.at(since_s)
         c, s = cos(planned.yaw), sin(planned.yaw)
         dx, dy = state.x - planned.x, state.y - planned.y
         errors = TrackingErrors(dy * c - dx * s, dx * c + dy * s,

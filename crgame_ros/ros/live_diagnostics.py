@@ -84,11 +84,15 @@ class LiveDiagnostics:
 
 
 def _tracking(av: AutonomousVehicle) -> dict[str, object]:
-    """Give how far a tracked AV is from its plan, now and at worst."""
+    """Give how far a tracked AV is from its route's lane and its plan, now and at worst."""
     execution = av.execution
     if execution is None:
         return {}
     values: dict[str, object] = {}
+    lane = av.route_lane
+    if lane is not None:
+        values['lane_error'] = '' if lane.error is None else round(lane.error, 4)
+        values['worst_lane_error'] = round(lane.worst, 4)
     for when, errors in (('', execution.errors), ('worst_', execution.worst)):
         for name in ('lateral', 'along', 'heading', 'speed'):
             value = '' if errors is None else round(getattr(errors, name), 4)

@@ -19,6 +19,7 @@ from crgame_ros.planner.interface import Plan
 from crgame_ros.planner.joints import JointSeries, plan_from_joints
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.scenario.game import TimingSpec
+from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.setup import AvSetup
 from crgame_ros.timing.progress_tracker import ProgressTracker
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
@@ -78,6 +79,8 @@ class AutonomousVehicle:
         self._early: JointSeries | None = None
         self.execution = execution
         self._reference: Reference | None = None
+        # Where a tracked AV ought to be by the map, whatever its plans say.
+        self.route_lane: RouteLane | None = None
         # Where a tracked AV believes to be, if its tracker steers by that.
         self.believed: VehicleState | None = None
         self._busy_since: int | None = None

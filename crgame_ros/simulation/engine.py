@@ -22,6 +22,7 @@ from crgame_ros.simulation.av_models import (
 )
 from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.plan_requests import PlanRequests
+from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.publishing import steps_between_messages
@@ -79,6 +80,10 @@ class Simulation:
         self.avs = [
             AutonomousVehicle(av, self.scheduler, setup.game.timing,
                               make_execution(av.spec, av.vehicle, dt_s)) for av in setup.avs]
+        for av in self.avs:
+            if av.execution is not None and setup.network.lanelet_ids:
+                av.route_lane = RouteLane(
+                    setup.network, av.setup.planning_problem, av.setup.state)
         self._localisations = [
             (av, localisation) for av in self.avs if (localisation := make_localisation(
                 av.setup.spec, av.state, setup.game.seed, dt_s)) is not None]
@@ -176,6 +181,9 @@ class Simulation:
         k = self.scheduler.k(self.n)
         if not self.scheduler.is_tick(self.n):
             return StepResult(self.n, k, False, {}, None)
+        for av in self.avs:
+            if av.route_lane is not None and not av.driven:
+                av.route_lane.measure(av.state)
         objects = self._world.advance(k)
         fired = () if self._events is None else self._take_effect(self._events, k, objects)
         objects = self._world.settle(self.states)

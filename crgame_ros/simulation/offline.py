@@ -38,12 +38,15 @@ class PlannerRecord:
 
     :param counters: requests and plans as the engine saw them.
     :param statistics: answers, braking plans and times of the planner itself.
-    :param tracking: worst errors of a tracked AV; None of one that follows plans exactly.
+    :param tracking: worst errors of a tracked AV against its plans; None of one that follows them
+        exactly.
+    :param lane_error: largest distance of a tracked AV from its route's lane [m]
     """
 
     counters: AvCounters
     statistics: PlannerStatistics
     tracking: TrackingErrors | None = None
+    lane_error: float | None = None
 
     @property
     def accepted_ratio(self) -> float:
@@ -134,7 +137,8 @@ class PlannerSeat:
         """Sum up what the planner did."""
         av = next(av for av in self._simulation.avs if av.setup.id == self.id)
         return PlannerRecord(av.counters, self.crew.statistics,
-                             None if av.execution is None else av.execution.worst)
+                             None if av.execution is None else av.execution.worst,
+                             None if av.route_lane is None else av.route_lane.worst)
 
 
 def run_offline(

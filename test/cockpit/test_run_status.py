@@ -63,13 +63,13 @@ def test_tracking_errors_of_tracked_avs() -> None:
     """Now and at worst, by their names; an AV that follows perfectly has none."""
     status = _begun()
     errors = {f'{when}{name}_error': str(value) for value, (when, name) in enumerate(
-        (when, name) for when in ('', 'worst_') for name in ('lateral', 'along', 'heading',
-                                                             'speed'))}
+        (when, name) for when in ('', 'worst_') for name in ('lane', 'lateral', 'along',
+                                                             'heading', 'speed'))}
     status.take('sim_node: av0 plans', 0, 'following its plan', errors, 1.0)
     assert status.document()['planners']['av0']['tracking'] == {
-        'lateral_error': 0.0, 'along_error': 1.0, 'heading_error': 2.0, 'speed_error': 3.0,
-        'worst_lateral_error': 4.0, 'worst_along_error': 5.0, 'worst_heading_error': 6.0,
-        'worst_speed_error': 7.0}
+        'lane_error': 0.0, 'lateral_error': 1.0, 'along_error': 2.0, 'heading_error': 3.0,
+        'speed_error': 4.0, 'worst_lane_error': 5.0, 'worst_lateral_error': 6.0,
+        'worst_along_error': 7.0, 'worst_heading_error': 8.0, 'worst_speed_error': 9.0}
     status.take('sim_node: av0 plans', 0, 'following its plan', {'accepted': '1'}, 2.0)
     assert status.document()['planners']['av0']['tracking'] is None
 

@@ -137,7 +137,49 @@ def test_a_plan_from_where_the_vehicle_is_every_tick(name: str) -> None:
         state = made.step(state, reference.at(n % 10 * DT))
     assert state.yaw_rate == pytest.approx(10.0 / 40.0, rel=0.05)
     assert state.speed == pytest.approx(10.0, abs=0.05)
-    assert made.worst.lateral < 0.05
+    # A plan that is a second old wanted the curvature at once: T_delta = 0.15 s late, the heading
+    # lacks v / R T = 0.04 rad, and the way of a second on it is 0.38 m.
+    assert 0.1 < made.worst.lateral < 0.38
+
+
+def test_errors_are_against_a_plan_that_is_a_second_old() -> None:
+    """
+    Replanned at 10 Hz from its own state onto a circle, the vehicle goes straight on all the same.
+
+    From its newest plan it is never more than 1.2 cm away, and from the circle that it was to be
+    on for a second by now R (1 - cos(1 s v / R)) = 1.24 m.
+    """
+    made = TrackedExecution(VEHICLE, Fixed(VEHICLE, DT), KinematicSingleTrack(VEHICLE), DT)
+    state = VehicleState(0.0, 0.0, 0.0, 10.0)
+    made.reset(state)
+    for n in range(500):
+        if n % 10 == 0:
+            reference = Reference(support.plan(
+                10.0, 4.0, support.circle(40.0), start=state[:3]), DT_C)
+        state = made.step(state, reference.at(n % 10 * DT))
+        if n % 10 == 9 and n > 100:
+            # Made a second before, when the vehicle was 10 m behind.
+            assert made.errors is not None
+            c, s = math.cos(0.25), math.sin(0.25)
+            dx, dy = 10.0 - 40.0 * s, -40.0 * (1.0 - c)
+            expected = (dy * c - dx * s, dx * c + dy * s, -0.25, 0.0)
+            assert made.errors == pytest.approx(expected, abs=1e-3)
+    # Until the next plan is old enough the one before it has to do: for 1.09 s.
+    assert made.worst.lateral == pytest.approx(1.458, abs=0.001)
+
+
+def test_short_plans_are_compared_as_long_as_they_last() -> None:
+    """Plans of 0.5 s never grow a second old: the oldest that still says something is taken."""
+    made = TrackedExecution(VEHICLE, Fixed(VEHICLE, DT), KinematicSingleTrack(VEHICLE), DT)
+    state = VehicleState(0.0, 0.0, 0.0, 10.0)
+    made.reset(state)
+    for n in range(300):
+        if n % 10 == 0:
+            reference = Reference(support.plan(
+                10.0, 0.5, support.circle(40.0), start=state[:3]), DT_C)
+        state = made.step(state, reference.at(n % 10 * DT))
+    # 40 m (1 - cos(0.5 s v / R)) = 0.31 m.
+    assert made.worst.lateral == pytest.approx(0.31, abs=0.01)
 
 
 @pytest.mark.parametrize('game', ['cut_in', 'roundabout', 'parked_cars'])

@@ -4,8 +4,11 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+from commonroad.planning.goal import GoalRegion
+from commonroad.planning.planning_problem import PlanningProblem
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -16,8 +19,11 @@ from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.planner.route import start_lanelet
+from crgame_ros.scenario.game import AvSpec, Game, ModelSpec
 from crgame_ros.scenario.game_file import dump_game, parse_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.state import StateColumn
 
@@ -55,6 +61,54 @@ def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str) -> None:
     assert [item for item in result.violations if not item.is_valid] == []
     # It is no perfect execution: the model's lags show.
     assert result.state_hash != perfect.state_hash
+
+
+@pytest.mark.parametrize(('name', 'metres'), [
+    ('DEU_Flensburg-10_1_T-1', 2.5), ('ZAM_Tjunction-1_42_T-1', 6.0)])
+def test_an_av_far_off_its_path_says_so(name: str, metres: float,
+                                        shared_scenarios: Path) -> None:
+    """
+    With G_s = 0.5 it turns half as much as its tracker believes: metres off in a turn.
+
+    Its newest plan, which begins where it is ten times a second, is never more than 10 cm away.
+    The plan of a second ago and, above all, the lane tell.
+    """
+    game = Game(shared_scenarios / f'{name}.xml', humans=())
+    runs = [run_offline(build_setup(replace(game, avs=(av,))), duration_s=15.0,
+                        check_drivability=False)
+            for av in (AvSpec('av0'), AvSpec('av0', execution='tracked'),
+                       AvSpec('av0', execution='tracked', dynamics=ModelSpec(
+                           'dynamic-bicycle', {'slip': 0.5})))]
+    _, faithful, slipping = (run.planners['av0'] for run in runs)
+    away = errors_to(runs[2], runs[0]).max()
+    assert away > metres
+    assert slipping.lane_error == pytest.approx(away, abs=0.4)
+    assert slipping.tracking is not None and slipping.tracking.lateral > 0.6
+    # One that does what its tracker believes is near its path, and says that too.
+    assert errors_to(runs[1], runs[0]).max() < 0.4
+    assert faithful.lane_error is not None and faithful.lane_error < 0.4
+    assert faithful.tracking is not None and faithful.tracking.lateral < 0.3
+
+
+def test_the_lane_is_either_of_a_route_that_changes_lanes() -> None:
+    """Before the change, after it and on the way between: never half a lane away from both."""
+    setup = tracked('cut_in')
+    roads, av = setup.network, setup.avs[0]
+    lane, _ = start_lanelet(roads, *av.state[:3])
+    beside = roads.left_of(roads.straightest_successor(lane))
+    assert beside is not None
+    given = av.planning_problem
+    problem = PlanningProblem(given.planning_problem_id, given.initial_state, GoalRegion(
+        given.goal.state_list, {0: [beside]}))
+    route_lane = RouteLane(roads, problem, av.state)
+    width = roads.width_at(lane, 10.0)
+    for across, expected in ((0.0, 0.0), (0.3 * width, 0.3 * width), (width, 0.0),
+                             (1.2 * width, 0.2 * width), (-1.0, -1.0)):
+        # Beside the goal's lanelet, which the change has to reach; the road runs along x.
+        x, y, _ = roads.pose_on(roads.straightest_successor(lane), 5.0)
+        route_lane.measure(av.state._replace(x=x, y=y + across))
+        assert route_lane.error == pytest.approx(expected, abs=0.05)
+    assert route_lane.worst == pytest.approx(max(0.3 * width, 1.0), abs=0.05)
 
 
 def test_same_inputs_same_bits() -> None:

@@ -16,11 +16,11 @@ const COLUMNS = [
   ['Fallbacks', 'brakings where the planner found no plan', (p) => count(p.fallbacks), ''],
 ];
 
-const TRACKING_TITLE = 'Where the vehicle is, against where its plan wanted it to be now; '
-  + 'in parentheses the worst of the run';
+const TRACKING_TITLE = "Where the vehicle is: beside the middle of its route's lane, and against "
+  + 'where its plan of a second ago wanted it to be now; in parentheses the worst of the run';
 // Of a tracked AV: name of the error, factor to the unit, unit, digits.
 const ERRORS = [
-  ['lateral', 1, 'm', 2], ['along', 1, 'm', 2], ['heading', 180 / Math.PI, '°', 1],
+  ['lane', 1, 'm', 2], ['lateral', 1, 'm', 2], ['along', 1, 'm', 2], ['heading', 180 / Math.PI, '°', 1],
   ['speed', 1, 'm/s', 2],
 ];
 
@@ -129,7 +129,7 @@ function makeRow(av, connection) {
   };
 }
 
-/** How far a tracked AV is from its plan: now, and at worst so far. */
+/** How far a tracked AV is from its lane and its plan: now, and at worst so far. */
 function trackingText(tracking) {
   if (!tracking) {
     return '';
@@ -139,5 +139,5 @@ function trackingText(tracking) {
       factor * (tracking[`${when}${name}_error`] ?? NaN), digits));
     return `${name} ${now} ${unit} (${worst})`;
   });
-  return `off its plan: ${parts.join(', ')}`;
+  return `off its lane and plan: ${parts.join(', ')}`;
 }

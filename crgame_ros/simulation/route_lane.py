@@ -1,0 +1,48 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How far an AV is from the middle of the lane that its route follows."""
+
+from math import cos, sin
+
+from commonroad.planning.planning_problem import PlanningProblem
+import numpy as np
+import shapely
+
+from crgame_ros.planner.route import find_route, goal_lanelets, start_lanelet
+from crgame_ros.scenario.lane_line import LaneLine
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.vehicle.state import VehicleState
+
+# How far the route goes on beyond its goal [m]: longer than any game.
+BEYOND_GOAL = 1500.0
+
+
+class RouteLane:
+    """
+    The centre lines of the route's lanelets, one for each stretch without a lane change.
+
+    The lane is the map's: unlike a plan it doesn't follow a vehicle that drifts off.
+
+    :param roads: roads with one lanelet at least.
+    :param problem: its goal decides on the route.
+    :param start: where the vehicle begins, rear axle.
+    """
+
+    def __init__(self, roads: RoadNetwork, problem: PlanningProblem, start: VehicleState) -> None:
+        lanelet, s = start_lanelet(roads, start.x, start.y, start.yaw)
+        route = find_route(roads, lanelet, s, goal_lanelets(roads, problem), BEYOND_GOAL)
+        self._lines = [LaneLine(np.concatenate([roads.line(item).points for item in leg]))
+                       for leg in route.legs]
+        # Finds the nearest place of a long line fastest.
+        self._strings = [shapely.LineString(line.points) for line in self._lines]
+        self.error: float | None = None
+        self.worst = 0.0
+
+    def measure(self, state: VehicleState) -> None:
+        """Find the rear axle's offset from the nearest of the centre lines, left positive [m]."""
+        here = shapely.Point(state.x, state.y)
+        line, string = min(zip(self._lines, self._strings, strict=True),
+                           key=lambda pair: here.distance(pair[1]))
+        x, y, yaw = line.poses(np.array([string.project(here)]), np.zeros(1))[0].tolist()
+        self.error = (state.y - y) * cos(yaw) - (state.x - x) * sin(yaw)
+        self.worst = max(self.worst, abs(self.error))
