@@ -131,6 +131,8 @@ def _offline(values: argparse.Namespace) -> int:
                          planners=(values.planner,) if values.planner else ())
     setup = with_planners(build_setup(effective_game(request)), request.planners)
     setup = with_replayed_events(setup)
+    for notice in setup.notices:
+        print(f'note: {notice}', file=sys.stderr)
     drivers, intervals_s = recorded_inputs(setup)
     triggers = [(round(time_s / setup.scheduler.dt_s), name) for name, time_s in values.trigger]
     start_s = time.perf_counter()

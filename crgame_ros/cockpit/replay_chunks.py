@@ -246,10 +246,8 @@ class ChunkBuilder:
             future = positions[:, [place[joint] for joint in joints]]
             if not np.isfinite(future[0, 0]):
                 continue
-            if column < len(self._vehicles):
-                future = self._transforms[asking].to_simulation(future)
             columns.append(column)
-            futures.append(future)
+            futures.append(self._transforms[asking].to_simulation(future))
         return columns, np.array(futures).reshape(len(columns), len(positions), 3)
 
 

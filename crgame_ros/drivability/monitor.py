@@ -3,8 +3,9 @@
 """
 The drivability of every driven vehicle at one simulation step (CRG III-D).
 
-Live in its node and offline in lockstep the same code runs. The states are already in the
-scenario frame: the engine has applied the transform of CRG 28 before it publishes them.
+Live in its node and offline in lockstep the same code runs. States come in simulation coordinates.
+A contact is judged there, for a rigid transform of all changes none; the road, which no transform
+moves, is looked at through the vehicle's (CRG 28).
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from crgame_ros.drivability.collision import CollisionDetector
 from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.drivability.road_boundary import RoadBoundary
 from crgame_ros.errors import InputError
+from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
 from crgame_ros.scenario.game import DrivabilitySpec
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.occupancy import OccupancyMap
@@ -60,15 +62,19 @@ class DrivabilityMonitor:
     :param lanelet_network: the road; None leaves the road unchecked.
     :param spec: which checks run, and whether a human's violation asks for a stop.
     :param occupancy: the map of permanent obstacles, if there is one; to touch one is a collision.
+    :param transforms: (V) from simulation to the scenario coordinates in which each is checked
+        against the road (`road_transforms`); none are the identity.
     """
 
     def __init__(self, driven: Sequence[ObjectDescription], others: Sequence[ObjectDescription],
                  lanelet_network: LaneletNetwork | None, spec: DrivabilitySpec,
-                 occupancy: OccupancyMap | None = None) -> None:
+                 occupancy: OccupancyMap | None = None,
+                 transforms: Sequence[RigidTransform] = ()) -> None:
         self._ids = [vehicle.id for vehicle in driven]
         self._other_ids = [other.id for other in others]
         self._rear_to_center = [vehicle.rear_to_center for vehicle in driven]
         self._shapes = [vehicle.shape for vehicle in driven]
+        self._transforms = tuple(transforms) or (RigidTransform(),) * len(driven)
         self._stops = [spec.stop and vehicle.role is Role.HUMAN for vehicle in driven]
         self._detector = CollisionDetector(
             self._shapes, [other.shape for other in others]) if spec.collision else None
@@ -91,7 +97,8 @@ class DrivabilityMonitor:
         """
         centers = self._centers(vehicle_states)
         if self._road is not None:
-            self._road.prepare((x, y) for x, y, _ in centers)
+            self._road.prepare(self._on_map(index, center)[:2]
+                               for index, center in enumerate(centers))
         if self._permanent is not None:
             for index, center in enumerate(centers):
                 self._permanent.is_hit(index, center)
@@ -166,7 +173,26 @@ class DrivabilityMonitor:
     def _is_off_road(self, index: int, center: tuple[float, float, float]) -> bool:
         if self._road is None or center[0] != center[0]:
             return False
-        return self._road.is_off_road(*center, self._shapes[index])
+        return self._road.is_off_road(*self._on_map(index, center), self._shapes[index])
+
+    def _on_map(self, index: int, center: Pose) -> Pose:
+        """Map a vehicle's centre to the coordinates of the road (CRG 28)."""
+        transform = self._transforms[index]
+        if transform.is_identity:
+            return center
+        x, y, yaw = transform.to_scenario(np.array(center)).tolist()
+        return x, y, yaw
+
+
+def road_transforms(humans: int, avs: Sequence[RigidTransform]) -> tuple[RigidTransform, ...]:
+    """
+    Choose through which transform each driven vehicle is checked against the road (CRG 28).
+
+    An AV's is its own; humans take that of the first AV, for the paper has but one.
+
+    :return: of the humans, then of the AVs.
+    """
+    return (*[avs[0] if avs else RigidTransform()] * humans, *avs)
 
 
 def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDrivability]

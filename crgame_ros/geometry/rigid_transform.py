@@ -57,6 +57,12 @@ class RigidTransform:
         return np.stack((cos * x - sin * y + self.offset_x, sin * x + cos * y + self.offset_y,
                          wrap_pi_array(poses[..., 2] + self.yaw_offset)), axis=-1)
 
+    def turn_to_scenario(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Turn vectors (..., 2), velocities for one, from simulation to scenario coordinates."""
+        cos, sin = math.cos(self.yaw_offset), math.sin(self.yaw_offset)
+        x, y = vectors[..., 0], vectors[..., 1]
+        return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
+
     def to_simulation(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map poses (..., 3) from scenario to simulation coordinates (CRG 10)."""
         cos, sin = math.cos(self.yaw_offset), math.sin(self.yaw_offset)

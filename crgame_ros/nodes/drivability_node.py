@@ -13,8 +13,14 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from trajectory_msgs.msg import JointTrajectory
 
-from crgame_ros.drivability.monitor import changes, DrivabilityMonitor, VehicleDrivability
+from crgame_ros.drivability.monitor import (
+    changes,
+    DrivabilityMonitor,
+    road_transforms,
+    VehicleDrivability,
+)
 from crgame_ros.errors import CrgameError
+from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.planner.joints import vehicles_from_joints
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time, to_time
@@ -77,7 +83,9 @@ class DrivabilityNode(Node):
         place = game.content.get('occupancy')
         monitor = DrivabilityMonitor(
             driven, documents.others, network, game.drivability,
-            None if place is None else TiledOccupancy(Path(place)))
+            None if place is None else TiledOccupancy(Path(place)),
+            road_transforms(len(game.humans), [RigidTransform(*entry['transform'])
+                                               for entry in game.avs]))
         monitor.prepare(np.array([entry['state'] for entry in (*game.humans, *game.avs)]))
         for item in driven:
             if item.id not in self._reports:

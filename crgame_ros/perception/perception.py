@@ -229,13 +229,10 @@ class Perception:
         things, columns = layout.things[known], layout.columns[known]
         times_s = 1e-9 * request.times_ns.astype(np.float64)
         poses, rates = self._tracks.predict(things, self._n, times_s)
-        # The engine gives driven vehicles in the AV's scenario coordinates, objects as they are.
-        driven = things < self._vehicles
-        if not self._transform.is_identity and driven.any():
-            turn = self._transform.yaw_offset
-            cos, sin = math.cos(turn), math.sin(turn)
-            poses[:, driven] = self._transform.to_scenario(poses[:, driven])
-            rates[:, driven, :2] = rates[:, driven, :2] @ np.array([[cos, sin], [-sin, cos]])
+        # As the engine does: everybody in the AV's scenario coordinates.
+        if not self._transform.is_identity:
+            poses = self._transform.to_scenario(poses)
+            rates[..., :2] = self._transform.turn_to_scenario(rates[..., :2])
         positions[:, columns] = poses
         velocities[:, columns] = rates
 

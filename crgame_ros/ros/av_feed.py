@@ -60,7 +60,6 @@ class AvFeed:
         self._scenario: ScenarioSet | None = None
         self._transforms: dict[str, RigidTransform] = {}
         self._columns: dict[str, int] = {}
-        self._vehicles = 0
         self._mounts: SensorMounts | None = None
         self._looked_s = 0.0
 
@@ -73,7 +72,6 @@ class AvFeed:
                             for entry in game.avs}
         self._columns = {item.id: index for index, item in enumerate(
             (*scenario.driven, *scenario.others))}
-        self._vehicles = len(scenario.driven)
         self._mounts = SensorMounts(game.avs, self._columns, game.scheduler.dt_s)
         wanted = [(name, av) for name in ('/<av>/plan', '/<av>/plan_request')
                   for av in self._transforms]
@@ -195,8 +193,7 @@ class AvFeed:
             self._hub.send_frame(f'seen:{index}', encode_seen(*place, index, seen),
                                  only_if=_perceives_as(av))
         if predictions:
-            columns, futures = predicted(message, self._columns, av, self._vehicles,
-                                         self._transforms[av])
+            columns, futures = predicted(message, self._columns, av, self._transforms[av])
             self._hub.send_frame(
                 f'prediction:{index}', encode_prediction(*place, index, columns, futures),
                 only_if=lambda client: client.wants_predictions)

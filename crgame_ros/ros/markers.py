@@ -177,9 +177,7 @@ class AvPaths:
                   and place.keys() >= set(object_joint_names(name[:-2]))]
         columns = [[place[name] for name in object_joint_names(owner)] for owner in owners]
         poses = series.positions[chosen][:, np.array(columns, dtype=np.intp).reshape(-1, 3)]
-        driven = np.array([f'{owner}/steering' in place for owner in owners], dtype=bool)
-        # Of what a planner is sent, only the driven vehicles are in its own coordinates.
-        poses[:, driven] = self._transform.to_simulation(poses[:, driven])
+        poses = self._transform.to_simulation(poses)
         ends = np.stack((poses[:-1, :, :2], poses[1:, :, :2]), axis=2)
         moves = np.hypot(*np.moveaxis(ends[:, :, 1] - ends[:, :, 0], 2, 0))
         self.prediction.fill(ends[moves > PREDICTION_MOVES].reshape(-1, 2))

@@ -39,14 +39,13 @@ def plan_rows(message: JointTrajectory, transform: RigidTransform) -> NDArray[np
     return rows
 
 
-def predicted(message: JointTrajectory, columns: Mapping[str, int], av: str, vehicles: int,
+def predicted(message: JointTrajectory, columns: Mapping[str, int], av: str,
               transform: RigidTransform) -> tuple[list[int], NDArray[np.float64]]:
     """
     Give who is predicted in a plan request, as columns (Q), and their poses (Q, P, 3).
 
-    :param columns: of everything that can appear, by id: vehicles first.
+    :param columns: of everything that can appear, by id.
     :param av: who asks, and is left out.
-    :param vehicles: how many of them are vehicles, which the planner sees transformed.
     :param transform: of the AV.
     :raises InputError: if points are missing or do not give every joint.
     """
@@ -58,10 +57,7 @@ def predicted(message: JointTrajectory, columns: Mapping[str, int], av: str, veh
     if not len(positions) or any(start + 3 > len(joints) for start, _ in starts):
         raise InputError('has joints or points missing', 'plan request')
     futures = np.array([positions[:, start:start + 3] for start, _ in starts])
-    futures = futures.reshape(len(starts), len(positions), 3)
-    for row, (_, column) in enumerate(starts):
-        if column < vehicles:
-            futures[row] = transform.to_simulation(futures[row])
+    futures = transform.to_simulation(futures.reshape(len(starts), len(positions), 3))
     present = np.isfinite(futures[:, 0, StateColumn.X])
     return [column for (_, column), here in zip(starts, present, strict=True) if here], \
         futures[present]

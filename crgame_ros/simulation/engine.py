@@ -82,8 +82,8 @@ class Simulation:
                               make_execution(av.spec, av.vehicle, dt_s)) for av in setup.avs]
         for av in self.avs:
             if av.execution is not None and setup.network.lanelet_ids:
-                av.route_lane = RouteLane(
-                    setup.network, av.setup.planning_problem, av.setup.state)
+                av.route_lane = RouteLane(setup.network, av.setup.planning_problem,
+                                          av.setup.state, av.setup.transform)
         self._localisations = [
             (av, localisation) for av in self.avs if (localisation := make_localisation(
                 av.setup.spec, av.state, setup.game.seed, dt_s)) is not None]

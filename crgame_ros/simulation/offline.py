@@ -9,7 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.control.tracked_execution import TrackingErrors
-from crgame_ros.drivability.monitor import changes, DrivabilityMonitor, VehicleDrivability
+from crgame_ros.drivability.monitor import (
+    changes,
+    DrivabilityMonitor,
+    road_transforms,
+    VehicleDrivability,
+)
 from crgame_ros.driver.command import RELEASED
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
@@ -242,7 +247,9 @@ class _Trace:
         self._monitor = DrivabilityMonitor(
             setup.vehicle_descriptions, setup.obstacles.descriptions,
             setup.loaded.scenario.lanelet_network, setup.game.drivability,
-            occupancy=setup.open_occupancy()) if check or setup.game.drivability.stop else None
+            setup.open_occupancy(), road_transforms(
+                len(setup.humans), [av.transform for av in setup.avs]),
+        ) if check or setup.game.drivability.stop else None
         if self._monitor is not None:
             self._monitor.prepare(np.array([
                 vehicle.state for vehicle in setup.vehicles]))

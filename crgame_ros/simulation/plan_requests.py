@@ -149,12 +149,11 @@ class PlanRequests:
 
 def _to_scenario(av: AvSetup, vehicles: int, positions: Poses, velocities: Poses,
                  accelerations: Poses) -> None:
-    """Map the driven vehicles' columns to the AV's scenario coordinates (CRG 9)."""
-    cos, sin = np.cos(av.transform.yaw_offset), np.sin(av.transform.yaw_offset)
-    for column in range(0, 4 * vehicles, 4):
-        positions[:, column:column + 3] = av.transform.to_scenario(
-            positions[:, column:column + 3])
-        for vectors in (velocities, accelerations):
-            x, y = vectors[:, column].copy(), vectors[:, column + 1].copy()
-            vectors[:, column] = cos * x - sin * y
-            vectors[:, column + 1] = sin * x + cos * y
+    """Map everybody to the AV's scenario coordinates (CRG 9), so that all fit together."""
+    for part, joints in ((slice(4 * vehicles), 4), (slice(4 * vehicles, None), 3)):
+        # Views of who is in the columns, one row each.
+        poses, *vectors = (array[:, part].reshape(len(array), -1, joints)
+                           for array in (positions, velocities, accelerations))
+        poses[..., :3] = av.transform.to_scenario(poses[..., :3])
+        for rates in vectors:
+            rates[..., :2] = av.transform.turn_to_scenario(rates[..., :2])

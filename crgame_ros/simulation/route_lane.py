@@ -8,6 +8,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 import numpy as np
 import shapely
 
+from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
 from crgame_ros.planner.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.scenario.lane_line import LaneLine
 from crgame_ros.scenario.road_network import RoadNetwork
@@ -25,11 +26,14 @@ class RouteLane:
 
     :param roads: roads with one lanelet at least.
     :param problem: its goal decides on the route.
-    :param start: where the vehicle begins, rear axle.
+    :param start: where the vehicle begins, rear axle, simulation coordinates.
+    :param transform: from these to those of the roads as its planner knows them.
     """
 
-    def __init__(self, roads: RoadNetwork, problem: PlanningProblem, start: VehicleState) -> None:
-        lanelet, s = start_lanelet(roads, start.x, start.y, start.yaw)
+    def __init__(self, roads: RoadNetwork, problem: PlanningProblem, start: VehicleState,
+                 transform: RigidTransform) -> None:
+        self._transform = transform
+        lanelet, s = start_lanelet(roads, *self._on_map(start))
         route = find_route(roads, lanelet, s, goal_lanelets(roads, problem), BEYOND_GOAL)
         self._lines = [LaneLine(np.concatenate([roads.line(item).points for item in leg]))
                        for leg in route.legs]
@@ -40,9 +44,16 @@ class RouteLane:
 
     def measure(self, state: VehicleState) -> None:
         """Find the rear axle's offset from the nearest of the centre lines, left positive [m]."""
-        here = shapely.Point(state.x, state.y)
+        own_x, own_y, _ = self._on_map(state)
+        here = shapely.Point(own_x, own_y)
         line, string = min(zip(self._lines, self._strings, strict=True),
                            key=lambda pair: here.distance(pair[1]))
         x, y, yaw = line.poses(np.array([string.project(here)]), np.zeros(1))[0].tolist()
-        self.error = (state.y - y) * cos(yaw) - (state.x - x) * sin(yaw)
+        self.error = (own_y - y) * cos(yaw) - (own_x - x) * sin(yaw)
         self.worst = max(self.worst, abs(self.error))
+
+    def _on_map(self, state: VehicleState) -> Pose:
+        if self._transform.is_identity:
+            return state[:3]
+        x, y, yaw = self._transform.to_scenario(np.array(state[:3])).tolist()
+        return x, y, yaw

@@ -31,6 +31,10 @@ from crgame_ros.vehicle.state import VehicleState
 
 # A vehicle recorded this close to an AV's start is a recording of the AV [m].
 SAME_PLACE = 1.0
+# Beyond these discrepancies of both initial poses people are told: [m], half the room that a car
+# has beside it in a lane, and [rad], which is as much 25 m ahead.
+MAX_DISCREPANCY = 0.5
+MAX_TURN = 0.02
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,14 @@ class AvSetup:
     def id(self) -> str:
         """Id of the vehicle: av0, …"""
         return self.spec.id
+
+    @property
+    def declared(self) -> VehicleState:
+        """State at n = 0 as the planning problem declares it."""
+        if self.transform.is_identity:
+            return self.state
+        x, y, yaw = self.transform.to_scenario(np.array(self.state[:3])).tolist()
+        return self.state._replace(x=x, y=y, yaw=yaw)
 
 
 @dataclass(frozen=True)
@@ -172,7 +184,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
     check_events(game, loaded.source, network, obstacles, [human.id for human in game.humans],
                  [av.spec for av in avs])
-    notices = [*loaded.notices, *(
+    notices = [*loaded.notices, *_discrepancies(avs), *(
         f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'
         for number, av_id in doubles.items())]
     humans: list[HumanSetup] = []
@@ -236,10 +248,23 @@ def _recorded_egos(loaded: LoadedScenario, avs: tuple[AvSetup, ...], k0: int) ->
             continue
         x, y = exact_position(state.position)
         for av in avs:
-            center = av.state.center(av.vehicle.rear_to_center)
+            # Recordings are where the problem is declared, wherever the simulator puts the AV.
+            center = av.declared.center(av.vehicle.rear_to_center)
             if math.hypot(x - center[0], y - center[1]) < SAME_PLACE:
                 doubles[obstacle.obstacle_id] = av.id
     return doubles
+
+
+def _discrepancies(avs: Iterable[AvSetup]) -> Iterable[str]:
+    """Tell of AVs that the simulator places far from where their problems do (CRG III-A1)."""
+    for av in avs:
+        apart = math.dist(av.state[:2], av.declared[:2])
+        turned = abs(av.transform.yaw_offset)
+        if not (apart <= MAX_DISCREPANCY and turned <= MAX_TURN):
+            yield (f'{av.id}: lanelet geometry and its planning problem place it {apart:.2f} m '
+                   f'and {math.degrees(turned):.1f} deg apart (more than {MAX_DISCREPANCY:g} m or '
+                   f'{math.degrees(MAX_TURN):.1f} deg): it will drive beside its lane by as much; '
+                   '"spawn: problem" has no such gap')
 
 
 def _place_avs(

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The drivability monitor: who hit what, at which step, and who has to stop."""
 
+from dataclasses import replace
 import math
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
@@ -9,8 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from crgame_ros.drivability.monitor import changes, DrivabilityMonitor, VehicleDrivability
+from crgame_ros.drivability.monitor import (
+    changes,
+    DrivabilityMonitor,
+    road_transforms,
+    VehicleDrivability,
+)
 from crgame_ros.errors import InputError
+from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.game import DrivabilitySpec
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
@@ -48,6 +55,33 @@ def at(*rows: tuple[float, float, float, float]) -> ObjectStates:
     table = np.array(rows)
     zero = np.zeros((len(rows), 1))
     return ObjectStates(np.hstack((table[:, :2], zero)), np.hstack((table[:, 2:], zero)))
+
+
+def test_the_road_is_looked_at_through_the_transform_and_contacts_are_not() -> None:
+    """
+    CRG 28: at y = 4 in simulation coordinates the human is at y = 2.5 in the scenario's.
+
+    The AV beside it, with another transform, is where it seems to be; their contact is what it is
+    in the coordinates that they share.
+    """
+    shifted = RigidTransform(0.0, 0.0, -1.5)
+    humans_av = RigidTransform(0.0, 0.0, 0.5)
+    assert road_transforms(1, [shifted, humans_av]) == (shifted, shifted, humans_av)
+    assert road_transforms(2, []) == (RigidTransform(),) * 2
+    states = vehicles(rear(0.0, 4.0), rear(20.0, 3.0), rear(3.0, 3.0))
+    for transforms, off_road in (
+            ((), [True, False, False]),
+            ((shifted, RigidTransform(), humans_av), [False, False, True]),
+            # Turned by 180 degrees about the origin it is at y = -4.
+            ((RigidTransform(math.pi), shifted, RigidTransform(0.0, 500.0)),
+             [True, False, True])):
+        monitor = DrivabilityMonitor(
+            [HUMAN, AV, replace(AV, id='av1')], [TRUCK], network(), ALL, transforms=transforms)
+        monitor.prepare(states)
+        monitor.set_objects(0, at((27.0, 3.0, 0.0, 0.0)))
+        verdicts = monitor.check(0, 0.0, states)
+        assert [item.off_road for item in verdicts] == off_road
+        assert [item.hit for item in verdicts] == [('av1',), ('o30',), ('hv0',)]
 
 
 @pytest.mark.parametrize('prepared', [True, False])

@@ -131,8 +131,12 @@ class World:
         columns[0][:, 1:] = np.nan
         for item, pose, velocity in zip(self.descriptions[len(vehicles):], self.poses(n),
                                         self.velocities, strict=True):
-            columns.append(np.array([pose + ahead * velocity, np.tile(velocity, (points, 1)),
-                                     np.full((points, 3), np.nan)]))
+            poses = pose + ahead * velocity
+            rates = np.tile(velocity, (points, 1))
+            if not self.transform.is_identity:
+                poses = self.transform.to_scenario(poses)
+                rates[:, :2] = self.transform.turn_to_scenario(rates[:, :2])
+            columns.append(np.array([poses, rates, np.full((points, 3), np.nan)]))
             names += object_joint_names(item.id)
         arrays = np.concatenate(columns, axis=2)
         return JointSeries(10_000_000 * n, tuple(names),

@@ -185,7 +185,7 @@ def test_localisation_alone_replaces_the_ego_only() -> None:
     assert np.isnan(perceived.positions[1:, :4]).all()
 
 
-def test_spawn_transform_maps_driven_vehicles_and_leaves_objects() -> None:
+def test_spawn_transform_maps_everybody() -> None:
     """As in the true request (CRG 9): with exact sensors it comes out the same."""
     transform = RigidTransform(0.7, 30.0, -4.0)
     human = VehicleState(12.0, 5.0, 0.3, 6.0)
@@ -198,6 +198,11 @@ def test_spawn_transform_maps_driven_vehicles_and_leaves_objects() -> None:
     np.testing.assert_allclose(perceived.velocities[:, 8:], request.velocities[:, 8:], atol=1e-9)
     # The human was at these very coordinates before; in the scenario's it drives at 0.3 + 0.7.
     np.testing.assert_allclose(perceived.velocities[0, 4:6], (6 * math.cos(1.0), 6 * math.sin(1)))
+    # And the car, 25 m ahead and 3 m to the right of the AV's origin, at 0.2 + 0.7.
+    assert perceived.positions[0, 10] == pytest.approx(0.9)
+    assert perceived.positions[0, 8:10] == pytest.approx(
+        (30.0 + 25.0 * math.cos(0.7) + 3.0 * math.sin(0.7),
+         -4.0 + 25.0 * math.sin(0.7) - 3.0 * math.cos(0.7)), abs=1.0)
 
 
 def test_ego_is_estimated_in_scenario_coordinates() -> None:

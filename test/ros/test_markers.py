@@ -331,9 +331,9 @@ def test_plan_is_drawn_until_it_is_used_up(scene: SceneMarkers, setup: Setup) ->
 
 def test_prediction_is_drawn_in_map() -> None:
     """
-    Whoever moves has a line of segments of 0.5 s; driven vehicles are mapped back.
+    Whoever moves has a line of segments of 0.5 s; everybody is mapped back.
 
-    The planner's coordinates are turned by 90 degrees here, those of other objects are not.
+    The planner's coordinates are turned by 90 degrees here.
     """
     transform = RigidTransform(0.5 * math.pi, 100.0, 0.0)
     seconds = np.arange(31) * 0.1
@@ -343,7 +343,8 @@ def test_prediction_is_drawn_in_map() -> None:
     still = np.full((31, 3), 7.0)
     walker = np.stack((0.0 * seconds, seconds, 0.0 * seconds), axis=1)
     positions = np.concatenate((
-        nowhere, transform.to_scenario(driven), np.zeros((31, 1)), still, walker), axis=1)
+        nowhere, transform.to_scenario(driven), np.zeros((31, 1)), transform.to_scenario(still),
+        transform.to_scenario(walker)), axis=1)
     names = (*_names('av0', 'x', 'y', 'yaw', 'steering'),
              *_names('hv0', 'x', 'y', 'yaw', 'steering'), *_names('o1', 'x', 'y', 'yaw'),
              *_names('o2', 'x', 'y', 'yaw'))

@@ -2,19 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """The engine step by step: algorithm 1's order, requests, transforms, several vehicles."""
 
+from collections.abc import Sequence
+import copy
 from dataclasses import replace
 import hashlib
+from pathlib import Path
 
 import numpy as np
 import pytest
 import simulation_support as support
-from simulation_support import HandDriven
+from simulation_support import Array, HandDriven
 
 from crgame_ros.driver.command import DriverCommand
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.planner.joints import plan_from_joints
 from crgame_ros.scenario.game import AvSpec, HumanSpec, PoseSpawn
-from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.simulation.engine import Simulation
+from crgame_ros.simulation.plan_requests import PlanRequests
+from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.state import VehicleState
 
@@ -165,6 +172,67 @@ def test_plan_comes_back_through_the_inverse(turned: LoadedScenario) -> None:
                                    atol=1e-12)
         np.testing.assert_allclose(state[3:], plan.states[1, 3:], atol=1e-12)
     assert run.reasons == [None] * 5
+
+
+def test_the_whole_world_is_mapped_for_each_planner(shared_scenarios: Path) -> None:
+    """
+    Everybody stands to each planner's ego as to its simulated AV, recorded obstacles too (CRG 9).
+
+    Two AVs whose problems are declared beside their lane, each by its own pose: for each the
+    distances between all are those of the simulation, now and in every prediction.
+    """
+    loaded = load_scenario(shared_scenarios / 'USA_US101-4_1_T-1.xml')
+    second = copy.deepcopy(loaded.planning_problems[0])
+    second._planning_problem_id = 999999
+    second.initial_state.position = second.initial_state.position + np.array((1.0, -12.0))
+    second.initial_state.orientation = second.initial_state.orientation + 0.1
+    first = support.moved(loaded, 10.0, (0.5, 1.5), -0.05)
+    loaded = replace(first, planning_problems=(*first.planning_problems, second))
+    setup = support.setup_of(loaded, [HumanSpec('hv0', 'idle')], avs=(
+        AvSpec('av0', spawn='lanelet'), AvSpec('av1', spawn='lanelet')))
+    assert setup.avs[0].transform != setup.avs[1].transform
+    run = HandDriven(setup)
+    run.drive(20, commands=lambda n: [GAS])
+    plain = setup_without_transforms(setup)
+    reference = PlanRequests(plain).build(plain.avs[0], 0, run.simulation.states, PlanRequests(
+        plain).forecast(2, 20, run.simulation.states, run.simulation.avs, run.result.objects, ()))
+    found_objects = 0
+    for av_id in ('av0', 'av1'):
+        request = run.result.requests[av_id]
+        order = [reference.names.index(name) for name in request.names]
+        for point in (0, 10, 30):
+            mine = places(request.names, request.positions[point], request.velocities[point])
+            theirs = places(request.names, reference.positions[point][order],
+                            reference.velocities[point][order])
+            present = np.isfinite(mine).all(axis=1) & np.isfinite(theirs).all(axis=1)
+            found_objects += present.sum()
+            mine, theirs = mine[present], theirs[present]
+            for columns in (slice(0, 2), slice(2, 4)):
+                np.testing.assert_allclose(
+                    distances(mine[:, columns]), distances(theirs[:, columns]), atol=1e-9)
+            speeds = [np.hypot(*rows[:, 2:4].T) for rows in (mine, theirs)]
+            np.testing.assert_allclose(*speeds, atol=1e-9)
+            turns = wrap_pi_array(mine[:, 4] - theirs[:, 4])
+            np.testing.assert_allclose(turns, turns[0], atol=1e-9)
+            assert abs(turns[0]) > 0.04
+    assert found_objects > 100
+
+
+def setup_without_transforms(setup: Setup) -> Setup:
+    """Give the same run with all planners in simulation coordinates."""
+    return replace(setup, avs=tuple(replace(av, transform=RigidTransform()) for av in setup.avs))
+
+
+def places(names: Sequence[str], positions: Array, velocities: Array) -> Array:
+    """Give x, y, vx, vy and yaw (Q, 5) of everybody in a point of a request."""
+    starts = [index for index, name in enumerate(names) if name.endswith('/x')]
+    return np.array([(*positions[i:i + 2], *velocities[i:i + 2], positions[i + 2])
+                     for i in starts])
+
+
+def distances(points: Array) -> Array:
+    """Give the distances (Q, Q) between points (Q, 2)."""
+    return np.hypot(*np.moveaxis(points[:, None] - points[None], 2, 0))
 
 
 def test_others_are_mapped_for_the_planner(turned: LoadedScenario) -> None:

@@ -17,7 +17,7 @@ from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
-from crgame_ros.scenario.game import HumanSpec
+from crgame_ros.scenario.game import AvSpec, HumanSpec
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
@@ -230,3 +230,24 @@ def test_duration_must_be_positive(cut_in: LoadedScenario, duration: float) -> N
     """Neither empty runs nor endless ones."""
     with pytest.raises(InputError, match='duration'):
         run_offline(support.setup_of(cut_in, [support.BESIDE], avs=()), duration_s=duration)
+
+
+def test_an_av_put_on_its_lane_drives_where_its_planner_believes(cut_in: LoadedScenario) -> None:
+    """
+    Declared 1.5 m to the left of the lane that the simulator puts it on (CRG 6-10 and 28).
+
+    Its planner leads it to the middle of the lane, so that in the coordinates that all share it
+    is 1.5 m to the right, with its wheels off the road; in the planner's it is not, nor is it by
+    CRG 28. In these coordinates both spawns are one drive.
+    """
+    declared = support.moved(cut_in, 15.0, (0.0, 1.5))
+    runs = {spawn: run_offline(support.setup_of(declared, avs=(
+        AvSpec('av0', spawn=spawn),)), duration_s=8.0) for spawn in ('problem', 'lanelet')}
+    states = runs['lanelet'].states_of('av0')
+    assert states[0, 1] == pytest.approx(0.0, abs=1e-9)
+    assert states[-1, 1] == pytest.approx(-1.5, abs=0.05)
+    assert not any(item.off_road for item in runs['lanelet'].violations)
+    transform = runs['lanelet'].setup.avs[0].transform
+    np.testing.assert_allclose(transform.to_scenario(states[:, :3]),
+                               runs['problem'].states_of('av0')[:, :3], atol=1e-6)
+    assert any('1.50 m and 0.0 deg apart' in item for item in runs['lanelet'].setup.notices)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a game to placed vehicles."""
 
+import copy
 from dataclasses import replace
 import hashlib
 import math
@@ -68,6 +69,35 @@ def test_lanelet_spawn_aligns_both_references(cut_in: LoadedScenario) -> None:
     mapped = av.transform.to_scenario(np.array(av.state[:3]))
     assert tuple(mapped) == pytest.approx(target[:3])
     assert av.state.speed == 10.0
+
+
+@pytest.mark.parametrize(('shift', 'turn', 'told'), [
+    (0.49, 0.0, ''), (1.5, 0.0, '1.50 m and 0.0 deg apart'), (-0.6, 0.0, '0.60 m and 0.0 deg'),
+    (0.1, 0.019, ''), (0.1, -0.05, 'm and 2.9 deg apart')])
+def test_a_large_discrepancy_is_told(cut_in: LoadedScenario, shift: float, turn: float,
+                                     told: str) -> None:
+    """More than 0.5 m or 0.02 rad (1.1 deg): the AV will drive beside its lane."""
+    declared = support.moved(cut_in, 10.0, (0.0, shift), turn)
+    setup = support.setup_of(declared, avs=(AvSpec('av0', spawn='lanelet'),))
+    notices = [item for item in setup.notices if 'apart' in item]
+    assert len(notices) == bool(told)
+    assert all(told in item and item.startswith('av0: ') for item in notices)
+    assert not any('apart' in item for item in support.setup_of(declared).notices)
+
+
+def test_the_recording_of_an_av_is_known_wherever_it_starts(traffic: LoadedScenario) -> None:
+    """It stands where the problem is declared, 1.5 m beside the lane that the AV is put on."""
+    declared = support.moved(traffic, 10.0, (0.0, 1.5))
+    declared = replace(declared, scenario=copy.deepcopy(declared.scenario))
+    problem = declared.planning_problems[0].initial_state
+    other = copy.deepcopy(declared.scenario.dynamic_obstacles[0])
+    other.initial_state.position = problem.position + np.array((0.2, 0.0))
+    declared.scenario.remove_obstacle(declared.scenario.dynamic_obstacles[0])
+    declared.scenario.add_objects(other)
+    for spawn in ('problem', 'lanelet'):
+        setup = support.setup_of(declared, avs=(AvSpec('av0', spawn=spawn),))
+        assert any(f'obstacle {other.obstacle_id} is the recorded av0' in item
+                   for item in setup.notices)
 
 
 def test_human_starts_where_the_game_says(cut_in: LoadedScenario) -> None:

@@ -100,7 +100,7 @@ def test_the_lane_is_either_of_a_route_that_changes_lanes() -> None:
     given = av.planning_problem
     problem = PlanningProblem(given.planning_problem_id, given.initial_state, GoalRegion(
         given.goal.state_list, {0: [beside]}))
-    route_lane = RouteLane(roads, problem, av.state)
+    route_lane = RouteLane(roads, problem, av.state, av.transform)
     width = roads.width_at(lane, 10.0)
     for across, expected in ((0.0, 0.0), (0.3 * width, 0.3 * width), (width, 0.0),
                              (1.2 * width, 0.2 * width), (-1.0, -1.0)):
