@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.driver.source import DriverSource
+from crgame_ros.driver.watchdog import SeatWatchdog
 
 
 class ReplayDriver(DriverSource):
     """
-    Repeats the commands that a recorded run consumed; released after their end.
+    Repeats the commands that a recorded run consumed.
+
+    After their end nobody is there: as after any loss of a driver the pedals and the steering are
+    let go at their rates, then the brake is applied gently and stays, in simulation time.
 
     :param commands: (cycles, 4) throttle, brake, steering, reverse of cycle 0, 1, …; NaN where an
         AV followed its plan.
@@ -22,11 +26,19 @@ class ReplayDriver(DriverSource):
     def __init__(self, commands: NDArray[np.float64]) -> None:
         self._commands = [DriverCommand(row[0], row[1], row[2], row[3] == 1.0)
                           for row in commands.tolist()]
+        self._recorded = len(self._commands)
+        self._end = SeatWatchdog()
 
     def drives(self, n: int) -> bool:
         """Tell whether somebody drove in the recorded cycle n."""
-        return n < len(self._commands) and not math.isnan(self._commands[n].throttle)
+        return n < self._recorded and not math.isnan(self._commands[n].throttle)
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the recorded command of cycle n."""
-        return self._commands[n] if n < len(self._commands) else RELEASED
+        """Give the recorded command of cycle n; after the last one that of a seat left alone."""
+        if n >= len(self._commands) == self._recorded:
+            last = self._commands[-1] if self._commands else RELEASED
+            self._end.filter(last, 0.0, dt_s, 0.0)
+        while n >= len(self._commands):
+            # At an infinite speed it never takes the brake off again.
+            self._commands.append(self._end.filter(RELEASED, math.inf, dt_s, math.inf))
+        return self._commands[n]

@@ -75,6 +75,15 @@ def parse_source(text: str) -> SourceSpec:
                      f'give one of {", ".join(_FORMS.values())}')
 
 
+def is_replay(text: str) -> bool:
+    """
+    Tell whether a driver source is a recording, which the simulation reads itself.
+
+    :raises InputError: as `parse_source`.
+    """
+    return parse_source(text).kind == 'replay'
+
+
 def load_timeline(spec: SourceSpec, base: Path) -> Timeline:
     """
     Read the timeline that a source names.

@@ -5,7 +5,7 @@
 import json
 from pathlib import Path
 
-from crgame_ros.driver.source import COCKPIT
+from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.launcher.node_process import NodeSpec
 from crgame_ros.launcher.run_plan import RunPlan
 from crgame_ros.planner.registry import EXTERNAL
@@ -50,7 +50,8 @@ def participant_specs(who: Participants) -> list[NodeSpec]:
         *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av}, nice=COMPANION_NICE,
                    restart=True) for av, planner in who.avs.items() if planner != EXTERNAL),
         *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human}, restart=True)
-          for human, driver in who.humans.items() if driver != COCKPIT),
+          for human, driver in who.humans.items()
+          if driver != COCKPIT and not is_replay(driver)),
         *(NodeSpec('perception_node', f'perception_node_{av}', {'vehicle': av},
                    nice=COMPANION_NICE, restart=True) for av in who.perceiving)]
     if who.traffic:

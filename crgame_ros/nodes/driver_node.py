@@ -16,7 +16,7 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 
 from crgame_ros.driver.device_map import load_device_map
-from crgame_ros.driver.source import DriverSource, JoyDriver, parse_source
+from crgame_ros.driver.source import DriverSource, is_replay, JoyDriver, parse_source
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
@@ -44,7 +44,7 @@ class DriverNode(Node):
             description="id of the human's vehicle", read_only=True)).value
         self._choice: str = declare('source', '', ParameterDescriptor(
             description="driver source instead of the game's: auto, idle, evdev[:NAME], "
-            'keys:FILE, joy:FILE, joy, replay:BAG', read_only=True)).value
+            'keys:FILE, joy:FILE, joy', read_only=True)).value
         self._joy_map: str = declare('joy_map', 'generic_gamepad', ParameterDescriptor(
             description='device map for the messages of an external joy node',
             read_only=True)).value
@@ -87,6 +87,9 @@ class DriverNode(Node):
             entry = game.vehicle(self._vehicle_id)
             if entry is None:
                 self.get_logger().warning(f'{self._vehicle_id} takes no part in this game')
+                driver = None
+            elif not self._choice and is_replay(entry['driver']):
+                self.get_logger().info(f'{self._vehicle_id}: the simulation repeats a recording')
                 driver = None
             else:
                 driver = live_driver(self._choice or entry['driver'],

@@ -5,10 +5,12 @@
 from dataclasses import asdict
 import json
 import os
+from typing import TYPE_CHECKING
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from crgame_ros.driver.source import is_replay
 from crgame_ros.errors import CrgameError
 from crgame_ros.ros.live_run import LiveRun, Outcome
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -16,6 +18,10 @@ from crgame_ros.ros.sim_control import SimControl
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.timing.time_slice import shorten_time_slice
+
+# Recordings are read in few runs, by code that takes time to load.
+if TYPE_CHECKING:
+    from crgame_ros.simulation.replay import RecordedInputs
 
 NS_PER_S = 1_000_000_000
 # /clock starts here: ROS takes a time of zero for "no clock yet".
@@ -31,6 +37,7 @@ class SimNode(Node):
         self._control = SimControl(self)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self)
+        self._recorded: RecordedInputs | None = None
 
     def run(self, stop: StopFlag) -> None:
         """Run until the game ends or a stop is asked for."""
@@ -42,7 +49,8 @@ class SimNode(Node):
         self._control.paused = self._control.starts_paused
         epoch, offset_ns = 0, FIRST_OFFSET_NS
         while True:
-            run = LiveRun(self, self._executor, self._control, setup, epoch, offset_ns)
+            run = LiveRun(self, self._executor, self._control, setup, epoch, offset_ns,
+                          self._recorded)
             outcome = run.run(stop)
             simulation = run.simulation
             now_ns = simulation.scheduler.stamp_ns(simulation.n)
@@ -67,6 +75,7 @@ class SimNode(Node):
             return present
 
     def _told(self, setup: Setup) -> Setup:
+        self._recorded = self._read_recordings(setup)
         self._write_roster(setup)
         for notice in setup.notices:
             self.get_logger().info(notice)
@@ -75,6 +84,13 @@ class SimNode(Node):
             f'{len(setup.obstacles.descriptions)} objects, '
             f'{1.0 / setup.scheduler.dt_s:g} Hz, tick {setup.scheduler.time_step_s:g} s')
         return setup
+
+    def _read_recordings(self, setup: Setup) -> 'RecordedInputs | None':
+        """Read whole what repeats a recording, before the run: its loop opens no file."""
+        if not any(is_replay(human.driver) for human in setup.humans):
+            return None
+        from crgame_ros.simulation.replay import recorded_inputs
+        return recorded_inputs(setup)
 
     def _write_roster(self, setup: Setup) -> None:
         """Tell the launcher who takes part, for a chosen game may have other vehicles."""

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.evdev_device import open_evdev
-from crgame_ros.driver.replay import ReplayDriver
 from crgame_ros.driver.source import (
     COCKPIT,
     DriverSource,
@@ -28,10 +27,11 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
 
     :param text: source as the game or the parameter names it.
     :param timeline: text of the timeline, if the game carries it.
-    :param vehicle_id: whose commands to take from a recording.
+    :param vehicle_id: for messages.
     :param joy_map: device map for an external joy node.
     :param say: tells the user something in one line.
-    :raises InputError: if the source names nothing that can be used.
+    :raises InputError: if the source names nothing that can be used, or is a recording: what comes
+        as messages arrives when it can, while recorded commands belong to their cycles.
     """
     source = parse_source(text)
     if source.has_timeline:
@@ -39,13 +39,8 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
             return ScriptedDriver.from_text(timeline, f'{vehicle_id}: {text}')
         return ScriptedDriver(load_timeline(source, Path('.')))
     if source.kind == 'replay':
-        # Imported here, for reading bags takes time that no other driver has to spend.
-        from crgame_ros.recording.run_log import replay_inputs
-        commands, _ = replay_inputs(Path(source.argument))
-        if vehicle_id not in commands:
-            raise InputError(f'{vehicle_id} took no part', source.argument,
-                             'it has ' + ', '.join(commands))
-        return ReplayDriver(commands[vehicle_id])
+        raise InputError('a recording is repeated by the simulation itself', vehicle_id,
+                         f'name it as the driver in the game: {text}')
     if source.kind == 'joy':
         return JoyDriver(load_device_map(joy_map))
     if source.kind in ('idle', COCKPIT):

@@ -6,6 +6,7 @@ from dataclasses import replace
 from enum import auto, Enum
 import gc
 import time
+from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
@@ -22,6 +23,10 @@ from crgame_ros.ros.start_gate import StartGate
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.time_controller import TimeController
+
+# Recordings are read in few runs, by code that takes time to load.
+if TYPE_CHECKING:
+    from crgame_ros.simulation.replay import RecordedInputs
 
 NS_PER_S = 1_000_000_000
 # How often the executor looks for service calls [Hz], and the least time left for it [ns].
@@ -52,16 +57,19 @@ class LiveRun:
     :param setup: the run.
     :param epoch: counts resets.
     :param clock_offset_ns: simulation time of step 0 [ns]
+    :param recorded: what drives seats as in a recording; None for nothing.
     """
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor, control: SimControl,
-                 setup: Setup, epoch: int, clock_offset_ns: int) -> None:
+                 setup: Setup, epoch: int, clock_offset_ns: int,
+                 recorded: 'RecordedInputs | None' = None) -> None:
         self._node = node
         self._executor = executor
         self._control = control
         self._epoch = epoch
         self._outputs = SimOutputs(node, setup)
-        self._inputs = SimInputs(node, setup, clock_offset_ns, control.seat_sources)
+        self._inputs = SimInputs(
+            node, setup, clock_offset_ns, control.seat_sources, recorded)
         scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
         feed = None if setup.traffic is None else RemoteTraffic(
             self._inputs.take_agents, setup.traffic, scheduler)
@@ -286,10 +294,11 @@ class LiveRun:
         """Do the work of one cycle, from reading the inputs to publishing the state."""
         start_ns = time.monotonic_ns()
         simulation, outputs, inputs = self.simulation, self._outputs, self._inputs
-        cycle = self._controller.begin_cycle(start_ns)
         for av in simulation.avs:
             self._take_plan(av.setup.id)
         self._take_orders(start_ns)
+        # A recorded human moves over the recorded intervals, whatever this machine is busy with.
+        cycle = self._controller.begin_cycle(start_ns, inputs.seats.interval_s(simulation.n))
         commands = inputs.seats.commands(start_ns, cycle.dt_eff_s, simulation)
         if simulation.scheduler.is_tick(simulation.n + 1):
             self._take_triggers()

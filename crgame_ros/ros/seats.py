@@ -15,7 +15,9 @@ from crgame_ros.ros.messages import from_joy, from_time
 
 # The driver's process needs neither, and they take half a second to load.
 if TYPE_CHECKING:
+    from crgame_ros.driver.replay import ReplayDriver
     from crgame_ros.simulation.engine import Simulation
+    from crgame_ros.simulation.replay import RecordedInputs
     from crgame_ros.simulation.setup import Setup
 
 NS = 1e-9
@@ -38,15 +40,17 @@ class Seat:
     :param home: source by which the game's driver speaks.
     :param commands: where the commands come from.
     :param clock_offset_ns: simulation time of step 0; older commands are of a run before [ns]
+    :param recording: drives while nobody else has the seat, cycle by cycle, whenever that comes.
     """
 
     def __init__(self, vehicle_id: str, driver: str, home: str, commands: PolledSubscription,
-                 clock_offset_ns: int) -> None:
+                 clock_offset_ns: int, recording: 'ReplayDriver | None' = None) -> None:
         self.id = vehicle_id
         self.driver = driver
         self.home = home
         self.source = home
         self.commands = commands
+        self.recording = recording
         self._where = f'/{vehicle_id}/driver_command'
         self._watchdog = SeatWatchdog()
         self._last = RELEASED
@@ -102,15 +106,25 @@ class Seat:
                 self.malformed += 1
         return self._heard_ns is not None
 
-    def command(self, now_ns: int, dt_s: float, speed: float) -> DriverCommand | None:
+    def repeats(self, n: int) -> bool:
+        """Tell whether cycle n is driven as in the recording."""
+        return self.recording is not None and self.source == self.home \
+            and self.recording.drives(n)
+
+    def command(self, now_ns: int, dt_s: float, speed: float, n: int = 0) -> DriverCommand | None:
         """
         Give the command for this cycle; released, then gentle braking, after a loss.
 
+        :param n: the cycle, which only a recording needs to know.
         :return: None for an AV that nobody has taken over.
         """
-        if self.source == PLANNER:
+        recording = self.recording if self.source == self.home else None
+        if self.source == PLANNER and not self.repeats(n):
             return None
-        self.listen(now_ns)
+        if recording is not None:
+            self._last, self._heard_ns = recording.command(n, dt_s), now_ns
+        else:
+            self.listen(now_ns)
         if self._heard_ns is None:
             self._heard_ns = now_ns
         age_s = (now_ns - self._heard_ns) * NS
@@ -125,20 +139,25 @@ class Seats:
     :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param sources: what people ordered so far, by seat; outlives a reset.
+    :param recorded: what drives seats as in a recording; None for nothing.
     """
 
     def __init__(self, endpoints: Endpoints, setup: 'Setup', clock_offset_ns: int,
-                 sources: MutableMapping[str, str]) -> None:
+                 sources: MutableMapping[str, str],
+                 recorded: 'RecordedInputs | None' = None) -> None:
+        drivers = {} if recorded is None else recorded.drivers
+        self._intervals_s: list[float] = [] if recorded is None or recorded.intervals_s is None \
+            else recorded.intervals_s.tolist()
         self._orders = endpoints.polled('/seats/order')
         self._sources = sources
         self.humans = [
             Seat(human.id, human.driver, _home(human.driver),
                  endpoints.polled('/<v>/driver_command', human.id, depth=COMMAND_DEPTH),
-                 clock_offset_ns) for human in setup.humans]
+                 clock_offset_ns, drivers.get(human.id)) for human in setup.humans]
         self.avs = [
             Seat(av.id, av.spec.planner, PLANNER,
                  endpoints.polled('/<v>/driver_command', av.id, depth=COMMAND_DEPTH),
-                 clock_offset_ns) for av in setup.avs]
+                 clock_offset_ns, drivers.get(av.id)) for av in setup.avs]
         self.all = [*self.humans, *self.avs]
         for seat in self.all:
             seat.source = sources.get(seat.id, seat.home)
@@ -148,13 +167,18 @@ class Seats:
         """Every subscription, to release it."""
         return [self._orders, *(seat.commands for seat in self.all)]
 
+    def interval_s(self, n: int) -> float | None:
+        """Give the interval of cycle n as recorded [s]; None where no human repeats it."""
+        return self._intervals_s[n] if any(seat.repeats(n) for seat in self.humans) else None
+
     def commands(self, now_ns: int, dt_s: float,
                  simulation: 'Simulation') -> list[DriverCommand | None]:
         """Give the command of every seat for this cycle; None for AVs that follow their plan."""
+        n = simulation.n
         return [
-            *(seat.command(now_ns, dt_s, human.state.speed)
+            *(seat.command(now_ns, dt_s, human.state.speed, n)
               for seat, human in zip(self.humans, simulation.humans, strict=True)),
-            *(seat.command(now_ns, dt_s, av.state.speed)
+            *(seat.command(now_ns, dt_s, av.state.speed, n)
               for seat, av in zip(self.avs, simulation.avs, strict=True))]
 
     def document(self) -> str:

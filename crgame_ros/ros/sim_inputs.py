@@ -5,7 +5,7 @@
 from collections.abc import MutableMapping
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from rclpy.node import Node
 
@@ -16,6 +16,10 @@ from crgame_ros.ros.messages import from_joint_trajectory, from_time
 from crgame_ros.ros.request_head import request_head
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.setup import Setup
+
+# Recordings are read in few runs, by code that takes time to load.
+if TYPE_CHECKING:
+    from crgame_ros.simulation.replay import RecordedInputs
 
 # Triggers read at one tick: a flood must not cost the cycle.
 MAX_TRIGGERS = 10
@@ -29,14 +33,16 @@ class SimInputs:
     :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param seat_sources: who was ordered to drive what, by seat.
+    :param recorded: what drives seats as in a recording; None for nothing.
     """
 
     def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
-                 seat_sources: MutableMapping[str, str]) -> None:
+                 seat_sources: MutableMapping[str, str],
+                 recorded: 'RecordedInputs | None' = None) -> None:
         self._node = node
         self._clock_offset_ns = clock_offset_ns
         endpoints = Endpoints(node)
-        self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources)
+        self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources, recorded)
         # Orders to a planner to go or stop, until the loop takes them.
         self.planner_orders: dict[str, bool] = {}
         self._services = [

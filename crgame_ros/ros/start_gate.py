@@ -49,7 +49,8 @@ class StartGate:
         self._planners = set(result.requests)
         self._traffic_answers = traffic_answers
         self._seats = {seat.id: seat for seat in inputs.seats.humans
-                       if {'driver_node', f'driver_node_{seat.id}'} & set(companions)}
+                       if seat.recording is None
+                       and {'driver_node', f'driver_node_{seat.id}'} & set(companions)}
         self._began_ns = 0
         self._asked_ns = 0
         self._told_ns = 0

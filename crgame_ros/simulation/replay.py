@@ -1,16 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded human again: the inputs of a recording, for the offline runner."""
+"""A recorded human again: the inputs of a recording, for both runners."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.driver.replay import ReplayDriver
-from crgame_ros.driver.source import DriverSource, parse_source, SourceSpec
+from crgame_ros.driver.source import parse_source, SourceSpec
 from crgame_ros.errors import InputError
 from crgame_ros.recording.run_events import read_run_events
 from crgame_ros.recording.run_log import replay_inputs
@@ -19,17 +20,26 @@ from crgame_ros.scenario.game import Game
 from crgame_ros.simulation.setup import Setup
 
 
-def recorded_inputs(
-    setup: Setup,
-) -> tuple[dict[str, DriverSource], NDArray[np.float64] | None]:
+class RecordedInputs(NamedTuple):
+    """
+    What the humans of recordings did, by the cycle in which the recorded run consumed it.
+
+    :param drivers: by human, and by AV that somebody took over.
+    :param intervals_s: (n) Delta t_eff that reproduce the recorded states to the last bit [s];
+        None without a recording.
+    """
+
+    drivers: dict[str, ReplayDriver]
+    intervals_s: NDArray[np.float64] | None
+
+
+def recorded_inputs(setup: Setup) -> RecordedInputs:
     """
     Find the inputs of every human whose driver is `replay:BAG`.
 
-    :return: drivers by human and by AV that somebody took over, and the intervals Delta t_eff that
-        reproduce the recorded states to the last bit [s]; None for the nominal step.
     :raises InputError: if a recording cannot be used, or two of them differ in their intervals.
     """
-    drivers: dict[str, DriverSource] = {}
+    drivers: dict[str, ReplayDriver] = {}
     intervals: NDArray[np.float64] | None = None
     for human in setup.humans:
         source = parse_source(human.driver)
@@ -45,7 +55,7 @@ def recorded_inputs(
         drivers[human.id], intervals = ReplayDriver(commands[human.id]), measured
         drivers.update({av.id: ReplayDriver(commands[av.id])
                         for av in setup.avs if av.id in commands})
-    return drivers, intervals
+    return RecordedInputs(drivers, intervals)
 
 
 def with_recorded_events(game: Game, fired: Sequence[FiredEvent],

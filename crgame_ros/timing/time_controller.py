@@ -104,8 +104,13 @@ class TimeController:
             return int(self._start_ns + step_ns)
         return int(self._anchor_ns + (self.n + 1) * step_ns)
 
-    def begin_cycle(self, now_ns: int) -> Cycle:
-        """Begin the next cycle: measure its interval and decide on what it integrates."""
+    def begin_cycle(self, now_ns: int, interval_s: float | None = None) -> Cycle:
+        """
+        Begin the next cycle: measure its interval and decide on what it integrates.
+
+        :param interval_s: integrate this instead, as a recorded run did [s]; what it differs by
+            is carried like what the clip cuts off, until intervals are measured again.
+        """
         self.n += 1
         measured_s = (now_ns - self._start_ns) * NS * self._factor
         self._start_ns = now_ns
@@ -115,7 +120,7 @@ class TimeController:
         moved_s = self._reset_if_due()
         return Cycle(self.n, ideal_s + self.dropped_s, ideal_s + self.dropped_s + self._error_s,
                      measured_s - self._dt_s, self._error_s,
-                     self._effective(measured_s - moved_s), self.resets, self.dropped_s)
+                     self._effective(measured_s - moved_s, interval_s), self.resets, self.dropped_s)
 
     def _reset_if_due(self) -> float:
         """Re-anchor after too large a lag, the only reason; return the time dropped [s]."""
@@ -130,15 +135,16 @@ class TimeController:
         self._error_s, self._late_in_a_row = 0.0, 0
         return dropped
 
-    def _effective(self, measured_s: float) -> float:
+    def _effective(self, measured_s: float, given_s: float | None) -> float:
         """Clip the measured interval (CRG 13); what is cut off comes back in later steps."""
         spec = self._spec
         if not spec.measured_interval:
-            return self._dt_s
+            return self._dt_s if given_s is None else given_s
         wanted = measured_s + self._carry_s
         # A bound that excludes the nominal step itself would never let the sum return to n dt.
         shortest = min(spec.dt_min, 0.5 * self._dt_s)
-        effective = min(max(spec.dt_max, 2.0 * self._dt_s), max(shortest, wanted))
+        effective = min(max(spec.dt_max, 2.0 * self._dt_s), max(shortest, wanted)) \
+            if given_s is None else given_s
         if spec.clip == 'carry':
             self._carry_s = wanted - effective
         return effective
