@@ -118,19 +118,17 @@ def _trigger(text: str) -> tuple[str, float]:
 
 def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.launcher.arguments import RunRequest
-    from crgame_ros.launcher.run_plan import effective_game, with_planners
+    from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.recording.run_log import run_log_of
     from crgame_ros.scenario.export import write_scenario
     from crgame_ros.simulation.offline import run_offline
-    from crgame_ros.simulation.replay import recorded_inputs, with_replayed_events
-    from crgame_ros.simulation.setup import build_setup
+    from crgame_ros.simulation.replay import recorded_inputs
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
                          duration_s=values.duration,
                          planners=(values.planner,) if values.planner else ())
-    setup = with_planners(build_setup(effective_game(request)), request.planners)
-    setup = with_replayed_events(setup)
+    setup = effective_setup(request)
     for notice in setup.notices:
         print(f'note: {notice}', file=sys.stderr)
     drivers, intervals_s = recorded_inputs(setup)

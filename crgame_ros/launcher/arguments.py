@@ -22,12 +22,14 @@ examples:
   ./run.sh                                        the cut-in game
   ./run.sh scenarios/merge.yaml --driver evdev    drive the merge yourself
   ./run.sh --scenario FILE.xml --planner reactive --duration 30
-  ./run.sh --driver replay:runs/NAME/bag          the same human against another planner
+  ./run.sh --driver replay:runs/NAME/bag --planner reactive
+                                                  a recorded game again, against another planner
   ./run.sh --replay runs/NAME/bag                 look at a recording, with a time line
 
 driver sources: cockpit (the run waits for somebody in the browser), auto (wheel, gamepad or
 keyboard, whichever is found), evdev[:NAME], keys:FILE, joy:FILE (scripted), joy (an external joy
-node), replay:BAG, idle. Whoever they are, somebody in the browser can take the seat.
+node), replay:BAG (without a game the recording's own), idle. Whoever they are, somebody in the
+browser can take the seat.
 planners: idm, idm-package, reactive, constant-velocity, a registered name, module:Class or
 file.py:Class."""
 

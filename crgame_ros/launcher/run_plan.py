@@ -8,17 +8,23 @@ from datetime import datetime
 from pathlib import Path
 
 from crgame_ros.cockpit.access import check_address
-from crgame_ros.driver.source import COCKPIT
+from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.paths import default_game
 from crgame_ros.planner.registry import create_planner, EXTERNAL
+from crgame_ros.recording.recorded_game import read_recorded_game
+from crgame_ros.scenario import guard
 from crgame_ros.scenario.checked_values import build
 from crgame_ros.scenario.events import PlannerSwap
 from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.scenario.game_file import dump_game, load_game
 from crgame_ros.simulation.event_check import check_swap
-from crgame_ros.simulation.replay import with_replayed_events
+from crgame_ros.simulation.replay import (
+    recorded_inputs,
+    replay_notices,
+    with_replayed_events,
+)
 from crgame_ros.simulation.setup import build_setup, Setup
 
 
@@ -76,12 +82,47 @@ def effective_game(request: RunRequest) -> Game:
             raise InputError('the game has no human', '--driver', 'leave it out')
         first = replace(game.humans[0], driver=_from_here(request.driver))
         game = replace(game, humans=(first, *game.humans[1:]))
+    return _with_limits(game, request)
+
+
+def _with_limits(game: Game, request: RunRequest) -> Game:
+    """Take over how long and how finely to simulate."""
     if request.duration_s is not None:
         game = replace(game, duration=request.duration_s)
     if request.rate_hz is not None:
         timing = build(TimingSpec, {**vars(game.timing), 'rate': request.rate_hz}, '--rate')
         game = replace(game, timing=timing)
     return game
+
+
+def effective_setup(request: RunRequest) -> Setup:
+    """
+    Load and place what a request asks for, with its planners and whatever it repeats.
+
+    With `--driver replay:BAG` and no game it is the game of the recording.
+
+    :raises InputError: if a file or name cannot be used, or game and recording don't belong
+        together.
+    """
+    bag = _own_recording(request)
+    if bag is None:
+        setup = build_setup(effective_game(request))
+    else:
+        recorded = read_recorded_game(bag, other_planners=bool(request.planners))
+        setup = build_setup(_with_limits(recorded.game, request), recorded.loaded)
+    setup = with_replayed_events(with_planners(setup, request.planners))
+    notices = [*setup.notices, *replay_notices(setup)]
+    if bag is not None:
+        notices.append(f'{bag}: this is the game of the recording')
+    return replace(setup, notices=tuple(notices))
+
+
+def _own_recording(request: RunRequest) -> Path | None:
+    """Give the recording whose own game is asked for, None if there is another game."""
+    if request.driver is None or request.game is not None or request.scenario is not None:
+        return None
+    source = parse_source(request.driver)
+    return Path(source.argument).expanduser() if source.kind == 'replay' else None
 
 
 def _from_here(driver: str) -> str:
@@ -99,17 +140,22 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
     :param now: wall clock for the folder's name.
     :raises InputError: if anything cannot be used.
     """
-    setup = build_setup(effective_game(request))
+    setup = effective_setup(request)
+    recorded_inputs(setup)
     if request.headless and any(human.driver == COCKPIT for human in setup.humans):
         raise InputError('nobody can take a seat in the browser', '--headless',
                          'leave it out, or name another driver')
-    setup = with_replayed_events(with_planners(setup, request.planners))
     for av in setup.avs:
         _check_planner(av.spec)
     _check_swaps(setup)
     if not request.headless:
         check_address(request.listen or '127.0.0.1', request.port)
     folder = _make_folder(request.out, setup.loaded.benchmark_id, now())
+    if _own_recording(request) is not None:
+        # The nodes read files: this run's folder gets the scenario that the recording carries.
+        scenario = folder / 'scenario.xml'
+        scenario.write_bytes(guard.encode(setup.loaded.xml_text))
+        setup = replace(setup, game=replace(setup.game, scenario=scenario))
     plan = RunPlan(request, setup, folder)
     plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
     return plan

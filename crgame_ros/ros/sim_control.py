@@ -10,10 +10,11 @@ from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParam
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from crgame_ros.driver.source import is_replay
 from crgame_ros.errors import InputError
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.scenario.game import Game
+from crgame_ros.scenario.game import Game, HumanSpec
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
@@ -126,7 +127,8 @@ class SimControl:
         """
         Load the game that the parameters name now, for a reset.
 
-        :param present: a new scenario keeps its humans with their drivers, and its rules.
+        :param present: a new scenario keeps its humans with their drivers, and its rules; a
+            recording belongs to its own scenario, so that the game's default drives instead.
         :raises InputError: if it cannot be used or lies outside the configured directories.
         """
         name = self._value(self._chosen)
@@ -135,7 +137,10 @@ class SimControl:
         path = self._allowed(name)
         if path.samefile(present.scenario):
             return present
-        humans = tuple(replace(human, spawn=None) for human in present.humans)
+        humans = tuple(
+            replace(human, spawn=None,
+                    driver=HumanSpec.driver if is_replay(human.driver) else human.driver)
+            for human in present.humans)
         return replace(present, scenario=path, title='', humans=humans, avs=None)
 
     def _game(self, path: str) -> Game:

@@ -137,6 +137,12 @@ def _has_doctype(source: str) -> InputError:
                       'remove <!DOCTYPE …>')
 
 
+def encode(text: str) -> bytes:
+    """Give the content of a file that `read_text` reads as this text."""
+    declared = _ENCODING.match(text[:200].encode('utf-8'))
+    return text.encode(declared.group(1).decode('ascii') if declared else 'utf-8')
+
+
 def _decode(data: bytes, source: str) -> str:
     declared = _ENCODING.match(data[:200].removeprefix(b'\xef\xbb\xbf'))
     encoding = declared.group(1).decode('ascii') if declared else 'utf-8'

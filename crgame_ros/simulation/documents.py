@@ -18,7 +18,7 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.event_file import document_entry, parse_document_entries
 from crgame_ros.scenario.events import EventSpec, FiredEvent
 from crgame_ros.scenario.game import DrivabilitySpec
-from crgame_ros.scenario.game_file import execution_entries
+from crgame_ros.scenario.game_file import dump_game, execution_entries, model_entry
 from crgame_ros.scenario.object_file import object_entry
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
@@ -55,7 +55,8 @@ def game_document(setup: 'Setup', *, epoch: int, clock_offset_ns: int,
         'real_time_factor': real_time_factor, 'seed': game.seed, 'duration': duration,
         'humans': [
             {'id': human.id, 'vehicle': _vehicle_entry(human.vehicle),
-             'state': list(human.state), 'driver': human.driver, 'timeline': human.timeline}
+             'state': list(human.state), 'driver': human.driver, 'timeline': human.timeline,
+             'dynamics': None if human.dynamics is None else model_entry(human.dynamics)}
             for human in setup.humans],
         'avs': [
             {'id': av.id, 'vehicle': _vehicle_entry(av.vehicle),
@@ -70,7 +71,8 @@ def game_document(setup: 'Setup', *, epoch: int, clock_offset_ns: int,
         'events': [document_entry(event) for event in game.events],
         'objects': [object_entry(item) for item in game.objects],
         'traffic': None if game.traffic is None else traffic_entry(game.traffic),
-        'occupancy': None if game.occupancy is None else str(game.occupancy.resolve())}
+        'occupancy': None if game.occupancy is None else str(game.occupancy.resolve()),
+        'file': dump_game(game)}
     return json.dumps(document, allow_nan=False)
 
 

@@ -13,10 +13,16 @@ from numpy.typing import NDArray
 from crgame_ros.driver.replay import ReplayDriver
 from crgame_ros.driver.source import parse_source, SourceSpec
 from crgame_ros.errors import InputError
+from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.run_events import read_run_events
 from crgame_ros.recording.run_log import replay_inputs
 from crgame_ros.scenario.events import AtStep, FiredEvent
 from crgame_ros.scenario.game import Game
+from crgame_ros.simulation.documents import (
+    game_document,
+    GameDocument,
+    parse_game_document,
+)
 from crgame_ros.simulation.setup import Setup
 
 
@@ -37,7 +43,8 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
     """
     Find the inputs of every human whose driver is `replay:BAG`.
 
-    :raises InputError: if a recording cannot be used, or two of them differ in their intervals.
+    :raises InputError: if a recording cannot be used, is of another scenario or rate, or if two of
+        them differ in their intervals.
     """
     drivers: dict[str, ReplayDriver] = {}
     intervals: NDArray[np.float64] | None = None
@@ -45,7 +52,9 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
         source = parse_source(human.driver)
         if source.kind != 'replay':
             continue
-        commands, measured = replay_inputs(_bag(setup, source))
+        bag = _bag(setup, source)
+        _check_same(setup, read_game_document(bag), bag)
+        commands, measured = replay_inputs(bag)
         if human.id not in commands:
             raise InputError(f'{human.id} took no part', source.argument,
                              'it has ' + ', '.join(commands))
@@ -56,6 +65,45 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
         drivers.update({av.id: ReplayDriver(commands[av.id])
                         for av in setup.avs if av.id in commands})
     return RecordedInputs(drivers, intervals)
+
+
+def _check_same(setup: Setup, recorded: GameDocument, bag: Path) -> None:
+    """Refuse a recording whose commands mean nothing in this run."""
+    benchmark_id = recorded.content.get('benchmark_id')
+    if recorded.scenario_sha256 != setup.loaded.sha256:
+        raise InputError(
+            f'was recorded in another scenario ({benchmark_id}) than {setup.loaded.source}',
+            str(bag), 'leave the game out: the recording carries its own')
+    here, there = setup.scheduler, recorded.scheduler
+    if (here.time_step_ns, here.steps_per_tick) != (there.time_step_ns, there.steps_per_tick):
+        raise InputError(f'was recorded at {1.0 / there.dt_s:g} Hz, not {1.0 / here.dt_s:g} Hz',
+                         str(bag), f'give --rate {1.0 / there.dt_s:g}')
+
+
+def replay_notices(setup: Setup) -> tuple[str, ...]:
+    """
+    Say, one line each, which recorded humans will not take their recorded ways, and why.
+
+    :raises InputError: if a recording cannot be used, or is of another scenario or rate.
+    """
+    notices = []
+    for human in setup.humans:
+        source = parse_source(human.driver)
+        if source.kind != 'replay':
+            continue
+        bag = _bag(setup, source)
+        recorded = read_game_document(bag)
+        _check_same(setup, recorded, bag)
+        present = parse_game_document(game_document(
+            setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+        here, there = (document.vehicle(human.id) or {} for document in (present, recorded))
+        other = [name for key, name in (('state', 'start'), ('vehicle', 'vehicle'),
+                                        ('dynamics', 'vehicle model'))
+                 if here.get(key) != there.get(key)]
+        if other:
+            notices.append(f'{human.id} has another {" and ".join(other)} than in {bag}: '
+                           'its commands are repeated, its way is not')
+    return tuple(notices)
 
 
 def with_recorded_events(game: Game, fired: Sequence[FiredEvent],

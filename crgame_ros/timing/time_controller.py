@@ -118,9 +118,10 @@ class TimeController:
         self._error_s = (now_ns - self._anchor_ns) * NS * self._factor - ideal_s
         self._late_in_a_row = self._late_in_a_row + 1 if self._error_s > self._dt_s else 0
         moved_s = self._reset_if_due()
+        effective_s = self._effective(measured_s - moved_s, interval_s)
         return Cycle(self.n, ideal_s + self.dropped_s, ideal_s + self.dropped_s + self._error_s,
-                     measured_s - self._dt_s, self._error_s,
-                     self._effective(measured_s - moved_s, interval_s), self.resets, self.dropped_s)
+                     measured_s - self._dt_s, self._error_s, effective_s, self.resets,
+                     self.dropped_s)
 
     def _reset_if_due(self) -> float:
         """Re-anchor after too large a lag, the only reason; return the time dropped [s]."""

@@ -9,6 +9,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from live_peer import Peer
 from live_support import CUT_IN, Launcher
 import numpy as np
 from numpy.typing import NDArray
@@ -106,26 +107,42 @@ def test_recorded_human_drives_live_against_another_planner(recorded: Path,
     """
     `--driver replay:BAG` repeats the recorded human's states to the last bit on a busy machine.
 
-    Commands and intervals belong to their cycles: that these come late changes nothing.
+    Commands and intervals belong to their cycles: that these come late changes nothing, nor does a
+    pause in between or a reset. The recording alone is enough: its own game is run.
     """
-    bag = recorded / 'bag'
+    bag, again = recorded / 'bag', tmp_path / 'run' / 'bag_1'
     with _busy_machine(), Launcher(
-            [recorded / 'game.yaml', '--driver', f'replay:{bag}', '--planner',
-             'constant-velocity', '--duration', DURATION_S], tmp_path / 'run') as launcher:
+            ['--driver', f'replay:{bag}', '--planner', 'constant-velocity', '--duration', 60],
+            tmp_path / 'run') as launcher, \
+            Peer(launcher.domain, '/clock', '/scenario/game') as peer:
+        peer.wait_until(lambda: peer.n > 20, 'n = 20')
+        assert peer.call('/sim/reset').success
+        peer.wait_until(lambda: peer.games[-1].epoch == 1 and peer.n > 100, 'n = 100')
+        assert peer.call('/sim/pause').success and peer.call('/sim/step').success
+        peer.listen_for(0.5)
+        assert peer.call('/sim/start').success
+        peer.wait_until(lambda: peer.n > STEPS + 60, 'more than was recorded')
+        assert peer.call('/sim/stop').success
         assert launcher.wait() == 0, launcher.text
-    first, second = (read_cycles(path) for path in (bag, tmp_path / 'run' / 'bag'))
-    assert len(first.rows) == len(second.rows) == STEPS
-    assert np.array_equal(first.commands('hv0'), second.commands('hv0'))
-    assert np.array_equal(first.column('dt_eff_s'), second.column('dt_eff_s'))
-    # The machine did its part: the loop itself ran over other intervals than were integrated.
-    assert not np.array_equal(first.column('step_error_s'), second.column('step_error_s'))
-    before, after = (_published(path, 'hv0') for path in (bag, tmp_path / 'run' / 'bag'))
-    assert sorted(after) == list(range(STEPS + 1))
+    assert launcher.says('note: .*: this is the game of the recording')
+    first, second = (read_cycles(path) for path in (bag, again))
+    assert len(first.rows) == STEPS
+    commands, intervals = second.commands('hv0'), second.column('dt_eff_s')
+    assert np.array_equal(first.commands('hv0'), commands[:STEPS])
+    assert np.array_equal(first.column('dt_eff_s'), intervals[:STEPS])
+    # The loop itself ran over other intervals than were integrated.
+    assert not np.array_equal(first.column('step_error_s'), second.column('step_error_s')[:STEPS])
+    # After the recording nobody is there: 0.45 s later, at r_p- = 2.2 /s, the brake is on.
+    assert commands[STEPS + 50, :2].tolist() == [0.0, pytest.approx(0.15)]
+    # What it differed by from the clock is made up for.
+    assert intervals.sum() == pytest.approx(0.01 * len(intervals), abs=0.1)
+    before, after = (_published(path, 'hv0') for path in (bag, again))
+    assert sorted(after) == list(range(len(intervals) + 1))
     assert all(np.array_equal(before[n], after[n]) for n in range(STEPS + 1))
     # The simulation repeats it: no node speaks for the seat.
     assert 'driver_node_hv0' not in dict(launcher.started)
     # The other planner keeps its speed, whatever the human does; IDM had accelerated.
-    before, after = (_published(path, 'av0') for path in (bag, tmp_path / 'run' / 'bag'))
+    before, after = (_published(path, 'av0') for path in (bag, again))
     assert after[200][1, 0] == pytest.approx(after[0][1, 0], abs=1e-6)
     assert before[200][1, 0] > before[0][1, 0] + 0.5
     assert load_game(tmp_path / 'run' / 'game.yaml').avs[0].planner == 'constant-velocity'

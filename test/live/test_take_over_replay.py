@@ -137,6 +137,19 @@ def test_the_take_over_is_repeated(recorded: Recorded) -> None:
     assert alone.states_of('av0')[last, StateColumn.SPEED] > speeds[last] + 3.0
 
 
+def test_live_it_is_repeated_too(recorded: Recorded, tmp_path: Path) -> None:
+    """By the recording alone: who drove what, in the same cycles, and the human's very states."""
+    with Launcher(['--driver', f'replay:{recorded.folder / "bag"}', '--duration',
+                   f'{recorded.duration_s:.2f}'], tmp_path / 'run') as launcher:
+        assert launcher.wait() == 0, launcher.text
+    first, second = (read_cycles(folder / 'bag') for folder in (recorded.folder, tmp_path / 'run'))
+    for vehicle in ('hv0', 'av0'):
+        assert np.array_equal(first.commands(vehicle), second.commands(vehicle), equal_nan=True)
+    before, after = (_published(folder / 'bag', 'hv0')
+                     for folder in (recorded.folder, tmp_path / 'run'))
+    assert np.array_equal(before, after)
+
+
 def test_the_command_line_does_the_same_twice(recorded: Recorded) -> None:
     """`crgame offline GAME --driver replay:BAG`: one state hash, that of the runner."""
     hashes = set()

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from live_peer import Peer
 from live_support import CUT_IN, wait_until
+import numpy as np
 import pytest
 import rclpy
 from rclpy.context import Context
@@ -16,11 +17,13 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
+from crgame_ros.driver.replay import ReplayDriver
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.environment import free_domain_id
 from crgame_ros.ros.messages import to_joy
 from crgame_ros.ros.seats import COMMAND_DEPTH, GAME, MAX_ORDERS, Seat, Seats
 from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.replay import RecordedInputs
 from crgame_ros.simulation.setup import build_setup
 
 MS = 1_000_000
@@ -187,3 +190,41 @@ def test_what_makes_no_command_is_counted(table: Table) -> None:
                or found[-1] != RELEASED, 'the last of them')
     assert found[-1] == DriverCommand(0.0, 1.0, -1.0)
     assert (table.human.outdated, table.human.malformed) == (1, 1)
+
+
+def test_a_recording_drives_by_the_step(table: Table) -> None:
+    """
+    Row n in cycle n, however late it is; who takes the seat has it, and gives it back to row n.
+
+    After the last row nobody is there: the pedals go up and the brake holds. An AV is driven
+    where somebody had taken it over, and follows its plan elsewhere.
+    """
+    setup = build_setup(load_game(CUT_IN))
+    rows = np.array([[0.01 * n, 0.0, 0.0, 0.0] for n in range(100)])
+    taken = np.full((100, 4), np.nan)
+    taken[40:50] = (0.0, 1.0, 0.0, 0.0)
+    intervals = np.linspace(0.005, 0.015, 100)
+    seats = Seats(Endpoints(table.node), setup, OFFSET_NS, {}, RecordedInputs(
+        {'hv0': ReplayDriver(rows), 'av0': ReplayDriver(taken)}, intervals))
+    table = table._replace(seats=seats)
+    seat, av = seats.humans[0], seats.avs[0]
+    # A second between two cycles is no loss, and other messages for the seat are not heard.
+    table.say(FULL)
+    given = [seat.command(n * 1000 * MS, 0.01, 20.0, n) for n in range(0, 40)]
+    assert [command.throttle for command in given] == rows[:40, 0].tolist()
+    assert [seats.interval_s(n) for n in range(100)] == intervals.tolist()
+    assert [av.command(0, 0.01, 10.0, n) for n in (39, 40, 49, 50)] == [
+        None, DriverCommand(0.0, 1.0), DriverCommand(0.0, 1.0), None]
+    wait_until(lambda: table.orders.get_subscription_count() > 1, 'the second seats')
+    table.order('cockpit', 40_000 * MS)
+    # What was commanded last holds until the new driver speaks, over measured intervals.
+    assert seat.command(40_000 * MS, 0.01, 20.0, 60) == given[-1]
+    assert seats.interval_s(60) is None
+    table.order('game', 40_000 * MS)
+    assert seat.command(41_000 * MS, 0.01, 20.0, 61).throttle == rows[61, 0]
+    after = [seat.command(41_000 * MS, 0.01, 20.0, n) for n in range(99, 200)]
+    assert after[0].throttle == 0.99
+    # r_p- = 2.2 /s: 0.99 is gone after 45 steps of 10 ms, then the brake rises to 0.15 and stays.
+    assert [command.throttle > 0.0 for command in after] == [True] * 45 + [False] * 56
+    assert after[-1] == DriverCommand(0.0, 0.15)
+    assert seats.interval_s(100) is None and not seat.losses

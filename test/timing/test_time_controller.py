@@ -235,6 +235,26 @@ def test_orders_are_served_after_a_bounded_number_of_late_steps() -> None:
     assert not controller.serves_orders_now
 
 
+def test_given_intervals_are_taken_as_they_are() -> None:
+    """
+    A recorded run's intervals, whatever is measured; the difference comes when they end.
+
+    The machine stalls for 40 ms in step 30, while the recording gives 9 ms a step for 50 steps:
+    in the end the human has moved over n dt all the same.
+    """
+    controller = started()
+    given_s, total_s, now_ns = 0.009, 0.0, START_NS
+    for n in range(1, 101):
+        now_ns = max(controller.deadline_ns(), now_ns + MS) + (40 * MS if n == 30 else 0)
+        cycle = controller.begin_cycle(now_ns, given_s if n <= 50 else None)
+        total_s += cycle.dt_eff_s
+        if n <= 50:
+            assert cycle.dt_eff_s == given_s
+        assert cycle.step_error_s == pytest.approx(0.04, abs=1e-7) or n != 30
+    # 50 * 9 ms were given: the 50 ms that lack come at once, with the first measured interval.
+    assert total_s == pytest.approx(100 * DT, abs=1e-7)
+
+
 @pytest.mark.parametrize('factor', [0.1, 0.5, 2.0, 10.0])
 def test_real_time_factor(factor: float) -> None:
     """A cycle of dt lasts dt / factor on the wall; errors and intervals are in simulated time."""

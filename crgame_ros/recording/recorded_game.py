@@ -1,0 +1,88 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The game that a recording carries: to run it again without any other file."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from crgame_ros.errors import InputError
+from crgame_ros.recording.epochs import read_epoch, XML_TOPIC
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.scenario.events import PlannerSwap
+from crgame_ros.scenario.game import Game, PoseSpawn
+from crgame_ros.scenario.game_file import parse_game
+from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
+from crgame_ros.simulation.documents import GAME_TOPIC, GameDocument
+
+
+class RecordedGame(NamedTuple):
+    """
+    A game out of a recording.
+
+    :param game: every human is driven by the recording, from where it started; its scenario is
+        the recording itself, which no XML reader takes.
+    :param loaded: the recorded scenario.
+    """
+
+    game: Game
+    loaded: LoadedScenario
+
+
+def read_game_document(bag: Path) -> GameDocument:
+    """
+    Read what a recording says of its game.
+
+    :raises InputError: if a document of the run is missing.
+    """
+    with BagReader(bag) as reader:
+        return read_epoch(reader).game
+
+
+def read_recorded_game(bag: Path, *, other_planners: bool = False) -> RecordedGame:
+    """
+    Read the game of the last run in a recording.
+
+    :param other_planners: whether the user names the planners, so that the recorded ones are not
+        needed.
+    :raises InputError: if it is not in the recording, or names code outside this package: what to
+        execute is for people to say, not for a file that came from somewhere.
+    """
+    with BagReader(bag) as reader:
+        run = read_epoch(reader)
+    where = f'{bag}, {GAME_TOPIC}'
+    text = run.game.content.get('file')
+    if not isinstance(text, str):
+        raise InputError('does not hold the game file', where,
+                         'name the game that was recorded before --driver')
+    try:
+        values = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InputError('holds a game file that is no YAML', where, 'record again') from error
+    game = parse_game(values, where, bag.parent)
+    starts = {entry['id']: PoseSpawn(*map(float, entry['state'][:4]))
+              for entry in run.game.humans}
+    humans = tuple(replace(human, driver=f'replay:{bag.resolve()}', spawn=starts[human.id])
+                   for human in game.humans if human.id in starts)
+    code = _named_code(game, other_planners)
+    if code:
+        raise InputError(f'names code outside this package ({code[0]})', where,
+                         'name the planners with --planner, or the game file of that run')
+    return RecordedGame(replace(game, scenario=bag, humans=humans),
+                        parse_scenario(run.xml_text, f'{bag}, {XML_TOPIC}'))
+
+
+def _named_code(game: Game, other_planners: bool) -> list[str]:
+    """List the models that are `module:Class` or `file.py:Class`."""
+    avs = game.avs or ()
+    names = [model.name for av in avs for model in (av.tracker.model, av.dynamics)]
+    names += [human.dynamics.name for human in game.humans if human.dynamics is not None]
+    names += [sensor.model for av in avs if av.perception is not None
+              for sensor in av.perception.sensors]
+    names += [event.action.planner for event in game.events
+              if isinstance(event.action, PlannerSwap)]
+    names += [game.traffic.model] if game.traffic is not None else []
+    names += [] if other_planners else [av.planner for av in avs]
+    return [name for name in names if ':' in name]
