@@ -61,7 +61,9 @@ def _build_parser() -> argparse.ArgumentParser:
     _add_offline(commands.add_parser('offline', help='run a game as fast as it can'))
     convert = commands.add_parser('convert', help='recording to CommonRoad scenario')
     convert.add_argument('bag', type=Path, help='folder or file of the recording')
-    convert.add_argument('--out', type=Path, help='folder for the scenario (default: beside)')
+    convert.add_argument('--out', type=Path, metavar='PATH',
+                         help='file to write (*.xml), or folder for <benchmark id>.xml (default: '
+                         'beside the recording)')
     convert.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
@@ -101,7 +103,8 @@ def _add_offline(parser: argparse.ArgumentParser) -> None:
         help='simulation steps between a request and its plan (default: 0)')
     add('--trigger', type=_trigger, action='append', default=[], metavar='NAME@S',
         help='trigger an event of the game so many seconds after the start; may be repeated')
-    add('--out', type=Path, metavar='DIR', help='write the run as a CommonRoad scenario there')
+    add('--out', type=Path, metavar='PATH',
+        help='write the run as a CommonRoad scenario: a file (*.xml) or a folder')
     parser.set_defaults(command=_offline)
 
 
@@ -163,7 +166,7 @@ def _offline(values: argparse.Namespace) -> int:
             'stop_n': len(result.vehicle_states) - 1}}
     print(json.dumps(report, indent=2))
     if values.out is not None:
-        values.out.mkdir(parents=True, exist_ok=True)
+        _make_folder_of(values.out)
         for notice in write_scenario(run_log_of(result), values.out).notices:
             print(f'note: {notice}', file=sys.stderr)
     return 0
@@ -172,12 +175,22 @@ def _offline(values: argparse.Namespace) -> int:
 def _convert(values: argparse.Namespace) -> int:
     from crgame_ros.recording.conversion import convert
     if values.out is not None:
-        values.out.mkdir(parents=True, exist_ok=True)
+        _make_folder_of(values.out)
     report = convert(values.bag, values.out, values.epoch)
     for notice in report.notices:
         print(f'note: {notice}')
     print(report.path)
     return 0
+
+
+def _make_folder_of(out: Path) -> None:
+    """Make the folder that a scenario goes to, whether it or the file is named."""
+    folder = out.parent if out.suffix == '.xml' else out
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f'cannot be made ({error.strerror})', str(folder),
+                         'name another file or folder') from error
 
 
 def _recover(values: argparse.Namespace) -> int:

@@ -248,6 +248,8 @@ _crgame_main() {
     _crgame_prepend PYTHONPATH "$root"
     # The executables that colcon installs start with `env python3`.
     _crgame_prepend PATH "$venv/bin"
+    # `crgame` is then a command, unless pip has installed one.
+    [[ -e $venv/bin/crgame ]] || ln -sf ../../crgame "$venv/bin/crgame" 2>/dev/null || true
     # One thread for each process: the nodes share few cores, and their matrices are small.
     export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1} OPENBLAS_NUM_THREADS=${OPENBLAS_NUM_THREADS:-1}
     export MPLBACKEND=${MPLBACKEND:-Agg} CRGAME_PYTHON=$venv/bin/python

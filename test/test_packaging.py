@@ -3,11 +3,13 @@
 """What is installed and where, the pins, and scripts/env.sh."""
 
 import ast
+from collections.abc import Iterator
 from configparser import ConfigParser
 from importlib import import_module
 import os
 from pathlib import Path
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -19,6 +21,7 @@ from packaging.utils import canonicalize_name
 import pytest
 
 from crgame_ros import __version__
+from crgame_ros.cli import _build_parser
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'timesync_node',
@@ -281,9 +284,49 @@ def test_env_says_that_the_index_is_out_of_reach(tmp_path: Path) -> None:
     assert (tree / '.venv' / 'COLCON_IGNORE').exists()
 
 
+def _examples() -> Iterator[tuple[Path, str]]:
+    """Give every example of the README and the docs that calls crgame, without its comment."""
+    for page in (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'docs').glob('*.md')):
+        for block in re.findall(r'^```bash\n(.*?)^```', page.read_text(encoding='utf-8'),
+                                re.MULTILINE | re.DOTALL):
+            for line in block.splitlines():
+                if re.match(r'(\S*/)?crgame\s', line):
+                    yield page, line.partition(' #')[0]
+
+
+def test_examples_of_crgame_are_true() -> None:
+    """Each calls the command that a clone has, from where the reader is, with valid arguments."""
+    examples = list(_examples())
+    assert len(examples) >= 7
+    for page, line in examples:
+        program, *words = shlex.split(line.replace('<', '').replace('>', ''))
+        assert program == './crgame', f'{page}: {line}'
+        assert callable(_build_parser().parse_args(words).command), f'{page}: {line}'
+
+
+def test_crgame_runs_from_a_clone(tmp_path: Path) -> None:
+    """From any directory, through a link, and by its name once env.sh has been sourced."""
+    tree = _stamped(tmp_path / 'a tree')
+    _copy(tree, 'crgame')
+    (tree / 'crgame_ros').symlink_to(ROOT / 'crgame_ros')
+    (tmp_path / 'link').symlink_to(tree / 'crgame')
+    # This interpreter, with the packages that it has.
+    python = tree / '.venv' / 'bin' / 'python'
+    python.unlink()
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    python.chmod(0o755)
+    code = f'cd "{tmp_path}"; '
+    for command in (f'"{tree}/crgame"', './link', 'crgame'):
+        done = _source(tree, f'{code}{command} --help && {command} info no_such_bag')
+        assert 'crgame convert   turn a recording into a CommonRoad scenario' in done.stdout, done
+        assert (done.returncode, done.stderr) == (
+            2, 'error: no_such_bag: no such file or folder; give a recording\n'), command
+
+
 def test_shell_scripts_parse() -> None:
     """Every shell script of the project parses."""
-    scripts = [ROOT / name for name in ('run.sh', 'test.sh', '.ci/run') if (ROOT / name).exists()]
+    scripts = [ROOT / name for name in ('run.sh', 'crgame', 'test.sh', '.ci/run')
+               if (ROOT / name).exists()]
     for script in (*scripts, *(ROOT / 'scripts').glob('*.sh')):
         done = subprocess.run(['bash', '-n', script], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr

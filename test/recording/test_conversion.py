@@ -15,6 +15,7 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin
 from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 
+from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.recording.conversion import ConversionReport, convert
 from crgame_ros.scenario.export_network import schema_errors
@@ -115,6 +116,12 @@ def test_place_and_choice(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     with pytest.raises(InputError, match='a file that is no exported run is there already'):
         convert(bag, out / 'named.xml')
     assert (out / 'named.xml').read_text() == first.setup.loaded.xml_text
+    # The command makes the folders that are missing, whichever of the two is named.
+    for named, path in (('new/run.xml', 'new/run.xml'),
+                        ('other', 'other/ZAM_Traffic-1_1_T-1.xml')):
+        assert main(['convert', str(bag), '--out', str(tmp_path / named)]) == 0
+        assert (tmp_path / path).is_file()
+    assert main(['convert', str(bag), '--out', str(out / 'named.xml' / 'below')]) == 2
     # A bare file is a recording too; its folder gets the scenario.
     assert convert(bag / 'bag_0.mcap').path == bag / 'ZAM_Traffic-1_1_T-1.xml'
 
