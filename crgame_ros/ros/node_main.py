@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -93,5 +94,11 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+        # What nodes freeze, and what they hold in circles through rclpy's compiled part, would
+        # never be let go of; other compiled packages complain of that in dozens of lines.
+        gc.unfreeze()
+        gc.enable()
+        if node is not None:
+            vars(node).clear()
     sys.stdout.flush()
     sys.exit(code)

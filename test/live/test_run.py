@@ -169,12 +169,17 @@ def _wait_for_step(launcher: Launcher, n: int) -> None:
 
 
 def test_terminate_ends_a_bare_scenario(shared_scenarios: Path, tmp_path: Path) -> None:
-    """`--scenario` alone runs: a human is placed, the AV gets a planner; SIGTERM ends it well."""
-    with Launcher(['--scenario', shared_scenarios / 'USA_US101-4_1_T-1.xml'],
-                  tmp_path / 'run') as launcher:
+    """
+    `--scenario` alone runs: a human is placed, the AV gets a planner; SIGTERM ends it well.
+
+    Also the compiled packages of the reactive planner, which tell of every object that is left.
+    """
+    with Launcher(['--scenario', shared_scenarios / 'USA_US101-4_1_T-1.xml',
+                   '--planner', 'reactive'], tmp_path / 'run') as launcher:
         _wait_for_step(launcher, 50)
         launcher.signal(signal.SIGTERM)
         assert launcher.wait() == 0, launcher.text
+        assert not launcher.says('nanobind|leaked'), launcher.text
         _check_outputs(tmp_path / 'run', 'C-USA_US101-4_1_T-1')
     vehicles = _poses(tmp_path / 'run' / 'bag')[0]
     assert set(vehicles) == {'hv0', 'av0'}
