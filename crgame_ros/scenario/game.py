@@ -77,7 +77,7 @@ class HumanSpec:
     :param driver: where its command comes from: auto, cockpit, idle, evdev[:NAME], keys:FILE,
         joy:FILE, joy, replay:BAG.
     :param vehicle: name of the vehicle parameters.
-    :param spawn: where it starts; None places it beside or behind the first AV.
+    :param spawn: where it starts; None places it beside or behind the first AV, where it can.
     :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
     """
 

@@ -22,6 +22,8 @@ from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 
+# The least distance behind the AV's rear axle, in lengths of the vehicle.
+_CLOSEST = 1.5
 # Margin around the footprint [m], headway behind the AV [s], and what a driver is taken to
 # brake with and to react in when a gap is judged [m/s^2], [s].
 _MARGIN = 0.5
@@ -85,8 +87,9 @@ def place_human(network: RoadNetwork, spec: HumanSpec, parameters: VehicleParame
     Place a human's vehicle at the start.
 
     Exactly where `spec.spawn` says; without it on the lane beside the first AV and slightly
-    behind, or behind it in its lane by 2 s, or ahead of it, or elsewhere on a lane near it;
-    without an AV at the start of a long road. A place that was searched for lies on the road, in
+    behind, or behind it in its lane by 2 s, or as far as the road goes, or level with it; where
+    there is no such place, ahead of it, or elsewhere on a lane near it; without an AV at the
+    start of a long road. A place that was searched for lies on the road, in
     the lane's heading, at least 0.5 m from everything, and its speed is the AV's, at most one
     from which it can brake behind its leader.
 
@@ -186,26 +189,31 @@ def _on_lanelet(network: RoadNetwork, spawn: LaneletSpawn, vehicle_id: str) -> V
 
 def _near_av(network: RoadNetwork, parameters: VehicleParameters,
              av: VehicleState) -> Iterator[tuple[int, float]]:
-    """Propose places in the order of preference: beside, behind, ahead, anywhere near."""
+    """Propose places in the order of preference: beside, behind, level, ahead, anywhere near."""
     lane = network.nearest_lanelet(av.x, av.y, av.yaw)
     s_av, _ = network.locate(lane, av.x, av.y)
     length = parameters.length
+    beside: list[tuple[int, float]] = []
     for neighbour in (network.left_of(lane), network.right_of(lane)):
         if neighbour is None or neighbour not in network.lanelet_ids:
             continue
         s, d = network.locate(neighbour, av.x, av.y)
         if abs(d) > network.width_at(neighbour, s) + network.width_at(lane, s_av):
             continue
-        for back in (1.2, 1.6, 2.0, 3.0, 4.0):
-            place = network.advance(neighbour, s, -back * length)
-            if place is not None:
-                yield place
+        beside.append((neighbour, s))
     gap = _HEADWAY_S * abs(av.speed) + 2.0 * length
-    for direction in (-1.0, 1.0):
-        for extra in (0.0, 5.0, 10.0, 20.0, 40.0):
-            place = network.advance(lane, s_av, direction * (gap + extra))
-            if place is not None:
-                yield place
+    further = [gap + extra for extra in np.arange(0.0, 41.0, 5.0).tolist()]
+    # Where the road begins shortly before the AV, closer behind it, then level with it.
+    closer = np.arange(gap, _CLOSEST * length, -0.5 * length)[1:].tolist()
+    preferred = [
+        *((*place, -back * length) for place in beside for back in (1.2, 1.6, 2.0, 3.0, 4.0)),
+        *((lane, s_av, -distance) for distance in (*further, *closer)),
+        *((*place, ahead * length) for place in beside for ahead in (0.0, 0.4, 0.8, 1.2)),
+        *((lane, s_av, distance) for distance in further)]
+    for start, s, distance in preferred:
+        place = network.advance(start, s, distance)
+        if place is not None:
+            yield place
     everywhere = [(math.dist((x, y), (av.x, av.y)), lanelet, s)
                   for lanelet in network.lanelet_ids
                   for s, (x, y) in _grid(network, lanelet)]

@@ -96,6 +96,29 @@ def test_human_stands_beside_and_slightly_behind() -> None:
     assert human.speed == av.speed == 12.0
 
 
+@pytest.mark.parametrize(('name', 'ahead', 'aside'), [
+    # Dense traffic that does not react: the nearest place behind that nobody runs into.
+    ('USA_US101-4_1_T-1', (-50.0, -40.0), (-2.0, 2.0)),
+    # Their roads begin 29 m and 14 m behind the AV, less than 2 s.
+    ('ZAM_Over-1_1', (-29.0, -20.0), (-2.0, 2.0)),
+    ('ZAM_Tutorial-1_2_T-1', (-14.0, -6.7), (-0.1, 0.1)),
+    ('more/DEU_AAH1-2_76900_T-7049', (-27.0, -20.0), (-2.0, 2.0)),
+    # Here it begins at the AV: level with it on the other lane.
+    ('ZAM-Ramp-1_1-T-1', (-1.0, 4.5), (3.0, 4.0)),
+    ('more/OSC_Overtake-1_1_T-1', (-1.0, 4.5), (3.0, 4.0))])
+def test_human_is_not_ahead_where_there_is_room_behind(
+        name: str, ahead: tuple[float, float], aside: tuple[float, float]) -> None:
+    """Beside or behind, also where the road begins shortly behind the AV; in the AV's frame."""
+    loaded = shared(f'{name}.xml')
+    road, obstacles = RoadNetwork(loaded.scenario.lanelet_network), ScenarioObstacles(loaded)
+    av = avs_of(loaded)[0]
+    human = place_human(road, HumanSpec('hv0'), CAR, [av], obstacles.descriptions,
+                        obstacles.states_at(0))
+    x, y = human.x - av.x, human.y - av.y
+    assert ahead[0] < x * math.cos(av.yaw) + y * math.sin(av.yaw) < ahead[1]
+    assert aside[0] < y * math.cos(av.yaw) - x * math.sin(av.yaw) < aside[1]
+
+
 def test_human_behind_keeps_two_seconds_and_a_length() -> None:
     """On FRA_Anglet's single lane it stands behind by 2 s at the AV's speed and two lengths."""
     loaded = shared('FRA_Anglet-1_1_T-1.xml')
