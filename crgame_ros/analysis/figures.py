@@ -21,6 +21,8 @@ HUMAN_COLOUR = '#d55e00'
 AV_COLOURS = ('#0072b2', '#56b4e9', '#009e73')
 OBJECT_COLOUR = '#777777'
 ROAD_COLOUR = '#d9d9d9'
+# Of road beyond the outermost vehicle's rear axle [m].
+MARGIN = 8.0
 
 
 def colour_of(vehicle_id: str) -> str:
@@ -35,24 +37,41 @@ def draw_run(result: OfflineResult, times_s: Sequence[float], *, reach: float = 
     Draw a run: one view from above for each time, and profiles below.
 
     :param times_s: times of the snapshots [s]
-    :param reach: half the length of road shown around the first AV [m]
+    :param reach: half the length of road shown around the first AV [m]; more where another driven
+        vehicle would be left out, at most three times as much.
     """
     rows = len(times_s)
+    window = _window(result, times_s, reach)
     figure = Figure(figsize=(9.0, 0.95 * rows + 3.0), layout='constrained')
     grid = figure.add_gridspec(rows + 3, 2)
     for row, time_s in enumerate(times_s):
-        _snapshot(figure.add_subplot(grid[row, :]), result, time_s, reach)
+        _snapshot(figure.add_subplot(grid[row, :]), result, time_s, window)
     _profile(figure.add_subplot(grid[rows:, 0]), result, StateColumn.SPEED, 'speed [m/s]')
     _gap(figure.add_subplot(grid[rows:, 1]), result)
     return figure
 
 
-def _snapshot(axes: Axes, result: OfflineResult, time_s: float, reach: float) -> None:
+def _at(result: OfflineResult, time_s: float) -> tuple[int, Array, '_View']:
+    """Give the step, the states (V, 8) and the view from the first AV, else the first human."""
     setup = result.setup
     n = min(round(time_s / setup.scheduler.dt_s), len(result.vehicle_states) - 1)
     states = result.vehicle_states[n]
-    focus = states[len(setup.humans)] if setup.avs else states[0]
-    view = _View(focus)
+    return n, states, _View(states[len(setup.humans)] if setup.avs else states[0])
+
+
+def _window(result: OfflineResult, times_s: Sequence[float],
+            reach: float) -> tuple[float, float]:
+    """Choose how far back and ahead all snapshots show, so that they have one scale [m]."""
+    ahead = np.concatenate([view.of(states[:, :2])[:, 0] for _, states, view in (
+        _at(result, time_s) for time_s in times_s)])
+    return (float(np.clip(ahead.min() - MARGIN, -3.0 * reach, -0.6 * reach)),
+            float(np.clip(ahead.max() + MARGIN, 1.4 * reach, 3.0 * reach)))
+
+
+def _snapshot(axes: Axes, result: OfflineResult, time_s: float,
+              window: tuple[float, float]) -> None:
+    setup = result.setup
+    n, states, view = _at(result, time_s)
     for lanelet in setup.loaded.scenario.lanelet_network.lanelets:
         axes.add_patch(Polygon(view.of(lanelet.polygon.vertices), facecolor=ROAD_COLOUR,
                                edgecolor='white', linewidth=0.8))
@@ -66,8 +85,9 @@ def _snapshot(axes: Axes, result: OfflineResult, time_s: float, reach: float) ->
         offset = description.rear_to_center
         center = np.array((x + offset * math.cos(yaw), y + offset * math.sin(yaw), yaw))
         _footprint(axes, view, description, center, colour_of(description.id))
-    axes.set_xlim(-0.6 * reach, 1.4 * reach)
-    axes.set_ylim(-0.13 * reach, 0.13 * reach)
+    axes.set_xlim(*window)
+    half_height = 0.065 * (window[1] - window[0])
+    axes.set_ylim(-half_height, half_height)
     axes.set_aspect('equal')
     axes.set_yticks([])
     axes.set_xticks([])
