@@ -44,7 +44,7 @@ NO_CHANGE = 15.0
 BEFORE_JUNCTION = 2.0
 # Nor this near to an obstacle: the front would hit it; with less than that room the way out of the
 # lane is as short as this allows [m].
-TOO_NEAR = 4.0
+TOO_NEAR = 5.0
 TIGHT = 10.0
 # A change is as long as this, and as so many lengths of the vehicle, at least [m].
 SHORTEST_CHANGE, LENGTHS = 12.0, 2.7
@@ -55,6 +55,8 @@ LETTING_IN = 1.1
 # Who has not got far in a change for so long gives it up [s].
 GIVE_UP = 5.0
 STARTED = 0.4
+# Who has got farther does so after so many times as long.
+LATER = 5
 # A lane that is blocked too is worth changing into if it goes on for so much longer [m].
 BEYOND = 25.0
 
@@ -117,7 +119,7 @@ class LaneChanges:
         agents.source[done >= agents.span] = NOBODY
         stuck = np.flatnonzero(
             agents.active & (agents.source != NOBODY) & (agents.source != agents.lane)
-            & (agents.waits > self._give_up) & (done < STARTED * agents.span))
+            & (agents.waits > np.where(done < STARTED * agents.span, 1, LATER) * self._give_up))
         if len(stuck):
             graph, lane, center = self._graph, agents.source[stuck], agents.centers()[stuck]
             guess = agents.s[stuck] * graph.length[lane] / graph.length[agents.lane[stuck]]
@@ -178,7 +180,8 @@ class LaneChanges:
         onto = routes.next[destination, lane]
         junction = has[wide, lane] | ((onto >= 0) & has[wide, np.maximum(onto, 0)] & (
             graph.length[lane] - agents.s[slots] <= self.no_change(agents.speed[slots])))
-        free &= ~junction & ~halts
+        # Where a lane ends there is no other place.
+        free &= (~junction & ~halts) | routes.drops[lane]
         content = agents.content_until[slots] <= k
         content &= (slots * (len(slots) > AT_ONCE) + k) % self._thoughts == 0
         for side, table in ((1, graph.left), (-1, graph.right)):

@@ -21,6 +21,8 @@ BoolArray = NDArray[np.bool_]
 STANDING = 0.05
 # A leader that is faster drives on [m/s].
 DRIVES_ON = 3.0
+# Who can halt with this lets somebody go who has waited very long [m/s^2].
+MERCY = 1.5
 # A grant ends so far behind its junction [m].
 PASSED = 1.0
 # What others are expected to bear at most [m/s^2], and how fast agents get to and out of
@@ -44,6 +46,7 @@ class CrossingRules(NamedTuple):
     :param withdrawal: that agents take at most to give up a right that they had [m/s^2]
     :param zipper: standing time after which those on the road let one merge, if they can slow
         down gently [s]; own choice.
+    :param mercy: the same for one that crosses [s]; own choice.
     :param room: behind the junction, besides the agent's own length [m]
     """
 
@@ -54,6 +57,7 @@ class CrossingRules(NamedTuple):
     deceleration: float = 3.0
     withdrawal: float = 2.2
     zipper: float = 6.0
+    mercy: float = 20.0
     room: float = 1.5
 
 
@@ -83,22 +87,26 @@ class Meetings(NamedTuple):
 
     :param begin: (A + 1) rows of each agent.
     :param who: (M) row of the other agent, or -1 - n for the n-th of the others.
+    :param step: (M) of the agent's way.
     :param into: (M) distance of the agent's front from the conflict [m]
     :param priority: (M) of the agent.
     :param apart: (M) whether both pass at different times anyway.
     :param inside: (M) whether the other is in the conflict.
     :param committed: (M) whether the other can no longer stop before it.
-    :param courteous: (M) whether the other can let the agent merge without haste.
+    :param courteous: (M) whether the other can let the agent go without haste.
+    :param joins: (M) whether both go on behind each other.
     """
 
     begin: IntArray
     who: IntArray
+    step: IntArray
     into: FloatArray
     priority: IntArray
     apart: BoolArray
     inside: BoolArray
     committed: BoolArray
     courteous: BoolArray
+    joins: BoolArray
 
 
 class Crossings:
@@ -121,7 +129,7 @@ class Crossings:
         self._rules = rules
         self._time_step_s = time_step_s
         self._ticks = np.array([max(1, round(seconds / time_step_s)) for seconds in (
-            rules.patience, rules.zipper, 1.0)])
+            rules.patience, rules.zipper, 1.0, rules.mercy)])
 
     def halts(self, k: int, agents: Agents, way: Ways, passage: Passages, arrivals: Arrivals,
               situation: Situation) -> FloatArray:
@@ -163,34 +171,46 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
     slots, count = at.slots, len(at.slots)
     _release(agents, slots, way, dt_s)
     stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    halt = np.full(count, math.inf)
     for i in range(count):
         # Nobody is let in past somebody who waits before the same junction.
         stopped[i] = min(at.light[i], at.queued[i]) < passage.hold[i] + 2.0
         full[i] = at.rear_stop[i] < passage.end[i] + 0.5 * agents.length[slots[i]] + rules.room
-    meeting = _meet(conflicts, rules, agents, way, passage, arrivals, at, stopped | full)
+    stays = stopped | full
+    for i, slot in enumerate(slots):
+        # For who has waited very long others leave the room behind the junction.
+        if agents.waits[slot] > ticks[3] and not stopped[i]:
+            stays[i] = False
+    meeting = _meet(conflicts, rules, agents, way, passage, arrivals, at, stays)
     for i, slot in enumerate(slots):
         agents.blocker[slot] = FREE
         if agents.grant[slot] >= 0 and _withdraws(rules, ticks, k, agents, passage, meeting, at,
-                                                  stopped, i):
+                                                  i):
             agents.grant[slot] = NOBODY
+            halt[i] = agents.grant_hold[slot]
     for i in _in_turn(k, agents, slots):
         slot = slots[i]
-        if passage.first[i] < 0 or (
-                agents.grant[slot] >= 0 and _covers(agents, slot, way, passage, i)):
-            continue
-        inside = passage.hold[i] < -1.0
-        if inside or _may_enter(rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
-            agents.grant[slot] = k
-            agents.until[slot] = way.lane[i, passage.last[i]]
-            agents.grant_left[slot] = passage.end[i] + 0.5 * agents.length[slot]
-    halt = np.full(count, math.inf)
+        if passage.first[i] >= 0 and halt[i] == math.inf and (
+                passage.hold[i] < -1.0 or _may_enter(
+                    rules, ticks, k, agents, passage, meeting, at, stopped, full, i)):
+            _grant(k, agents, slot, way, passage, i)
     for i, slot in enumerate(slots):
-        if passage.first[i] >= 0:
-            if agents.grant[slot] >= 0:
-                halt[i] = _inside_halt(k, agents, meeting, at, i)
-            elif _is_near(agents.speed[slot], passage.hold[i]):
-                halt[i] = passage.hold[i]
+        if agents.grant[slot] >= 0:
+            halt[i] = min(halt[i], _inside_halt(k, agents, passage, meeting, at, i))
+        if passage.first[i] >= 0 and _is_near(agents.speed[slot], passage.hold[i]):
+            halt[i] = min(halt[i], passage.hold[i])
     return halt
+
+
+@compiled
+def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, i: int) -> None:
+    """Let an agent into its next junction: it holds no more before that."""
+    if agents.grant[slot] < 0:
+        agents.grant_hold[slot] = passage.hold[i]
+    agents.grant[slot] = k
+    agents.until[slot] = way.lane[i, passage.last[i]]
+    agents.grant_left[slot] = passage.end[i] + 0.5 * agents.length[slot]
+    passage.granted[i], passage.first[i] = passage.last[i], -1
 
 
 @compiled
@@ -207,20 +227,12 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
             continue
         # A lane may be on the way again later: how far it is counts as well.
         agents.grant_left[slot] -= agents.speed[slot] * dt_s
+        agents.grant_hold[slot] -= agents.speed[slot] * dt_s
         ahead = False
         for step in range(way.count[i]):
             ahead |= way.lane[i, step] == agents.until[slot]
         if not ahead or agents.grant_left[slot] < -PASSED:
             agents.grant[slot] = NOBODY
-
-
-@compiled
-def _covers(agents: AgentTable, slot: int, way: Ways, passage: Passages, i: int) -> bool:
-    """Tell whether what an agent was granted holds for all of the junction ahead."""
-    for step in range(passage.last[i], way.count[i]):
-        if way.lane[i, step] == agents.until[slot]:
-            return True
-    return False
 
 
 @compiled
@@ -243,7 +255,7 @@ def _meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, wa
     for i, slot in enumerate(at.slots):
         for n in range(rows.begin[i], rows.begin[i + 1]):
             mine = rows.row[n]
-            if passage.first[i] < 0 or arrivals.step[mine] > passage.last[i] \
+            if arrivals.step[mine] > max(passage.last[i], passage.granted[i]) \
                     or arrivals.into[mine] <= 0.0:
                 continue
             conflict = arrivals.conflict[mine]
@@ -290,9 +302,10 @@ def _rows_of(arrivals: Arrivals, count: int) -> _Rows:
 @compiled
 def _empty(agents: int, room: int) -> Meetings:
     return Meetings(
-        np.zeros(agents + 1, np.int64), np.empty(room, np.int64), np.empty(room),
-        np.empty(room, np.int64), np.empty(room, np.bool_), np.empty(room, np.bool_),
-        np.empty(room, np.bool_), np.empty(room, np.bool_))
+        np.zeros(agents + 1, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
+        np.empty(room), np.empty(room, np.int64), np.empty(room, np.bool_),
+        np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_),
+        np.empty(room, np.bool_))
 
 
 @compiled
@@ -300,9 +313,10 @@ def _grown(found: Meetings) -> Meetings:
     more, size = _empty(len(found.begin) - 1, 2 * len(found.who)), len(found.who)
     more.begin[:] = found.begin
     more.who[:size], more.into[:size] = found.who, found.into
+    more.step[:size] = found.step
     more.priority[:size], more.apart[:size] = found.priority, found.apart
     more.inside[:size], more.committed[:size] = found.inside, found.committed
-    more.courteous[:size] = found.courteous
+    more.courteous[:size], more.joins[:size] = found.courteous, found.joins
     return more
 
 
@@ -323,26 +337,28 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     there = time_to(arrivals.into[mine], arrivals.speed[mine], HURRY, desired[i])
     gone = time_to(arrivals.out[mine], arrivals.speed[mine], rules.acceleration, desired[i])
     found.who[n], found.into[n] = who, arrivals.into[mine]
+    found.step[n] = arrivals.step[mine]
     found.priority[n] = conflicts.priority[conflict]
     found.apart[n] = there > late + rules.gap_after or gone + rules.gap_before < early
     found.inside[n] = into <= 0.0 and out > 0.0
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
-    found.courteous[n] = who >= 0 and conflicts.merges[conflict] and (
-        into > 2.0 * speed + speed**2 / 3.0)
+    found.courteous[n] = who >= 0 and into > 2.0 * speed + speed**2 / 3.0
+    found.joins[n] = conflicts.merges[conflict]
 
 
 @compiled
 def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
-               passage: Passages, meeting: Meetings, at: Situation, stopped: BoolArray,
-               i: int) -> bool:
+               passage: Passages, meeting: Meetings, at: Situation, i: int) -> bool:
     """Tell whether an agent gives up its right to enter, while that is easy."""
-    speed = agents.speed[at.slots[i]]
-    if passage.hold[i] <= 0.0 or speed**2 > 2.0 * rules.withdrawal * passage.hold[i]:
+    slot = at.slots[i]
+    speed, hold = agents.speed[slot], agents.grant_hold[slot]
+    if hold <= 0.0 or speed**2 > 2.0 * rules.withdrawal * hold:
         return False
-    if stopped[i]:
+    if min(at.light[i], at.queued[i]) < hold + 2.0:
         return True
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
-        if meeting.who[n] < 0 and _yields(ticks, k, agents, meeting, at, i, n):
+        if meeting.who[n] < 0 and meeting.step[n] <= passage.granted[i] and _yields(
+                ticks, k, agents, meeting, at, i, n):
             return True
     return False
 
@@ -362,12 +378,26 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
     if at.stop_sign[i] and (agents.waits[slot] < ticks[2] or speed >= STANDING
                             or passage.hold[i] >= 4.0):
         return False
+    easily = speed**2 < 2.0 * MERCY * passage.hold[i]
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
-        if _yields(ticks, k, agents, meeting, at, i, n):
+        if meeting.step[n] > passage.granted[i] and (
+                _yields(ticks, k, agents, meeting, at, i, n)
+                or (easily and _has_mercy(ticks, agents, meeting, at, i, n))):
             who = meeting.who[n]
             agents.blocker[slot] = at.slots[who] if who >= 0 else who
             return False
     return True
+
+
+@compiled
+def _has_mercy(ticks: IntArray, agents: AgentTable, meeting: Meetings, at: Situation, i: int,
+               n: int) -> bool:
+    """Tell whether an agent lets somebody go first who has waited very long."""
+    who = meeting.who[n]
+    if who < 0 or meeting.apart[n]:
+        return False
+    waits = agents.waits[at.slots[who]]
+    return bool(waits > ticks[3] and waits > agents.waits[at.slots[i]])
 
 
 @compiled
@@ -390,19 +420,20 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: 
     # Among those who stand, whoever has stood for longest goes first.
     longer = waits > theirs or (waits == theirs and i < who)
     patient = waits > ticks[0] and theirs > 0 and longer
-    patient |= meeting.courteous[n] and waits > ticks[1]
+    patient |= meeting.courteous[n] and waits > (ticks[1] if meeting.joins[n] else ticks[3])
     return bool(meeting.priority[n] < 0 and not patient)
 
 
 @compiled
-def _inside_halt(k: int, agents: AgentTable, meeting: Meetings, at: Situation,
-                 i: int) -> float:
+def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
+                 at: Situation, i: int) -> float:
     """Give the distance at which who was let in halts before a conflict that is taken."""
     slot = at.slots[i]
     result = math.inf
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         who = meeting.who[n]
-        if meeting.apart[n] or meeting.into[n] >= result:
+        if meeting.apart[n] or meeting.into[n] >= result or (
+                meeting.step[n] > passage.granted[i]):
             continue
         # Who cannot stop before it any more had better be quick.
         if agents.speed[slot]**2 > 8.0 * max(meeting.into[n], 0.1):

@@ -27,7 +27,7 @@ YELLOW_BRAKING = 3.0
 # Who brakes already doesn't drive on because that has become a little harder than wanted [m/s^2].
 BRAKES, STILL_BRAKING = -1.0, 4.0
 # Time until braking has set in [s].
-REACTION = 0.4
+REACTION = 0.2
 
 
 class LightTable(NamedTuple):
@@ -143,9 +143,8 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
             shown = lights.shown[lane, movement_of(lights, way, i, step)]
             away = way.offset[i, step] + lights.at[lane] - 0.5 * length[i]
             # Braking takes a moment to set in.
-            room = max(away - REACTION * speed[i], 0.1) if acceleration[i] >= BRAKES else max(
-                away, 0.1)
-            needed = speed[i]**2 / (2.0 * room)
+            late = REACTION * speed[i] if shown == YELLOW and acceleration[i] >= BRAKES else 0.0
+            needed = speed[i]**2 / (2.0 * max(away - late, 0.1))
             heeds = (shown == RED and needed < RED_BRAKING) or (
                 shown == YELLOW and needed < gentle)
             if away > -1.0 and heeds:

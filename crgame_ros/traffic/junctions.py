@@ -50,14 +50,16 @@ class Arrivals(NamedTuple):
 
 class Passages(NamedTuple):
     """
-    The next junction on the way of each agent (A).
+    The next junction on the way of each agent (A) that it was not let into yet.
 
+    :param granted: (A) step of the way at which what it was let into ends, -1 without that.
     :param first: (A) step of the way at which it begins, -1 without one.
     :param last: (A) at which it ends.
     :param hold: (A) distance of the agent's front from where it waits [m]
     :param end: (A) distance of its centre from the end of the last conflict [m]
     """
 
+    granted: IntArray
     first: IntArray
     last: IntArray
     hold: FloatArray
@@ -73,12 +75,18 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
     :param lines: (L) arc length of each lane's stop line [m], infinite without one.
     """
     count = len(slots)
-    result = Passages(np.full(count, -1, np.int64), np.full(count, -1, np.int64),
-                      np.full(count, math.inf), np.full(count, -math.inf))
+    result = Passages(
+        np.full(count, -1, np.int64), np.full(count, -1, np.int64), np.full(count, -1, np.int64),
+        np.full(count, math.inf), np.full(count, -math.inf))
     for i, slot in enumerate(slots):
         wide = 1 if agents.width[slot] > NARROW else 0
         entry, leave, half = conflicts.entry[wide], conflicts.leave[wide], 0.5 * agents.length[slot]
-        for step in range(way.count[i]):
+        if agents.grant[slot] >= 0:
+            for step in range(way.count[i]):
+                if way.lane[i, step] == agents.until[slot]:
+                    result.granted[i] = step
+                    break
+        for step in range(result.granted[i] + 1, way.count[i]):
             lane = way.lane[i, step]
             if not math.isfinite(entry[lane]):
                 continue

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The lanes of a road network as flat arrays, for many agents at once."""
 
+from commonroad.scenario.lanelet import Lanelet
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.lane_table import LaneTable, poses_on, project_all
+from crgame_ros.traffic.tracking import PURSUIT_TIME
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -18,6 +20,8 @@ STEP = 0.5
 MAX_GAP = 1.0
 # Headings of published centre lines jump from vertex to vertex; smoothed over this length [m].
 SMOOTHING = 4.0
+# Angles between lanes that matter [rad], and how far behind them one still turns [m].
+LEAST_KINK, KINK_REACH = 0.03, 4.0
 
 
 class LaneGraph:
@@ -49,6 +53,7 @@ class LaneGraph:
         curve = np.sqrt(lateral_acceleration / np.maximum(np.abs(self.curvature), 1e-4))
         # What a curve allows of itself; a limit is scaled by each driver's own factor.
         self.curve_speed: FloatArray = np.maximum(curve, 2.0)
+        self._slow_at_kinks(lateral_acceleration)
         self.table = LaneTable(
             self.first, self.count, self.length, self.step, self.limit, self.left, self.right,
             self.successors, self.predecessors, self.x, self.y, self.yaw, self.curvature,
@@ -85,7 +90,8 @@ class LaneGraph:
         lanelets = [network.lanelet_network.find_lanelet_by_id(i) for i in self.ids]
         following = [[self.index[j] for j in sorted(set(x.successor)) if j in self.index]
                      for x in lanelets]
-        following = [[j for j in row if self._joined(i, j)] for i, row in enumerate(following)]
+        following = [[j for j in row if self._joined(i, j)] or self._found(i, lanelets[i])
+                     for i, row in enumerate(following)]
         before: list[list[int]] = [[] for _ in self.ids]
         for i, row in enumerate(following):
             for j in row:
@@ -102,12 +108,37 @@ class LaneGraph:
             {self.index[j] for j in (x.adj_left, x.adj_right) if j in self.index}
             for x in lanelets]
 
+    def _found(self, lane: int, lanelet: Lanelet) -> list[int]:
+        """Find where a lane goes on whose successors in the file are all impossible."""
+        if not lanelet.successor:
+            return []
+        end = int(self.first[lane] + self.count[lane] - 1)
+        near = np.hypot(self.x[self.first] - self.x[end], self.y[self.first] - self.y[end])
+        return [int(i) for i in np.flatnonzero(near <= MAX_GAP) if self._joined(lane, int(i))]
+
     def _joined(self, lane: int, follower: int) -> bool:
         """Tell whether a lane goes on in another without a jump or a turn on the spot."""
         end, start = int(self.first[lane] + self.count[lane] - 1), int(self.first[follower])
         gap = np.hypot(self.x[start] - self.x[end], self.y[start] - self.y[end])
         turn = abs(wrap_pi(float(self.yaw[start] - self.yaw[end])))
         return lane != follower and bool(gap <= MAX_GAP) and turn < 1.2
+
+    def _slow_at_kinks(self, lateral_acceleration: float) -> None:
+        """
+        Let lanes that begin at an angle to the one before be entered slowly.
+
+        Who steers for a point a time T ahead turns by the angle within T.
+        """
+        for lane in range(len(self)):
+            start = int(self.first[lane])
+            before = self.predecessors[lane][self.predecessors[lane] >= 0]
+            ends = self.yaw[self.first[before] + self.count[before] - 1]
+            kink = float(np.abs(heading_difference(self.yaw[start], ends)).max(initial=0.0))
+            if kink > LEAST_KINK:
+                rows = slice(start, start + min(int(self.count[lane]), round(
+                    KINK_REACH / float(self.step[lane])) + 1))
+                self.curve_speed[rows] = np.minimum(self.curve_speed[rows], max(
+                    lateral_acceleration * PURSUIT_TIME / kink, 2.0))
 
     def rows(self, lane: IntArray, s: FloatArray) -> IntArray:
         """Give the table row nearest to arc length s (N) of lanes (N)."""

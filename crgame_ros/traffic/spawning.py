@@ -15,10 +15,13 @@ from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.agents import Agents, NOBODY, REAR_TO_CENTER
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.halting_lines import HaltingLines
+from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
 from crgame_ros.traffic.longitudinal import Longitudinal
-from crgame_ros.traffic.placement import Bodies
+from crgame_ros.traffic.leaders import ahead, Corridors, look_distance, ways
+from crgame_ros.traffic.placement import Bodies, place
 from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.world import agent_bodies
 
 ADOPTED_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'taxi',
                            'priorityVehicle'})
@@ -41,6 +44,8 @@ EASY = 1.5
 FIRM, STOP_GAP = 2.0, 2.0
 # Nor nearer than so long at their speeds [s].
 CLOSE_TIME = 0.25
+# Rounds in which those who are placed together get used to each other's speeds.
+CALMING = 3
 # What a newcomer may have to stop for is looked for as far as this [m].
 FARTHEST = 150.0
 
@@ -114,6 +119,7 @@ class Spawner:
     Puts agents on the road.
 
     :param graph: the lanes.
+    :param cells: of the lanes.
     :param routes: where agents go.
     :param conflicts: nobody is placed inside a junction.
     :param speeds: that are allowed somewhere.
@@ -125,11 +131,12 @@ class Spawner:
     :param generator: of random numbers.
     """
 
-    def __init__(self, graph: LaneGraph, routes: Routes, conflicts: Conflicts,
+    def __init__(self, graph: LaneGraph, cells: LaneCells, routes: Routes, conflicts: Conflicts,
                  speeds: Longitudinal, lines: HaltingLines, adopted: Sequence[Adopted], flow: float,
                  speed_factor: float, speed_spread: float, time_step_s: float,
                  generator: np.random.Generator) -> None:
         self._graph, self._routes, self._conflicts = graph, routes, conflicts
+        self._cells = cells
         self._speeds, self._lines = speeds, lines
         self._adopted = tuple(adopted)
         self._waiting = list(range(len(adopted)))
@@ -182,8 +189,37 @@ class Spawner:
             wanted = self._speed(lane, s, agents, slot)
             for share in (1.0, 0.6, 0.3):
                 if self._try(agents, slot, lane, s, share * wanted, others):
+                    if not self._has_room(agents, slot, others):
+                        agents.active[slot] = False
+                        continue
                     self._due[number] += self._random.exponential(self._mean_s)
                     break
+
+    def calm(self, agents: Agents, others: Bodies) -> None:
+        """Let nobody begin faster than lets it get behind whoever is ahead with firm braking."""
+        for _ in range(CALMING):
+            slots = np.flatnonzero(agents.active)
+            gap, speed = self._ahead(agents, slots, others)
+            safe = np.sqrt(np.maximum(speed, 0.0)**2 + 2.0 * FIRM * np.maximum(
+                gap - STOP_GAP, 0.0))
+            agents.speed[slots] = np.minimum(agents.speed[slots], safe)
+
+    def _ahead(self, agents: Agents, slots: IntArray,
+               others: Bodies) -> tuple[FloatArray, FloatArray]:
+        """Give the gaps (A) to who is ahead of agents on their ways, and its speeds (A)."""
+        lanes, count = self._graph.table, len(slots)
+        entries = place(lanes, self._cells.table, Bodies.join([others, agent_bodies(agents)]))
+        way = ways(lanes, self._routes.next, agents.lane[slots], agents.s[slots],
+                   agents.destination[slots], look_distance(agents.speed[slots]))
+        half, length = 0.5 * agents.width[slots], agents.length[slots]
+        pairs = ahead(lanes, entries, way, Corridors(
+            slots, length, agents.rear_to_center[slots] + 0.5 * length, -half, half),
+            np.empty(0))
+        gap, speed = np.full(count, np.inf), np.zeros(count)
+        for row in np.lexsort((pairs.gap, pairs.agent))[::-1].tolist():
+            gap[pairs.agent[row]] = pairs.gap[row]
+            speed[pairs.agent[row]] = entries.speed[pairs.entry[row]]
+        return gap, speed
 
     def adopt(self, k: int, agents: Agents, others: Bodies) -> None:
         """Let recorded obstacles appear where they are recorded at k, if the place is free."""
@@ -291,6 +327,13 @@ class Spawner:
             return False
         agents.put(slot, lane, s, 0.0, (float(x), float(y), float(yaw)), speed)
         return True
+
+    def _has_room(self, agents: Agents, slot: int, others: Bodies) -> bool:
+        """Tell whether a newcomer has the usual gap on its way, which may bend."""
+        gap, speed = self._ahead(agents, np.array([slot]), others)
+        own = float(agents.speed[slot])
+        return bool(gap[0] >= START_GAP + START_TIME * own + max(
+            own**2 - max(float(speed[0]), 0.0)**2, 0.0) / (2.0 * EASY))
 
     def _choose_destination(self, agents: Agents, slot: int, lane: int) -> None:
         agents.destination[slot] = self._routes.draw(

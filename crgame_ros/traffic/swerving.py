@@ -158,7 +158,7 @@ def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArra
     allowed = np.full(len(obstacles.s), SPEEDS[0])
     fine = np.ones(len(obstacles.s), dtype=bool)
     for speed in SPEEDS:
-        distance = float(pursuit_distance(np.array(speed)))
+        distance = pursuit_distance(speed, 0.0)
         driven = lfilter(*bilinear([2.0], [distance**2, 2.0 * distance, 2.0], 1.0 / step),
                          np.interp(s + distance, s, d))
         slope = np.gradient(driven, step)

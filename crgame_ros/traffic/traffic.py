@@ -118,7 +118,7 @@ class Traffic:
         # Agents taken off the road because they stood in a circle that nobody could open.
         self.taken_off = 0
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
-        self._spawner = Spawner(self._graph, self._routes, self._conflicts, self._longitudinal,
+        self._spawner = Spawner(self._graph, self._cells, self._routes, self._conflicts, self._longitudinal,
                                 self._lines, adopted, spec.flow, spec.speed_factor, spec.speed_spread,
                                 time_step_s, self._random)
         self.descriptions: tuple[ObjectDescription, ...] = (
@@ -133,6 +133,7 @@ class Traffic:
         self._lines.show(world.signals)
         self._spawner.adopt(k0, self._agents, bodies)
         self._spawner.place_at_random(self._agents, spec.agents, bodies)
+        self._spawner.calm(self._agents, bodies)
 
     def _capacity(self) -> int:
         spec = self._spec
