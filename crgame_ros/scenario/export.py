@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import date
 import os
 from pathlib import Path
-import re
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -21,15 +20,15 @@ from crgame_ros.recording.run_log import RunLog
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_elements import exact_number, planning_problem
 from crgame_ros.scenario.export_goals import goal_where_it_ended, goals_of
-from crgame_ros.scenario.export_network import network_elements, schema_errors, used_ids
-from crgame_ros.scenario.export_objects import IdPool, named, ObjectWriter
+from crgame_ros.scenario.export_ids import IdPool
+from crgame_ros.scenario.export_network import schema_errors, used_ids, write_roads
+from crgame_ros.scenario.export_objects import named, ObjectWriter
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 
 # Written into every exported file's source, and the mark by which one is known.
 SOURCE_MARK = 'driven in crgame_ros'
 _HEAD_BYTES = 4096
 _ERRORS_TOLD = 3
-_DATE = re.compile(r'\d{4}-\d{2}-\d{2}')
 
 
 @dataclass(frozen=True)
@@ -74,13 +73,12 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
     shift, notices = int(log.ks[0]), [*log.notices]
     if shift:
         notices.append(f'time step 0 is scenario step {shift} of the original')
-    network = network_elements(loaded, shift, notices)
-    ids = IdPool(used_ids(network), notices)
+    roads = write_roads(loaded, shift, notices)
+    ids = IdPool(used_ids(roads.elements), notices)
     objects = ObjectWriter(log, ids, notices)
     problem_ids = _problem_ids(log, ids)
     objects.write()
-    lanelets = {int(element.get('id')) for element in network if element.tag == 'lanelet'}
-    problems = _problems(log, loaded, objects.vehicle_rows, problem_ids, lanelets, notices)
+    problems = _problems(log, loaded, objects.vehicle_rows, problem_ids, roads.lanelets, notices)
     header = _header(log, loaded, len(problem_ids), notices)
     for name, value in (('author', author), ('affiliation', affiliation), ('source', source),
                         ('date', None if day is None else day.isoformat())):
@@ -88,7 +86,7 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
             header[name] = value
     remark = f'{loaded.benchmark_id} {SOURCE_MARK}'
     header['source'] = f'{header["source"]}; {remark}' if header['source'] else remark
-    text = _document(header, network, objects.text() + problems)
+    text = _document(header, roads.elements, objects.text() + problems)
     return ExportedScenario(header['benchmarkID'], text, objects.ids, problem_ids, tuple(notices))
 
 
@@ -161,7 +159,14 @@ def _header(log: RunLog, loaded: LoadedScenario, problems: int,
         'timeStepSize': exact_number(log.game.scheduler.time_step_s),
         'commonRoadVersion': '2020a', 'author': original.get('author', ''),
         'affiliation': original.get('affiliation', ''), 'source': original.get('source', ''),
-        'benchmarkID': benchmark_id, 'date': day if _DATE.fullmatch(day) else '1970-01-01'}
+        'benchmarkID': benchmark_id, 'date': day if _is_date(day) else '1970-01-01'}
+
+
+def _is_date(text: str) -> bool:
+    try:
+        return date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        return False
 
 
 def _problem_ids(log: RunLog, ids: IdPool) -> dict[str, int]:
@@ -172,7 +177,7 @@ def _problem_ids(log: RunLog, ids: IdPool) -> dict[str, int]:
 
 
 def _problems(log: RunLog, loaded: LoadedScenario, rows: NDArray[np.float64],
-              problem_ids: dict[str, int], lanelets: set[int], notices: list[str]) -> str:
+              problem_ids: dict[str, int], lanelets: dict[int, int], notices: list[str]) -> str:
     """Write the planning problems: where each vehicle began, and its goal."""
     known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
     own = {entry['id']: int(entry['planning_problem']) for entry in log.game.avs}

@@ -7,7 +7,7 @@ Text is put together directly: a run has tens of thousands of states, and buildi
 each of their values would take seconds. Numbers never carry an exponent, which the schema forbids.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 import math
 from typing import Any
 
@@ -134,10 +134,29 @@ def placed_rectangle(length: float, width: float, pose: Sequence[float]) -> str:
     return _placed_shape(Shape.rectangle(length, width), pose)
 
 
-def commonroad_shape(shape: CommonRoadShape) -> str:
-    """Write a shape of commonroad-io, in the coordinates it has."""
+def goal_position(shape: CommonRoadShape) -> str:
+    """
+    Write a position that is anywhere in a shape of commonroad-io, in the coordinates it has.
+
+    The schema wants all parts of a group to be of one kind: those of a mixed one are polygons.
+    """
+    parts = list(_parts(shape))
+    if len({type(part) for part in parts}) > 1:
+        return ''.join(_polygon(part.shapely_object.exterior.coords[:-1])
+                       if not isinstance(part, Polygon) else _commonroad_shape(part)
+                       for part in parts)
+    return ''.join(_commonroad_shape(part) for part in parts)
+
+
+def _parts(shape: CommonRoadShape) -> Iterator[CommonRoadShape]:
     if isinstance(shape, ShapeGroup):
-        return ''.join(commonroad_shape(part) for part in shape.shapes)
+        for part in shape.shapes:
+            yield from _parts(part)
+    else:
+        yield shape
+
+
+def _commonroad_shape(shape: CommonRoadShape) -> str:
     if isinstance(shape, Rectangle):
         return placed_rectangle(shape.length, shape.width, (*shape.center, shape.orientation))
     if isinstance(shape, Circle):

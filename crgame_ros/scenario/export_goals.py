@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The goals of exported planning problems."""
 
-from collections.abc import Collection
+from collections.abc import Mapping
 
 from commonroad.planning.planning_problem import PlanningProblem
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.export_elements import (
-    commonroad_shape,
+    goal_position,
     goal_state,
     interval_bounds,
     lanelet_references,
@@ -39,13 +39,15 @@ def goal_where_it_ended(centers: NDArray[np.float64], shape: Shape) -> str:
 
 
 def goals_of(problem: PlanningProblem, vehicle_id: str, shift: int, last: int,
-             lanelets: Collection[int], notices: list[str]) -> list[str]:
+             lanelets: Mapping[int, int], notices: list[str]) -> list[str]:
     """
     Give the goals of a planning problem on the time steps of the run.
 
+    A problem without a goal gets one that every state of the run meets.
+
     :param shift: scenario step that is time step 0
     :param last: last time step
-    :param lanelets: ids of the lanelets that a goal may refer to
+    :param lanelets: ids in the file of the lanelets that a goal may refer to, by their own
     :param notices: told what had to be changed
     """
     goals = []
@@ -56,11 +58,15 @@ def goals_of(problem: PlanningProblem, vehicle_id: str, shift: int, last: int,
             notices.append(f'{vehicle_id}: the time of its goal is over before the first step; it '
                            'may be reached at any step of the run')
             start, end = 0, last
-        known = [number for number in by_lanelet.get(index, ()) if number in lanelets]
+        known = [lanelets[number] for number in by_lanelet.get(index, ()) if number in lanelets]
         position = lanelet_references(known)
         if not known and state.has_value('position'):
-            position = commonroad_shape(state.position)
+            position = goal_position(state.position)
         goals.append(goal_state((max(start, 0), end), position, [
             (name, *interval_bounds(getattr(state, name)))
             for name in ('orientation', 'velocity') if state.has_value(name)]))
+    if not goals:
+        notices.append(f'{vehicle_id}: its planning problem has no goal; it gets one that every '
+                       'state of the run meets')
+        goals.append(goal_state((0, last), ''))
     return goals

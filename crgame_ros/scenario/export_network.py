@@ -3,6 +3,7 @@
 """The roads of a scenario for export: as its file has them, or rewritten where that is invalid."""
 
 from copy import deepcopy
+from dataclasses import dataclass
 import functools
 from importlib import resources
 import warnings
@@ -17,8 +18,9 @@ from commonroad.common.writer.file_writer_xml import (
 from commonroad.scenario.scenario import Location
 from lxml import etree
 
-from crgame_ros.errors import CrgameError
+from crgame_ros.errors import InputError
 from crgame_ros.scenario import guard
+from crgame_ros.scenario.export_ids import renumber
 from crgame_ros.scenario.loading import LoadedScenario
 
 _PARTS = ('location', 'scenarioTags', 'lanelet', 'trafficSign', 'trafficLight', 'intersection')
@@ -55,34 +57,51 @@ def schema_errors(root: etree._Element) -> list[str]:
     return [entry.message[:_MESSAGE_LENGTH] for entry in schema.error_log]
 
 
-def network_elements(loaded: LoadedScenario, shift: int,
-                     notices: list[str]) -> list[etree._Element]:
+@dataclass(frozen=True)
+class WrittenRoads:
+    """
+    The roads of an exported file.
+
+    :param elements: location, tags, lanelets, traffic signs, traffic lights and intersections.
+    :param lanelets: ids of the lanelets in the file, by those that they have in the scenario.
+    """
+
+    elements: list[etree._Element]
+    lanelets: dict[int, int]
+
+
+def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> WrittenRoads:
     """
     Give location, tags, lanelets, traffic signs, traffic lights and intersections.
 
     They are copied from the file as they are, or, where that breaks the schema (a third of the
-    published files do), written anew from what was read.
+    published files do), written anew from what was read, without what the schema still refuses.
+    What has no positive id of its own gets a new one.
 
     :param shift: scenario step that becomes time step 0; the cycles of the lights move with it
-    :param notices: told where the roads were written anew
-    :raises CrgameError: if they cannot be written so that the schema accepts them.
+    :param notices: told where the roads were changed
+    :raises InputError: if they cannot be written so that the schema accepts them.
     """
     root = guard.parse_hardened(loaded.xml_text, loaded.source)
+    taken = {int(node.get('id')) for node in root.iter('*') if _is_integer(node.get('id'))}
     if root.get('commonRoadVersion') == '2020a':
         copied, remarks = _completed([deepcopy(child) for tag in _PARTS
                                       for child in root.iterchildren(tag)], shift)
+        lanelets = renumber(copied, taken, remarks)
         if not _errors_of(copied):
             notices += remarks
-            return copied
+            return WrittenRoads(copied, lanelets)
     rewritten, remarks = _completed(_rewritten(loaded), shift)
-    errors = _errors_of(rewritten)
+    lanelets = renumber(rewritten, taken, remarks)
+    kept = _without_refused(rewritten, remarks)
+    errors = _errors_of(kept)
     if errors:
-        raise CrgameError(f'{loaded.source}: the roads cannot be written as a valid scenario '
-                          f'({"; ".join(errors[:3])}); correct the scenario and run again')
+        raise InputError(f'the roads cannot be written as a valid scenario '
+                         f'({"; ".join(errors[:3])})', loaded.source, 'correct the scenario')
     notices.append('the roads of the original are not as the CommonRoad 2020a schema has them and '
                    'are written anew from what was read')
     notices += remarks
-    return rewritten
+    return WrittenRoads(kept, lanelets)
 
 
 def used_ids(elements: list[etree._Element]) -> set[int]:
@@ -91,15 +110,69 @@ def used_ids(elements: list[etree._Element]) -> set[int]:
             if node.get('id') is not None}
 
 
-def _errors_of(elements: list[etree._Element]) -> list[str]:
-    """List what is wrong with the roads by themselves."""
+def _is_integer(text: str | None) -> bool:
+    try:
+        int(text or '')
+    except ValueError:
+        return False
+    return True
+
+
+def framed(elements: list[etree._Element]) -> etree._Element:
+    """Put copies of the roads into what the schema asks for beside them."""
     frame = etree.fromstring(_FRAME)
     frame.extend(deepcopy(elements))
-    # ids that are no numbers are for the schema to refuse
-    numbers = [int(node.get('id')) for node in frame.iter('*')
-               if node.get('id', '').isdecimal()]
+    # Ids that are no numbers are for the schema to refuse; no reference may mean the problem.
+    numbers = [int(text) for node in frame.iter('*')
+               for text in (node.get('id', ''), node.get('ref', '')) if text.isdecimal()]
     frame.append(etree.fromstring(_PROBLEM.format(max(numbers, default=0) + 1)))
-    return schema_errors(frame)
+    return frame
+
+
+def _errors_of(elements: list[etree._Element]) -> list[str]:
+    """List what is wrong with the roads by themselves."""
+    return schema_errors(framed(elements))
+
+
+def _without_refused(elements: list[etree._Element],
+                     notices: list[str]) -> list[etree._Element]:
+    """
+    Leave out what the schema refuses and the roads can do without.
+
+    What then lacks a part goes as well, up to a whole sign, light or intersection; a lanelet and
+    its bounds stay.
+    """
+    schema, _ = _schema()
+    frame, gone = framed(elements), []
+    while not schema.validate(frame):
+        tree = frame.getroottree()
+        refused = {node: entry.message for entry in schema.error_log
+                   for node in tree.xpath(entry.path or 'none') if _is_dispensable(node)}
+        # The schema reports these at the root.
+        known = {node.get('id') for node in frame.iter('*')}
+        refused |= {node: f'nothing has the id {node.get("ref")}'
+                    for node in frame.iterfind('.//*[@ref]') if node.get('ref') not in known}
+        if not refused:
+            break
+        for node, message in refused.items():
+            gone.append(f'<{node.tag}> ({message[:_MESSAGE_LENGTH]})')
+            parent = node.getparent()
+            if node.tag == 'location':
+                parent.replace(node, etree.fromstring(_LOCATION))
+            elif parent is not None:
+                parent.remove(node)
+    if gone:
+        notices.append(f'the schema refuses {len(gone)} elements of the roads; they are left out, '
+                       f'the first: {gone[0]}')
+    frame.remove(frame.find('planningProblem'))
+    return list(frame)
+
+
+def _is_dispensable(node: etree._Element) -> bool:
+    lineage = {node.tag, *(parent.tag for parent in node.iterancestors())}
+    return node.tag not in ('commonRoad', 'scenarioTags', 'lanelet') \
+        and not lineage & {'leftBound', 'rightBound', 'planningProblem'} \
+        or node.tag == 'lineMarking'
 
 
 def _completed(elements: list[etree._Element],
@@ -109,7 +182,11 @@ def _completed(elements: list[etree._Element],
         elements.insert(0, etree.fromstring(_LOCATION))
     if not any(element.tag == 'scenarioTags' for element in elements):
         elements.insert(1, etree.Element('scenarioTags'))
-    tags = next(element for element in elements if element.tag == 'scenarioTags')
+    header = [next(element for element in elements if element.tag == tag)
+              for tag in ('location', 'scenarioTags')]
+    elements = header + [element for element in elements
+                         if element.tag not in ('location', 'scenarioTags')]
+    tags = header[1]
     if tags.find(_SIMULATED) is None:
         etree.SubElement(tags, _SIMULATED)
     for light in elements:

@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles and objects of a run as CommonRoad obstacles, and the ids they get."""
+"""Vehicles and objects of a run as CommonRoad obstacles."""
 
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
@@ -20,40 +20,13 @@ from crgame_ros.scenario.export_elements import (
     static_obstacle,
     STATIC_TYPES,
 )
+from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.vehicle.state import StateColumn
 
 FloatArray = NDArray[np.float64]
 # In the order that the schema asks for.
 _GROUPS = ('static', 'dynamic', 'phantom', 'environment')
-
-
-class IdPool:
-    """
-    Hands out ids that are unique over everything in a file.
-
-    :param taken: ids that are in use.
-    :param notices: told where something cannot keep its id.
-    """
-
-    def __init__(self, taken: set[int], notices: list[str]) -> None:
-        self._taken = taken
-        self._notices = notices
-
-    def keep(self, number: int, name: str) -> int:
-        """Give something the id that it had in the original, or a new one if that is taken."""
-        if number > 0 and number not in self._taken:
-            self._taken.add(number)
-            return number
-        fresh = self.fresh()
-        self._notices.append(f'{name} has the id {fresh}, for {number} is taken')
-        return fresh
-
-    def fresh(self) -> int:
-        """Give an id that nothing has."""
-        number = max(self._taken) + 1
-        self._taken.add(number)
-        return number
 
 
 def named(name: str) -> str:

@@ -159,7 +159,7 @@ def _check_header(root: etree._Element, source: str) -> None:
     version = root.get('commonRoadVersion')
     if version not in VERSIONS:
         raise InputError(f'commonRoadVersion is {version!r}', f'{source}, <commonRoad>',
-                         f'convert it to {" or ".join(VERSIONS)}')
+                         f'give a scenario of 2017a, {" or ".join(VERSIONS)}')
     text = root.get('timeStepSize')
     if text is None:
         raise InputError('timeStepSize is missing', f'{source}, <commonRoad>',

@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Loading CommonRoad scenarios (2018b and 2020a) from files and from text."""
+"""Loading CommonRoad scenarios (2017a, 2018b and 2020a) from files and from text."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import hashlib
 import logging
 from pathlib import Path
-import re
 import warnings
 from xml.etree import ElementTree
 
@@ -17,7 +16,7 @@ from commonroad.common.reader.file_reader_xml import XMLFileReader
 from commonroad.common.util import AngleInterval, Interval
 from commonroad.geometry.shape import Circle, Shape, ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
-from commonroad.scenario.scenario import Scenario, ScenarioID
+from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import InitialState
 from lxml import etree
 import numpy as np
@@ -26,9 +25,9 @@ import shapely
 
 from crgame_ros.errors import InputError
 from crgame_ros.scenario import guard
+from crgame_ros.scenario.format_2017a import upgrade
+from crgame_ros.scenario.mending import mend
 
-_LENIENT_ID = re.compile(
-    r'(C-)?([A-Z]{3})[-_]([A-Za-z0-9]+)[-_](\d+)(?:[-_](\d+)(?:[-_]([STPI])((?:[-_]\d+)+))?)?')
 # Lanes are tabulated along their length: one of a million kilometres would fill the memory [m].
 _MAX_LANELET_LENGTH = 1e5
 
@@ -76,8 +75,9 @@ def parse_scenario(xml_text: str, source: str) -> LoadedScenario:
     :raises InputError: naming file, element and remedy, if it cannot be used.
     """
     root = guard.parse_hardened(xml_text, source)
+    notices = upgrade(root)
     guard.refuse_malformed(root, source)
-    notices = _mend(root)
+    notices += mend(root)
     scenario, problems, remarks = _read(etree.tostring(root), source)
     notices += remarks
     exact = tuple(_exact_problem(problem, notices) for problem in problems)
@@ -190,113 +190,3 @@ def _exact_problem(problem: PlanningProblem, notices: list[str]) -> PlanningProb
         acceleration=exact_value(state.acceleration), yaw_rate=exact_value(state.yaw_rate),
         slip_angle=exact_value(state.slip_angle))
     return PlanningProblem(problem.planning_problem_id, exact, problem.goal)
-
-
-def _mend(root: etree._Element) -> list[str]:
-    notices: list[str] = []
-    _mend_header(root, notices)
-    _mend_references(root, notices)
-    _mend_adjacency(root, notices)
-    heights = [point for point in root.iter('point') if point.find('z') is not None]
-    for point in heights:
-        point.remove(point.find('z'))
-    if heights:
-        notices.append(f'the heights of {len(heights)} points are ignored')
-    for light in root.iterchildren('trafficLight'):
-        if light.find('cycle') is None:
-            etree.SubElement(light, 'cycle')
-            notices.append(f'traffic light {light.get("id")} has no cycle and is inactive')
-    for obstacle in root.iterchildren('obstacle', 'dynamicObstacle'):
-        for name, entry in (('trajectory', 'state'), ('occupancySet', 'occupancy')):
-            for series in obstacle.findall(name):
-                if series.find(entry) is None:
-                    obstacle.remove(series)
-                    notices.append(f'obstacle {obstacle.get("id")}: its empty {name} is ignored')
-    return notices
-
-
-def _mend_header(root: etree._Element, notices: list[str]) -> None:
-    given = root.get('benchmarkID', '')
-    benchmark_id = _valid_benchmark_id(given)
-    if benchmark_id != given:
-        root.set('benchmarkID', benchmark_id)
-        notices.append(f'the malformed benchmark id {given[:60]!r} is replaced by {benchmark_id}')
-    if root.get('commonRoadVersion') == '2018b':
-        root.set('tags', root.get('tags', ''))
-    elif root.find('scenarioTags') is None:
-        etree.SubElement(root, 'scenarioTags')
-    location = root.find('location')
-    names = ('geoNameId', 'gpsLatitude', 'gpsLongitude')
-    if location is not None and not (
-            all(location.find(name) is not None for name in names)
-            and guard.has_finite_numbers(location.iter(
-                *names, 'xTranslation', 'yTranslation', 'zRotation', 'scaling'))):
-        root.remove(location)
-        notices.append('the location is incomplete or holds no numbers and is ignored')
-
-
-def _valid_benchmark_id(given: str) -> str:
-    candidates = [given]
-    parts = _LENIENT_ID.fullmatch(given)
-    if parts is not None:
-        cooperative, country, name, map_id, configuration, kind, numbers = parts.groups('')
-        candidates.append(f'{cooperative}{country}_{name}-{map_id}'
-                          + (f'_{configuration}' if configuration else '')
-                          + (f'_{kind}{numbers.replace("_", "-")}' if kind else ''))
-    for candidate in candidates:
-        if len(candidate) <= 100 and ScenarioID.benchmark_id_pattern.fullmatch(candidate):
-            try:
-                ScenarioID.from_benchmark_id(candidate, '2020a')
-            except (ValueError, AssertionError):
-                continue
-            return candidate
-    return f'ZAM_{re.sub("[^A-Za-z0-9]", "", given)[:40] or "Unnamed"}-1'
-
-
-def _mend_references(root: etree._Element, notices: list[str]) -> None:
-    """Drop references to what does not exist; commonroad-io would stumble over them."""
-    ids = {tag: {e.get('id') for e in root.iterchildren(tag)}
-           for tag in ('lanelet', 'trafficSign', 'trafficLight')}
-    targets = {'trafficSignRef': 'trafficSign', 'trafficLightRef': 'trafficLight'}
-    dropped: Counter[str] = Counter()
-    for parent in root.iterchildren('lanelet', 'intersection'):
-        for reference in parent.findall('.//*[@ref]'):
-            target = targets.get(reference.tag, 'lanelet')
-            if reference.tag != 'isLeftOf' and reference.get('ref') not in ids[target]:
-                reference.getparent().remove(reference)
-                dropped[f'<{reference.tag}> to the missing {target} {reference.get("ref")}'] += 1
-    if dropped:
-        notices.append(f'{dropped.total()} references lead nowhere and are ignored, the first: '
-                       f'{next(iter(dropped))}')
-    for tag in ('trafficSign', 'trafficLight'):
-        used = {e.get('ref') for e in root.iterfind(f'lanelet/{tag}Ref')}
-        for element in root.findall(tag):
-            if element.get('id') not in used and (
-                    tag == 'trafficSign' or element.find('position') is None):
-                root.remove(element)
-                notices.append(f'{tag} {element.get("id")} belongs to no lanelet and is ignored')
-
-
-def _mend_adjacency(root: etree._Element, notices: list[str]) -> None:
-    """Cut chains of neighbours that run in a circle; commonroad-io would follow them for ever."""
-    for side in ('adjacentLeft', 'adjacentRight'):
-        links = {}
-        for lanelet in root.iterchildren('lanelet'):
-            link = lanelet.find(side)
-            if link is not None and link.get('drivingDir') == 'same':
-                links[lanelet.get('id')] = link
-        done: set[str] = set()
-        for start in list(links):
-            chain: set[str] = set()
-            current = start
-            while current in links and current not in done:
-                chain.add(current)
-                following = links[current].get('ref')
-                if following in chain:
-                    link = links.pop(current)
-                    link.getparent().remove(link)
-                    notices.append(f'lanelet {current}: its {side} closes a circle and is '
-                                   'ignored')
-                    break
-                current = following
-            done |= chain

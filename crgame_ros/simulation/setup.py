@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from crgame_ros.driver.source import load_timeline, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.scenario.export_check import refuse_unwritable
 from crgame_ros.scenario.game import AvSpec, Game, ModelSpec
 from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedScenario
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
@@ -182,6 +183,8 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
     doubles = _recorded_egos(loaded, avs, k0)
     obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
+    refuse_unwritable(loaded, obstacles.descriptions,
+                      [av.planning_problem.planning_problem_id for av in avs])
     check_events(game, loaded.source, network, obstacles, [human.id for human in game.humans],
                  [av.spec for av in avs])
     notices = [*loaded.notices, *_discrepancies(avs), *(

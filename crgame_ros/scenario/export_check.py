@@ -1,0 +1,43 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a run in a scenario can be written, looked at before its first step."""
+
+from collections.abc import Sequence
+
+from lxml import etree
+
+from crgame_ros.errors import InputError
+from crgame_ros.scenario.export_elements import planning_problem, static_obstacle
+from crgame_ros.scenario.export_goals import goals_of
+from crgame_ros.scenario.export_ids import IdPool
+from crgame_ros.scenario.export_network import framed, schema_errors, used_ids, write_roads
+from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.scenario.objects import ObjectDescription
+
+_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def refuse_unwritable(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
+                      problems: Sequence[int]) -> None:
+    """
+    Write everything that does not depend on how the run goes, and see whether the schema has it.
+
+    :param objects: what can appear in the run; its shapes are checked.
+    :param problems: ids of the planning problems that are driven.
+    :raises InputError: if the run could not be exported.
+    """
+    roads = write_roads(loaded, 0, [])
+    frame = framed(roads.elements)
+    ids = IdPool(used_ids([frame]), [])
+    text = {item.shape: static_obstacle(ids.fresh(), 'unknown', item.shape, _ORIGIN[:3])
+            for item in objects}
+    known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    written = [planning_problem(ids.fresh(), _ORIGIN, goals_of(
+        known[number], str(number), 0, 1, roads.lanelets, [])) for number in problems]
+    last = frame[-1]
+    for element in map(etree.fromstring, text.values()):
+        last.addprevious(element)
+    frame.extend(map(etree.fromstring, written))
+    if errors := schema_errors(frame):
+        raise InputError(f'a run in it could not be exported ({errors[0]})', loaded.source,
+                         'correct the scenario')

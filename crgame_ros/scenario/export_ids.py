@@ -1,0 +1,90 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Ids that CommonRoad's schema accepts: positive, and unique over everything in a file."""
+
+from collections.abc import Collection, Iterable
+
+from lxml import etree
+
+_SIGNALS = {'trafficSignRef': 'trafficSign', 'trafficLightRef': 'trafficLight',
+            'isLeftOf': 'incoming'}
+
+
+class IdPool:
+    """
+    Hands out ids that are unique over everything in a file.
+
+    :param taken: ids that are in use.
+    :param notices: told where something cannot keep its id.
+    """
+
+    def __init__(self, taken: set[int], notices: list[str]) -> None:
+        self._taken = taken
+        self._notices = notices
+
+    def keep(self, number: int, name: str) -> int:
+        """Give something the id that it had in the original, or a new one if that is taken."""
+        if number > 0 and number not in self._taken:
+            self._taken.add(number)
+            return number
+        fresh = self.fresh()
+        self._notices.append(f'{name} has the id {fresh}, for {number} is '
+                             + ('taken' if number > 0 else 'not positive'))
+        return fresh
+
+    def fresh(self) -> int:
+        """Give an id that nothing has."""
+        number = max(self._taken, default=0) + 1
+        self._taken.add(number)
+        return number
+
+
+def renumber(elements: Iterable[etree._Element], taken: set[int], notices: list[str],
+             reserved: Collection[int] = ()) -> dict[int, int]:
+    """
+    Give a new id to every part of the roads whose own is not positive or belongs to another.
+
+    References follow. Incomings are known within their intersection only, as references to them
+    are.
+
+    :param elements: lanelets, traffic signs, traffic lights, intersections; changed in place.
+    :param taken: ids that anything else in the original has; new ones lie above them.
+    :param notices: told what was renumbered.
+    :param reserved: ids of other elements, which none of these may have.
+    :return: ids of the lanelets in the file, by those that they had.
+    """
+    elements = list(elements)
+    used = set(reserved)
+    pool = IdPool({max(taken, default=0), *taken}, [])
+    changed: dict[tuple[str, int, etree._Element | None], int] = {}
+    lanelets: dict[int, int] = {}
+    for element in elements:
+        for node in (element, *element.iterchildren('incoming')):
+            number = _number(node.get('id'))
+            if number is None:
+                continue
+            new = number
+            if number <= 0 or number in used:
+                new = pool.fresh()
+                changed[node.tag, number, element if node is not element else None] = new
+                notices.append(f'{node.tag} {number} has the id {new}: the schema wants positive '
+                               'ids, each of one element')
+            used.add(new)
+            node.set('id', str(new))
+            if node.tag == 'lanelet':
+                lanelets[number] = new
+    for element in elements if changed else ():
+        for reference in element.iterfind('.//*[@ref]'):
+            kind = _SIGNALS.get(reference.tag, 'lanelet')
+            scope = element if kind == 'incoming' else None
+            number = _number(reference.get('ref'))
+            if number is not None and (kind, number, scope) in changed:
+                reference.set('ref', str(changed[kind, number, scope]))
+    return lanelets
+
+
+def _number(text: str | None) -> int | None:
+    try:
+        return int(text or '')
+    except ValueError:
+        return None

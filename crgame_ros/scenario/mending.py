@@ -1,0 +1,165 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Mending scenario files where that is safe, before commonroad-io reads them."""
+
+from collections import Counter
+import re
+
+from commonroad.scenario.scenario import ScenarioID
+from lxml import etree
+
+from crgame_ros.scenario import guard
+from crgame_ros.scenario.export_ids import renumber
+
+_LENIENT_ID = re.compile(
+    r'(C-)?([A-Z]{3})[-_]([A-Za-z0-9]+)[-_](\d+)(?:[-_](\d+)(?:[-_]([STPI])((?:[-_]\d+)+))?)?')
+
+
+def mend(root: etree._Element) -> list[str]:
+    """
+    Mend what can be mended without guessing; commonroad-io would stumble over it.
+
+    :param root: a scenario that `guard.refuse_malformed` let through; changed in place.
+    :return: what was mended, one line each.
+    """
+    notices: list[str] = []
+    _mend_header(root, notices)
+    _mend_references(root, notices)
+    _mend_adjacency(root, notices)
+    _mend_incomings(root, notices)
+    _mend_times(root, notices)
+    heights = [point for point in root.iter('point') if point.find('z') is not None]
+    for point in heights:
+        point.remove(point.find('z'))
+    if heights:
+        notices.append(f'the heights of {len(heights)} points are ignored')
+    for light in root.iterchildren('trafficLight'):
+        if light.find('cycle') is None:
+            etree.SubElement(light, 'cycle')
+            notices.append(f'traffic light {light.get("id")} has no cycle and is inactive')
+    for obstacle in root.iterchildren('obstacle', 'dynamicObstacle'):
+        for name, entry in (('trajectory', 'state'), ('occupancySet', 'occupancy')):
+            for series in obstacle.findall(name):
+                if series.find(entry) is None:
+                    obstacle.remove(series)
+                    notices.append(f'obstacle {obstacle.get("id")}: its empty {name} is ignored')
+    return notices
+
+
+def _mend_header(root: etree._Element, notices: list[str]) -> None:
+    given = root.get('benchmarkID', '')
+    benchmark_id = _valid_benchmark_id(given)
+    if benchmark_id != given:
+        root.set('benchmarkID', benchmark_id)
+        notices.append(f'the malformed benchmark id {given[:60]!r} is replaced by {benchmark_id}')
+    if root.get('commonRoadVersion') == '2018b':
+        root.set('tags', root.get('tags', ''))
+    elif root.find('scenarioTags') is None:
+        etree.SubElement(root, 'scenarioTags')
+    location = root.find('location')
+    names = ('geoNameId', 'gpsLatitude', 'gpsLongitude')
+    if location is not None and not (
+            all(location.find(name) is not None for name in names)
+            and guard.has_finite_numbers(location.iter(
+                *names, 'xTranslation', 'yTranslation', 'zRotation', 'scaling'))):
+        root.remove(location)
+        notices.append('the location is incomplete or holds no numbers and is ignored')
+
+
+def _valid_benchmark_id(given: str) -> str:
+    candidates = [given]
+    parts = _LENIENT_ID.fullmatch(given)
+    if parts is not None:
+        cooperative, country, name, map_id, configuration, kind, numbers = parts.groups('')
+        candidates.append(f'{cooperative}{country}_{name}-{map_id}'
+                          + (f'_{configuration}' if configuration else '')
+                          + (f'_{kind}{numbers.replace("_", "-")}' if kind else ''))
+    for candidate in candidates:
+        if len(candidate) <= 100 and ScenarioID.benchmark_id_pattern.fullmatch(candidate):
+            try:
+                ScenarioID.from_benchmark_id(candidate, '2020a')
+            except (ValueError, AssertionError):
+                continue
+            return candidate
+    return f'ZAM_{re.sub("[^A-Za-z0-9]", "", given)[:40] or "Unnamed"}-1'
+
+
+def _mend_references(root: etree._Element, notices: list[str]) -> None:
+    """Drop references to what does not exist; commonroad-io would stumble over them."""
+    ids = {tag: {e.get('id') for e in root.iterchildren(tag)}
+           for tag in ('lanelet', 'trafficSign', 'trafficLight')}
+    targets = {'trafficSignRef': 'trafficSign', 'trafficLightRef': 'trafficLight'}
+    dropped: Counter[str] = Counter()
+    for parent in root.iterchildren('lanelet', 'intersection'):
+        for reference in parent.findall('.//*[@ref]'):
+            target = targets.get(reference.tag, 'lanelet')
+            if reference.tag != 'isLeftOf' and reference.get('ref') not in ids[target]:
+                reference.getparent().remove(reference)
+                dropped[f'<{reference.tag}> to the missing {target} {reference.get("ref")}'] += 1
+    if dropped:
+        notices.append(f'{dropped.total()} references lead nowhere and are ignored, the first: '
+                       f'{next(iter(dropped))}')
+    for tag in ('trafficSign', 'trafficLight'):
+        used = {e.get('ref') for e in root.iterfind(f'lanelet/{tag}Ref')}
+        for element in root.findall(tag):
+            if element.get('id') not in used and (
+                    tag == 'trafficSign' or element.find('position') is None):
+                root.remove(element)
+                notices.append(f'{tag} {element.get("id")} belongs to no lanelet and is ignored')
+
+
+def _mend_adjacency(root: etree._Element, notices: list[str]) -> None:
+    """Cut chains of neighbours that run in a circle; commonroad-io would follow them for ever."""
+    for side in ('adjacentLeft', 'adjacentRight'):
+        links = {}
+        for lanelet in root.iterchildren('lanelet'):
+            link = lanelet.find(side)
+            if link is not None and link.get('drivingDir') == 'same':
+                links[lanelet.get('id')] = link
+        done: set[str] = set()
+        for start in list(links):
+            chain: set[str] = set()
+            current = start
+            while current in links and current not in done:
+                chain.add(current)
+                following = links[current].get('ref')
+                if following in chain:
+                    link = links.pop(current)
+                    link.getparent().remove(link)
+                    notices.append(f'lanelet {current}: its {side} closes a circle and is '
+                                   'ignored')
+                    break
+                current = following
+            done |= chain
+
+
+def _mend_times(root: etree._Element, notices: list[str]) -> None:
+    """Let states without a time be those of time step 0, and goals without one hold at any."""
+    for element in root.iterchildren(*guard.OBSTACLE_TAGS, 'planningProblem'):
+        for state in element.findall('initialState'):
+            if state.find('time/*') is None:
+                _set_time(state, {'exact': 0})
+                notices.append(f'{element.tag} {element.get("id")}: its initial state has no time '
+                               'and counts as that of time step 0')
+        for goal in element.findall('goalState'):
+            if goal.find('time/*') is None:
+                _set_time(goal, {'intervalStart': 0, 'intervalEnd': guard.MAX_TIME_STEP})
+                notices.append(f'planning problem {element.get("id")}: its goal has no time and '
+                               'may be reached at any')
+
+
+def _mend_incomings(root: etree._Element, notices: list[str]) -> None:
+    """Give incomings ids of their own; the guard has seen to all others."""
+    reserved = {int(element.get('id')) for element in root.iterchildren('*')
+                if element.get('id') is not None and element.tag != 'intersection'}
+    inside = {int(node.get('id')) for node in root.iterfind('intersection//*[@id]')
+              if node.get('id').lstrip('-').isdecimal()}
+    renumber(root.findall('intersection'), reserved | inside, notices, reserved)
+
+
+def _set_time(state: etree._Element, values: dict[str, int]) -> None:
+    for time in state.findall('time'):
+        state.remove(time)
+    time = etree.SubElement(state, 'time')
+    for tag, value in values.items():
+        etree.SubElement(time, tag).text = str(value)
