@@ -91,12 +91,14 @@ def _add_roads(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_offline(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.launcher.arguments import PROBLEM_HELP
     parser.description = ('Run a game on a virtual clock, planners in lockstep. The same inputs '
                           'give the same state hash on every run.')
     add = parser.add_argument
     add('game', nargs='?', type=Path, help='game file (default: the cut-in game)')
     add('--scenario', type=Path, help='CommonRoad file instead of a game')
     add('--planner', help='planner of all AVs')
+    add('--problem', type=int, action='append', default=[], metavar='ID', help=PROBLEM_HELP)
     add('--driver', help='driver of the first human: keys:FILE, joy:FILE, replay:BAG, idle')
     add('--duration', type=float, metavar='S', help='simulated seconds')
     add('--latency', type=int, default=0, metavar='L',
@@ -129,7 +131,7 @@ def _offline(values: argparse.Namespace) -> int:
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
-                         duration_s=values.duration,
+                         duration_s=values.duration, problems=tuple(values.problem),
                          planners=(values.planner,) if values.planner else ())
     setup = effective_setup(request)
     for notice in setup.notices:

@@ -16,7 +16,10 @@ Drive in a CommonRoad scenario against autonomous vehicles, and record it.
 
 Without arguments: the cut-in game, driven by its script. A game file (YAML) says who takes part;
 --scenario alone works on any CommonRoad file: you are placed near the first AV, each planning
-problem becomes an AV, recorded obstacles play back."""
+problem becomes an AV, recorded obstacles play back. In an exported run its own human plays back as
+well, and you are placed only with --driver."""
+PROBLEM_HELP = ('only this planning problem becomes an AV, where the game names no AVs; give it '
+                'again for the next (default: all; of those that start on one spot the first)')
 EPILOG = """\
 examples:
   ./run.sh                                        the cut-in game
@@ -43,6 +46,8 @@ class RunRequest:
     :param scenario: CommonRoad file instead of the game's.
     :param driver: driver source of the first human.
     :param planners: planners of the AVs in their order; a single one serves all.
+    :param problems: planning problems that become AVs, where the game names none; all of them
+        where empty, of those that start on one spot the first.
     :param duration_s: simulated time [s]
     :param rate_hz: simulation rate [Hz]
     :param headless: without the cockpit.
@@ -66,6 +71,7 @@ class RunRequest:
     replay: Path | None = None
     realtime_priority: bool = False
     out: Path | None = None
+    problems: tuple[int, ...] = ()
 
 
 class _Parser(argparse.ArgumentParser):
@@ -83,6 +89,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--driver', metavar='SOURCE', help="who drives the first human's vehicle")
     add('--planner', action='append', default=[], metavar='NAME', dest='planners',
         help='planner of the AVs; give it again for the next AV')
+    add('--problem', action='append', type=int, default=[], metavar='ID', dest='problems',
+        help=PROBLEM_HELP)
     add('--duration', type=_positive, metavar='S', dest='duration_s',
         help="end after so many simulated seconds (default: the game's, else Ctrl-C)")
     add('--rate', type=_positive, metavar='R', dest='rate_hz',
@@ -112,6 +120,7 @@ def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunReq
     """
     values = vars(build_parser(program).parse_args(list(arguments)))
     values['planners'] = tuple(values['planners'])
+    values['problems'] = tuple(values['problems'])
     request = RunRequest(**values)
     if request.replay is not None and request != RunRequest(
             port=request.port, listen=request.listen, replay=request.replay):

@@ -19,6 +19,7 @@ from crgame_ros.scenario.checked_values import build
 from crgame_ros.scenario.events import PlannerSwap
 from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.scenario.game_file import dump_game, load_game
+from crgame_ros.scenario.recorded_humans import plays_its_humans
 from crgame_ros.simulation.event_check import check_swap
 from crgame_ros.simulation.replay import (
     recorded_inputs,
@@ -72,11 +73,18 @@ def effective_game(request: RunRequest) -> Game:
     if request.game is not None:
         game = load_game(request.game)
     elif request.scenario is not None:
-        game = Game(request.scenario, humans=(HumanSpec('hv0'),))
+        # The human of an exported run is a recording in it: the same cast drives again.
+        alone = request.driver is None and plays_its_humans(request.scenario)
+        game = Game(request.scenario, humans=() if alone else (HumanSpec('hv0'),))
     else:
         game = load_game(default_game())
     if request.game is not None and request.scenario is not None:
         game = replace(game, scenario=request.scenario)
+    if request.problems:
+        if game.avs is not None:
+            raise InputError('the game names its AVs', '--problem', 'leave it out')
+        game = replace(game, avs=tuple(AvSpec(f'av{index}', planning_problem=number)
+                                       for index, number in enumerate(request.problems)))
     if request.driver is not None:
         if not game.humans:
             raise InputError('the game has no human', '--driver', 'leave it out')

@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_elements import exact_number, planning_problem
@@ -24,9 +26,9 @@ from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import schema_errors, used_ids, write_roads
 from crgame_ros.scenario.export_objects import named, ObjectWriter
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
+from crgame_ros.scenario.objects import Role
+from crgame_ros.scenario.recorded_humans import human_note, SOURCE_MARK, without_human_notes
 
-# Written into every exported file's source, and the mark by which one is known.
-SOURCE_MARK = 'driven in crgame_ros'
 _HEAD_BYTES = 4096
 _ERRORS_TOLD = 3
 
@@ -76,7 +78,7 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
     roads = write_roads(loaded, shift, notices)
     ids = IdPool(used_ids(roads.elements), notices)
     objects = ObjectWriter(log, ids, notices)
-    problem_ids = _problem_ids(log, ids)
+    problem_ids = _problem_ids(log, loaded, ids)
     objects.write()
     problems = _problems(log, loaded, objects.vehicle_rows, problem_ids, roads.lanelets, notices)
     header = _header(log, loaded, len(problem_ids), notices)
@@ -84,8 +86,12 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
                         ('date', None if day is None else day.isoformat())):
         if value is not None:
             header[name] = value
-    remark = f'{loaded.benchmark_id} {SOURCE_MARK}'
-    header['source'] = f'{header["source"]}; {remark}' if header['source'] else remark
+    humans = {problem_ids[name]: objects.ids[name] for name in (
+        *(item.id for item in log.vehicles if item.role is Role.HUMAN),
+        *_recorded_humans(log, loaded))}
+    remark = f'{loaded.benchmark_id} {SOURCE_MARK}{human_note(humans)}'
+    earlier = without_human_notes(header['source'])
+    header['source'] = f'{earlier}; {remark}' if earlier else remark
     text = _document(header, roads.elements, objects.text() + problems)
     return ExportedScenario(header['benchmarkID'], text, objects.ids, problem_ids, tuple(notices))
 
@@ -169,19 +175,31 @@ def _is_date(text: str) -> bool:
         return False
 
 
-def _problem_ids(log: RunLog, ids: IdPool) -> dict[str, int]:
-    """Give each driven vehicle's planning problem an id; an AV's keeps its own."""
-    own = {entry['id']: int(entry['planning_problem']) for entry in log.game.avs}
-    kept = {av: ids.keep(number, f'planning problem {number}') for av, number in own.items()}
-    return {item.id: kept[item.id] if item.id in kept else ids.fresh() for item in log.vehicles}
+def _recorded_humans(log: RunLog, loaded: LoadedScenario) -> dict[str, int]:
+    """Find who was a human in an earlier run and played back: planning problems by object."""
+    present = {item.id for item, pose in zip(log.objects, log.object_poses[0], strict=True)
+               if np.isfinite(pose).all()}
+    return {f'o{obstacle}': problem for problem, obstacle in loaded.human_problems.items()
+            if f'o{obstacle}' in present}
+
+
+def _problem_ids(log: RunLog, loaded: LoadedScenario, ids: IdPool) -> dict[str, int]:
+    """Give each driver's planning problem an id; an AV's and a recorded human's keep their own."""
+    own = _driven_problems(log) | _recorded_humans(log, loaded)
+    kept = {name: ids.keep(number, f'planning problem {number}') for name, number in own.items()}
+    return {item.id: ids.fresh() for item in log.vehicles if item.id not in kept} | kept
+
+
+def _driven_problems(log: RunLog) -> dict[str, int]:
+    return {entry['id']: int(entry['planning_problem']) for entry in log.game.avs}
 
 
 def _problems(log: RunLog, loaded: LoadedScenario, rows: NDArray[np.float64],
               problem_ids: dict[str, int], lanelets: dict[int, int], notices: list[str]) -> str:
     """Write the planning problems: where each vehicle began, and its goal."""
     known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
-    own = {entry['id']: int(entry['planning_problem']) for entry in log.game.avs}
-    unused = sorted(known.keys() - own.values())
+    own, played = _driven_problems(log), _recorded_humans(log, loaded)
+    unused = sorted(known.keys() - {*own.values(), *played.values()})
     if unused:
         notices.append(f'nobody drove planning problem {", ".join(map(str, unused))}: left out')
     text = ''
@@ -196,7 +214,18 @@ def _problems(log: RunLog, loaded: LoadedScenario, rows: NDArray[np.float64],
             goals = [goal_where_it_ended(rows[:, column, :3], item.shape)]
         text += named(item.id) + planning_problem(
             problem_ids[item.id], rows[0, column].tolist(), goals)
+    for name, number in played.items():
+        goals = goals_of(known[number], name, int(log.ks[0]), len(log.ks) - 1, lanelets, notices)
+        text += named(name) + planning_problem(problem_ids[name], _first_row(log, name), goals)
     return text
+
+
+def _first_row(log: RunLog, name: str) -> list[float]:
+    """Give pose, speed, acceleration and yaw rate of an object at the first step."""
+    column = [item.id for item in log.objects].index(name)
+    x, y, yaw = log.object_poses[0, column].tolist()
+    speed = float(log.object_velocities[0, column, :2] @ (math.cos(yaw), math.sin(yaw)))
+    return [x, y, wrap_pi(yaw), speed, 0.0, 0.0]
 
 
 def _document(header: dict[str, str], network: Sequence[etree._Element], rest: str) -> str:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 import hashlib
 import logging
 from pathlib import Path
@@ -27,6 +28,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.format_2017a import upgrade
 from crgame_ros.scenario.mending import mend
+from crgame_ros.scenario.recorded_humans import read_human_note
 
 # Lanes are tabulated along their length: one of a million kilometres would fill the memory [m].
 _MAX_LANELET_LENGTH = 1e5
@@ -55,6 +57,13 @@ class LoadedScenario:
     time_step_s: float
     notices: tuple[str, ...]
     source: str
+
+    @cached_property
+    def human_problems(self) -> dict[int, int]:
+        """Planning problems of recorded humans, with the obstacles that hold their drives."""
+        recorded = {obstacle.obstacle_id for obstacle in self.scenario.dynamic_obstacles}
+        return {problem: obstacle for problem, obstacle
+                in read_human_note(self.scenario.source or '').items() if obstacle in recorded}
 
 
 def load_scenario(path: Path) -> LoadedScenario:

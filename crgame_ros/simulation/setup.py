@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Everything that a run needs, resolved: a game with its scenario loaded and vehicles placed."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import math
@@ -24,6 +24,7 @@ from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.scripted_objects import ScriptedObjects
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.simulation.av_models import check_models
+from crgame_ros.simulation.cast import cast_avs, Part
 from crgame_ros.simulation.event_check import check_events, held_obstacles, put_obstacles
 from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, TrafficSetup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
@@ -179,7 +180,8 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     """
     loaded = load_scenario(game.scenario) if loaded is None else loaded
     network = RoadNetwork(loaded.scenario.lanelet_network)
-    avs = _place_avs(game, loaded, network)
+    parts, remarks = cast_avs(game, loaded)
+    avs = _place_avs(parts, network)
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
     doubles = _recorded_egos(loaded, avs, k0)
     obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
@@ -187,7 +189,8 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
                       [av.planning_problem.planning_problem_id for av in avs])
     check_events(game, loaded.source, network, obstacles, [human.id for human in game.humans],
                  [av.spec for av in avs])
-    notices = [*loaded.notices, *_discrepancies(avs), *(
+    notices = [*loaded.notices, *(f'{loaded.source}: {remark}' for remark in remarks),
+               *_discrepancies(avs), *(
         f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'
         for number, av_id in doubles.items())]
     humans: list[HumanSetup] = []
@@ -270,37 +273,15 @@ def _discrepancies(avs: Iterable[AvSetup]) -> Iterable[str]:
                    '"spawn: problem" has no such gap')
 
 
-def _place_avs(
-    game: Game, loaded: LoadedScenario, network: RoadNetwork,
-) -> tuple[AvSetup, ...]:
-    problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
-    specs = game.avs
-    if specs is None:
-        specs = tuple(AvSpec(f'av{index}') for index in range(len(problems)))
-    named = {spec.planning_problem for spec in specs}
-    free = [number for number in problems if number not in named]
+def _place_avs(parts: Sequence[Part], network: RoadNetwork) -> tuple[AvSetup, ...]:
     avs: list[AvSetup] = []
-    for spec in specs:
-        where = f'{loaded.source}: {spec.id}'
-        number = spec.planning_problem
-        if number is None:
-            if not free:
-                raise InputError('no planning problem is left for it', where,
-                                 f'the scenario has {len(problems)}: remove the AV from the game')
-            number = free.pop(0)
-        if number not in problems:
-            raise InputError(f'planning problem {number} does not exist', where,
-                             'use one of ' + ', '.join(map(str, problems)))
-        if number in {av.planning_problem.planning_problem_id for av in avs}:
-            raise InputError(f'planning problem {number} has an AV already', where,
-                             'give each AV its own')
+    for spec, problem in parts:
         parameters = load_vehicle_parameters(spec.vehicle)
-        declared = problem_pose(problems[number], parameters.rear_to_center,
+        declared = problem_pose(problem, parameters.rear_to_center,
                                 parameters.wheelbase)
         state = declared
         if spec.spawn == 'lanelet':
             state = lanelet_pose(network, declared)
         transform = RigidTransform.between(state[:3], declared[:3])
-        avs.append(AvSetup(replace(spec, planning_problem=number), parameters, state, transform,
-                           problems[number]))
+        avs.append(AvSetup(spec, parameters, state, transform, problem))
     return tuple(avs)

@@ -163,14 +163,14 @@ def test_header_of_the_file(runs: Any, tmp_path: Path) -> None:
     root = etree.fromstring(export_scenario(log).xml_text.encode('utf-8'))
     assert root.get('author') == 'The crgame_ros authors'
     assert root.get('date') == '2026-01-01'
-    assert root.get('source').endswith('; ZAM_CutIn-1_1_T-1 driven in crgame_ros')
+    assert '; ZAM_CutIn-1_1_T-1 driven in crgame_ros (human: ' in root.get('source')
     assert root.find('scenarioTags/simulated') is not None
     named = export_scenario(log, author='A & "B"', affiliation='<C>', source='',
                             day=date(2031, 2, 3))
     root = etree.fromstring(named.xml_text.encode('utf-8'))
     assert (root.get('author'), root.get('affiliation'), root.get('date')) == (
         'A & "B"', '<C>', '2031-02-03')
-    assert root.get('source') == 'ZAM_CutIn-1_1_T-1 driven in crgame_ros'
+    assert root.get('source').startswith('ZAM_CutIn-1_1_T-1 driven in crgame_ros (human: ')
     vehicles = [c.text.strip() for c in root.iterchildren(etree.Comment)]
     assert vehicles == ['hv0', 'av0', 'hv0', 'av0']
 

@@ -1,0 +1,63 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which planning problems of an exported run were those of humans.
+
+An exported file has a planning problem for every driven vehicle. The attribute `source` says which
+of them a human drove, and as which obstacle the drive is recorded: it is free text for the schema,
+and survives reading and writing by commonroad-io, which comments do not.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+import re
+
+from crgame_ros.scenario import guard
+
+# Written into every exported file's source, and the mark by which one is known.
+SOURCE_MARK = 'driven in crgame_ros'
+_NOTE = re.compile(r' \(humans?: ([^()]*)\)')
+_HUMAN = re.compile(r'planning problem (\d{1,18}) is obstacle (\d{1,18})')
+
+
+def human_note(humans: Mapping[int, int]) -> str:
+    """
+    Write what follows `SOURCE_MARK`; empty without humans.
+
+    :param humans: obstacle ids by planning problem.
+    """
+    if not humans:
+        return ''
+    told = ', '.join(f'planning problem {number} is obstacle {obstacle}'
+                     for number, obstacle in humans.items())
+    return f' ({"human" if len(humans) == 1 else "humans"}: {told})'
+
+
+def without_human_notes(source: str) -> str:
+    """Remove what earlier runs said of their humans: it holds for their own files only."""
+    return _NOTE.sub('', source)
+
+
+def read_human_note(source: str) -> dict[int, int]:
+    """
+    Read what `human_note` wrote.
+
+    :param source: attribute of the file.
+    :return: obstacle ids by planning problem.
+    """
+    mark = source.rfind(SOURCE_MARK)
+    note = _NOTE.match(source, mark + len(SOURCE_MARK)) if mark >= 0 else None
+    return {} if note is None else {
+        int(problem): int(obstacle) for problem, obstacle in _HUMAN.findall(note[1])}
+
+
+def plays_its_humans(path: Path) -> bool:
+    """
+    Tell whether a file is an exported run whose humans play back while its AVs drive.
+
+    :raises InputError: if it cannot be read.
+    """
+    root = guard.parse_hardened(guard.read_text(path), str(path))
+    humans = read_human_note(root.get('source', ''))
+    problems = {problem.get('id') for problem in root.iterchildren('planningProblem')}
+    return bool(humans) and not problems <= {str(number) for number in humans}

@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which planning problems of a scenario are driven, by which AV."""
+
+from dataclasses import replace
+import math
+
+from commonroad.planning.planning_problem import PlanningProblem
+import shapely
+
+from crgame_ros.errors import InputError
+from crgame_ros.scenario.game import AvSpec, Game
+from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.scenario.spawn import outline, problem_pose
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+
+Part = tuple[AvSpec, PlanningProblem]
+# Problems whose vehicles would touch within these times, each at its first speed, are no cast: no
+# two planners could drive them at once [s].
+_ON_ONE_SPOT_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+
+
+def cast_avs(game: Game, loaded: LoadedScenario) -> tuple[list[Part], list[str]]:
+    """
+    Give each AV of a game its planning problem.
+
+    An AV for which the game names none takes the next one that nobody drives. Problems that
+    start on one spot are alternatives: of these the first is taken. The problem of a recorded
+    human is taken only by an AV that names it.
+
+    :return: AVs in the order of the game, their `planning_problem` filled in, and remarks for
+        the user.
+    :raises InputError: if a problem does not exist, is taken, or none is left.
+    """
+    problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    wanted = game.avs or ()
+    _refuse_unknown(wanted, problems, loaded.source)
+    named = [(spec, problems[spec.planning_problem]) for spec in wanted
+             if spec.planning_problem is not None]
+    free, notices = _free_problems(named, loaded)
+    if game.avs is None:
+        wanted = tuple(AvSpec(f'av{index}') for index in range(len(free)))
+    parts: list[Part] = []
+    for spec in wanted:
+        if spec.planning_problem is None:
+            if not free:
+                raise InputError(
+                    'no planning problem is left for it', f'{loaded.source}: {spec.id}',
+                    f'the scenario has {len(problems)}: remove the AV from the game'
+                    + (', or name its planning_problem' if notices else ''))
+            spec = replace(spec, planning_problem=free.pop(0).planning_problem_id)
+        parts.append((spec, problems[spec.planning_problem or 0]))
+    return parts, notices
+
+
+def _refuse_unknown(specs: tuple[AvSpec, ...], problems: dict[int, PlanningProblem],
+                    source: str) -> None:
+    taken: set[int] = set()
+    for spec in specs:
+        number = spec.planning_problem
+        if number is None:
+            continue
+        if number not in problems:
+            raise InputError(f'planning problem {number} does not exist', f'{source}: {spec.id}',
+                             'use one of ' + ', '.join(map(str, problems)))
+        if number in taken:
+            raise InputError(f'planning problem {number} has an AV already',
+                             f'{source}: {spec.id}', 'give each AV its own')
+        taken.add(number)
+
+
+def _free_problems(named: list[Part],
+                   loaded: LoadedScenario) -> tuple[list[PlanningProblem], list[str]]:
+    """Find the problems for AVs that name none, in the order of the file."""
+    taken = {problem.planning_problem_id: problem for _, problem in named}
+    notices: list[str] = []
+    free: list[PlanningProblem] = []
+    alternatives: dict[int, list[int]] = {}
+    for problem in loaded.planning_problems:
+        number = problem.planning_problem_id
+        if number in taken:
+            continue
+        if number in loaded.human_problems:
+            notices.append(f'planning problem {number} was that of a human, who plays back as '
+                           f'obstacle {loaded.human_problems[number]}')
+            continue
+        rival = next((other for other in (*taken.values(), *free)
+                      if _on_one_spot(problem, other)), None)
+        if rival is None:
+            free.append(problem)
+        else:
+            alternatives.setdefault(rival.planning_problem_id, []).append(number)
+    for number, others in alternatives.items():
+        notices.append(
+            f'planning problems {number}, {", ".join(map(str, others))} start on one spot and are '
+            f'alternatives: {number} is driven (--problem, or planning_problem of an AV in the '
+            'game, takes another)')
+    return free, notices
+
+
+def _on_one_spot(first: PlanningProblem, second: PlanningProblem) -> bool:
+    """Tell whether two vehicles touch at the start, or so soon that nobody could prevent it."""
+    if first.initial_state.time_step != second.initial_state.time_step:
+        return False
+    return any(shapely.intersects(_placed(first, time_s), _placed(second, time_s))
+               for time_s in _ON_ONE_SPOT_S)
+
+
+def _placed(problem: PlanningProblem, time_s: float) -> shapely.Polygon:
+    vehicle = load_vehicle_parameters()
+    state = problem_pose(problem, vehicle.rear_to_center)
+    x, y = state.center(vehicle.rear_to_center)
+    return outline(vehicle.shape, x + time_s * state.speed * math.cos(state.yaw),
+                   y + time_s * state.speed * math.sin(state.yaw), state.yaw)
