@@ -126,6 +126,7 @@ def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.recording.run_log import run_log_of
     from crgame_ros.scenario.export import write_scenario
+    from crgame_ros.simulation.contacts import contacts_of
     from crgame_ros.simulation.offline import run_offline
     from crgame_ros.simulation.replay import recorded_inputs
     if values.latency < 0:
@@ -165,7 +166,11 @@ def _offline(values: argparse.Namespace) -> int:
                        for item in result.violations if not item.is_valid],
         'stop': None if result.stop is None else {
             'vehicle': result.stop.vehicle_id, 'violation_n': result.stop.n,
-            'stop_n': len(result.vehicle_states) - 1}}
+            'stop_n': len(result.vehicle_states) - 1},
+        'contacts': [{'vehicle': item.vehicle_id, 'with': item.other_id, 'n': item.n,
+                      'side': item.side, 'kind': item.kind, 'speed': round(item.speed, 2),
+                      'other_speed': round(item.other_speed, 2), 'avoidable_by': item.verdict}
+                     for item in contacts_of(result)]}
     print(json.dumps(report, indent=2))
     if values.out is not None:
         _make_folder_of(values.out)

@@ -1,0 +1,155 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a contact of two bodies was: where it touched, of which kind, and who could have avoided it.
+
+The kinds are those of nuPlan's closed-loop score. Whether somebody could have avoided a contact is
+answered by driving again: had he braked with his full deceleration from the moment the other was
+in his way, would they have touched? The other does what it did.
+"""
+
+from dataclasses import dataclass
+import math
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+from crgame_ros.drivability.footprint import Footprint
+from crgame_ros.geometry.shape import Shape
+
+FloatArray: TypeAlias = NDArray[np.float64]
+Side: TypeAlias = Literal['front', 'rear', 'left', 'right']
+Kind: TypeAlias = Literal['stopped ego', 'stopped track', 'active front', 'rear', 'lateral']
+
+# nuPlan's: slower than this is standing [m/s].
+_STANDING = 0.05
+# How far before and behind the contact is looked at [s], and how finely.
+_BEFORE_S, _AFTER_S, _STRIDE_S = 10.0, 3.0, 0.02
+# The way of a body reaches so far beyond its last footprint [m].
+_BEYOND = 0.5
+
+
+@dataclass(frozen=True)
+class Course:
+    """
+    How a body moved.
+
+    :param shape: its footprint around the centre.
+    :param poses: (n, 3) of its centre x [m], y [m], yaw [rad] at each step; NaN where absent.
+    :param speeds: (n) [m/s]
+    :param braking: the deceleration that it can brake with; 0 if it cannot [m/s^2]
+    :param reaction_s: time until it brakes [s]
+    """
+
+    shape: Shape
+    poses: FloatArray
+    speeds: FloatArray
+    braking: float
+    reaction_s: float
+
+
+def touched_side(mine: Course, other: Course, step: int) -> Side:
+    """
+    Tell which side of a body another touched.
+
+    That side beyond which all of the other was, furthest, one step before; where they overlapped
+    from the start, the one through which the way out is shortest.
+
+    :param step: the first at which they touch.
+    """
+    before = max(step - 1, 0)
+    if not np.isfinite((mine.poses[before], other.poses[before])).all():
+        before = step
+    x, y, yaw = mine.poses[before].tolist()
+    corners = shapely.get_coordinates(_placed(other, before)) - (x, y)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    along, across = corners @ (cos, sin), corners @ (-sin, cos)
+    half_length, half_width = 0.5 * mine.shape.length, 0.5 * mine.shape.width
+    gaps: dict[Side, float] = {
+        'front': float(along.min()) - half_length, 'rear': -half_length - float(along.max()),
+        'left': float(across.min()) - half_width, 'right': -half_width - float(across.max())}
+    return max(gaps, key=lambda side: gaps[side])
+
+
+def kind_of(speed: float, other_speed: float, side: Side) -> Kind:
+    """
+    Name a contact as nuPlan does.
+
+    :param speed: of the vehicle that is judged (the ego) [m/s]
+    :param other_speed: of what it touches (the track) [m/s]
+    :param side: of the vehicle that is judged.
+    """
+    if abs(speed) <= _STANDING:
+        return 'stopped ego'
+    if abs(other_speed) <= _STANDING:
+        return 'stopped track'
+    return 'active front' if side == 'front' else 'rear' if side == 'rear' else 'lateral'
+
+
+def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
+    """
+    Tell whether a body would not have touched another, had it braked when that was in its way.
+
+    It brakes along the path that it took, from its reaction time after the other came into that
+    path (ahead of it, up to where they touched) and stayed, and is then never faster than it was.
+    False for what cannot brake, and where the other was never in its way: whoever is hit from
+    behind or from the side cannot brake it away. Steering is not considered.
+
+    :param step: the first at which they touch.
+    :param dt_s: time between the steps [s]
+    """
+    stride = max(1, round(_STRIDE_S / dt_s))
+    start = _in_the_way_since(mine, other, step, stride, round(_BEFORE_S / dt_s))
+    if start is None or mine.braking <= 0.0:
+        return False
+    end = min(len(mine.poses), step + round(_AFTER_S / dt_s) + 1)
+    driven = mine.poses[start:end]
+    moved = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(driven[:, :2], axis=0).T))))
+    time = dt_s * np.arange(len(driven))
+    speed = abs(float(mine.speeds[start]))
+    braked = np.clip(time - mine.reaction_s, 0.0, speed / mine.braking)
+    held = np.minimum(time, mine.reaction_s)
+    way = np.minimum(speed * (held + braked) - 0.5 * mine.braking * braked ** 2, moved)
+    yaws = np.unwrap(driven[:, 2])
+    poses = np.column_stack([np.interp(way, moved, column)
+                             for column in (driven[:, 0], driven[:, 1], yaws)])
+    again = Course(mine.shape, poses, mine.speeds, mine.braking, mine.reaction_s)
+    there = Course(other.shape, other.poses[start:end], other.speeds, 0.0, 0.0)
+    return not any(_touch(again, there, index) for index in range(0, len(poses), stride))
+
+
+def _in_the_way_since(mine: Course, other: Course, step: int, stride: int,
+                      most: int) -> int | None:
+    """Find the first step of those, up to the contact, at which the other is in my way."""
+    since = None
+    for index in range(step - stride, max(step - most, 0) - 1, -stride):
+        if not np.isfinite((mine.poses[index], other.poses[index])).all() \
+                or not shapely.intersects(_way(mine, index, step, stride), _placed(other, index)):
+            break
+        since = index
+    return since
+
+
+def _way(mine: Course, first: int, last: int, stride: int) -> shapely.Geometry:
+    """Give what a body covers from its centre at one step to beyond its front at another."""
+    centers = mine.poses[[*range(first, last, stride), last]]
+    yaw = float(centers[-1, 2])
+    reach = 0.5 * mine.shape.length + _BEYOND
+    line = np.vstack((centers[:, :2],
+                      centers[-1, :2] + reach * np.array((math.cos(yaw), math.sin(yaw)))))
+    return shapely.LineString(line).buffer(0.5 * mine.shape.width, cap_style='flat')
+
+
+def _touch(mine: Course, other: Course, index: int) -> bool:
+    poses = mine.poses[index], other.poses[index]
+    if not np.isfinite(poses).all():
+        return False
+    reach = mine.shape.radius + other.shape.radius
+    return math.dist(poses[0][:2], poses[1][:2]) <= reach \
+        and bool(shapely.intersects(_placed(mine, index), _placed(other, index)))
+
+
+def _placed(course: Course, index: int) -> shapely.Polygon:
+    return Footprint(course.shape).polygon(*course.poses[index].tolist())
