@@ -137,6 +137,9 @@ def _offline(values: argparse.Namespace) -> int:
     setup = effective_setup(request)
     for notice in setup.notices:
         print(f'note: {notice}', file=sys.stderr)
+    if values.out is not None and setup.game.duration < setup.scheduler.time_step_s:
+        raise InputError(f'{setup.game.duration} s are less than a time step of the scenario',
+                         '--out', f'let the run last for {setup.scheduler.time_step_s} s or more')
     drivers, intervals_s = recorded_inputs(setup)
     triggers = [(round(time_s / setup.scheduler.dt_s), name) for name, time_s in values.trigger]
     start_s = time.perf_counter()

@@ -5,7 +5,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -13,20 +12,16 @@ from xml.sax.saxutils import quoteattr
 
 from commonroad.scenario.scenario import ScenarioID
 from lxml import etree
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.export_elements import exact_number, planning_problem
-from crgame_ros.scenario.export_goals import goal_where_it_ended, goals_of
+from crgame_ros.scenario.export_elements import exact_number
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import schema_errors, used_ids, write_roads
-from crgame_ros.scenario.export_objects import named, ObjectWriter
+from crgame_ros.scenario.export_objects import ObjectWriter
+from crgame_ros.scenario.export_problems import ProblemWriter
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
-from crgame_ros.scenario.objects import Role
 from crgame_ros.scenario.recorded_humans import human_note, SOURCE_MARK, without_human_notes
 
 _HEAD_BYTES = 4096
@@ -41,7 +36,8 @@ class ExportedScenario:
     :param benchmark_id: its benchmark id.
     :param xml_text: the content of the file, valid by CommonRoad's schema.
     :param obstacle_ids: CommonRoad ids of the objects and vehicles in it, by their names.
-    :param problem_ids: ids of the planning problems, by vehicle.
+    :param problem_ids: ids of the planning problems, by vehicle or recorded human; where nobody
+        drove, by `problem` and number.
     :param notices: what it could not express, one line each.
     """
 
@@ -61,16 +57,16 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
     whose states hold the pose of the centre; a vehicle's velocity is that of its rear axle, as in
     CommonRoad's KS model. An object that appears later, or again, is a phantom obstacle from then
     on, for the schema lets every dynamic obstacle begin at 0. Each driven vehicle has a planning
-    problem: an AV's goal is its own, a human's where the drive ended.
+    problem: an AV's goal is its own, a human's where the drive ended. Where nobody drives, the
+    problems of the scenario stay as they are.
 
     :param author: header entries; the original's where None, the source with a remark added.
     :param day: date of the run; that of the original where None.
-    :raises InputError: if the run has no step or nobody drives.
+    :raises InputError: if the run has no step, or its scenario cannot be written.
     :raises CrgameError: if the schema refuses the result.
     """
-    if len(log.ks) < 2 or not log.vehicles:
-        raise InputError('nobody drives' if len(log.ks) > 1 else 'the run has no scenario step',
-                         'the run', 'let a vehicle take part for one time step or more')
+    if len(log.ks) < 2:
+        raise InputError('has no scenario step', 'the run', 'let it last for a time step or more')
     loaded = parse_scenario(log.xml_text, '/scenario/xml')
     shift, notices = int(log.ks[0]), [*log.notices]
     if shift:
@@ -78,22 +74,20 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
     roads = write_roads(loaded, shift, notices)
     ids = IdPool(used_ids(roads.elements), notices)
     objects = ObjectWriter(log, ids, notices)
-    problem_ids = _problem_ids(log, loaded, ids)
+    writer = ProblemWriter(log, loaded, roads.lanelets, ids, notices)
     objects.write()
-    problems = _problems(log, loaded, objects.vehicle_rows, problem_ids, roads.lanelets, notices)
-    header = _header(log, loaded, len(problem_ids), notices)
+    problems = writer.text(objects.vehicle_rows)
+    header = _header(log, loaded, len(writer.ids), notices)
     for name, value in (('author', author), ('affiliation', affiliation), ('source', source),
                         ('date', None if day is None else day.isoformat())):
         if value is not None:
             header[name] = value
-    humans = {problem_ids[name]: objects.ids[name] for name in (
-        *(item.id for item in log.vehicles if item.role is Role.HUMAN),
-        *_recorded_humans(log, loaded))}
+    humans = {writer.ids[name]: objects.ids[name] for name in writer.humans}
     remark = f'{loaded.benchmark_id} {SOURCE_MARK}{human_note(humans)}'
     earlier = without_human_notes(header['source'])
     header['source'] = f'{earlier}; {remark}' if earlier else remark
     text = _document(header, roads.elements, objects.text() + problems)
-    return ExportedScenario(header['benchmarkID'], text, objects.ids, problem_ids, tuple(notices))
+    return ExportedScenario(header['benchmarkID'], text, objects.ids, writer.ids, tuple(notices))
 
 
 def write_scenario(log: RunLog, out: Path, **header: Any) -> ExportedScenario:
@@ -173,59 +167,6 @@ def _is_date(text: str) -> bool:
         return date.fromisoformat(text).isoformat() == text
     except ValueError:
         return False
-
-
-def _recorded_humans(log: RunLog, loaded: LoadedScenario) -> dict[str, int]:
-    """Find who was a human in an earlier run and played back: planning problems by object."""
-    present = {item.id for item, pose in zip(log.objects, log.object_poses[0], strict=True)
-               if np.isfinite(pose).all()}
-    return {f'o{obstacle}': problem for problem, obstacle in loaded.human_problems.items()
-            if f'o{obstacle}' in present}
-
-
-def _problem_ids(log: RunLog, loaded: LoadedScenario, ids: IdPool) -> dict[str, int]:
-    """Give each driver's planning problem an id; an AV's and a recorded human's keep their own."""
-    own = _driven_problems(log) | _recorded_humans(log, loaded)
-    kept = {name: ids.keep(number, f'planning problem {number}') for name, number in own.items()}
-    return {item.id: ids.fresh() for item in log.vehicles if item.id not in kept} | kept
-
-
-def _driven_problems(log: RunLog) -> dict[str, int]:
-    return {entry['id']: int(entry['planning_problem']) for entry in log.game.avs}
-
-
-def _problems(log: RunLog, loaded: LoadedScenario, rows: NDArray[np.float64],
-              problem_ids: dict[str, int], lanelets: dict[int, int], notices: list[str]) -> str:
-    """Write the planning problems: where each vehicle began, and its goal."""
-    known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
-    own, played = _driven_problems(log), _recorded_humans(log, loaded)
-    unused = sorted(known.keys() - {*own.values(), *played.values()})
-    if unused:
-        notices.append(f'nobody drove planning problem {", ".join(map(str, unused))}: left out')
-    text = ''
-    for column, item in enumerate(log.vehicles):
-        if item.id in own:
-            if own[item.id] not in known:
-                raise InputError(f'planning problem {own[item.id]} of {item.id} is not in it',
-                                 loaded.source, 'record the run again')
-            goals = goals_of(known[own[item.id]], item.id, int(log.ks[0]), len(log.ks) - 1,
-                             lanelets, notices)
-        else:
-            goals = [goal_where_it_ended(rows[:, column, :3], item.shape)]
-        text += named(item.id) + planning_problem(
-            problem_ids[item.id], rows[0, column].tolist(), goals)
-    for name, number in played.items():
-        goals = goals_of(known[number], name, int(log.ks[0]), len(log.ks) - 1, lanelets, notices)
-        text += named(name) + planning_problem(problem_ids[name], _first_row(log, name), goals)
-    return text
-
-
-def _first_row(log: RunLog, name: str) -> list[float]:
-    """Give pose, speed, acceleration and yaw rate of an object at the first step."""
-    column = [item.id for item in log.objects].index(name)
-    x, y, yaw = log.object_poses[0, column].tolist()
-    speed = float(log.object_velocities[0, column, :2] @ (math.cos(yaw), math.sin(yaw)))
-    return [x, y, wrap_pi(yaw), speed, 0.0, 0.0]
 
 
 def _document(header: dict[str, str], network: Sequence[etree._Element], rest: str) -> str:

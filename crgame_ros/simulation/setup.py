@@ -185,8 +185,6 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
     doubles = _recorded_egos(loaded, avs, k0)
     obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
-    refuse_unwritable(loaded, obstacles.descriptions,
-                      [av.planning_problem.planning_problem_id for av in avs])
     check_events(game, loaded.source, network, obstacles, [human.id for human in game.humans],
                  [av.spec for av in avs])
     notices = [*loaded.notices, *(f'{loaded.source}: {remark}' for remark in remarks),
@@ -214,7 +212,10 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     check_models([(av.spec, av.vehicle) for av in avs],
                  [(human.id, human.dynamics, human.vehicle) for human in humans])
     setup.open_occupancy()
-    return _with_living(setup)
+    setup = _with_living(setup)
+    refuse_unwritable(loaded, setup.obstacles.descriptions,
+                      [av.planning_problem.planning_problem_id for av in avs])
+    return setup
 
 
 def _scripted(game: Game, network: RoadNetwork,

@@ -6,6 +6,7 @@ from dataclasses import replace
 from datetime import date
 import math
 from pathlib import Path
+import re
 from typing import Any
 
 from commonroad.common.solution import VehicleModel, VehicleType
@@ -132,8 +133,7 @@ def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
     states[1, 0, 3] = np.nan
     cases = [
         (replace(log, ks=log.ks[:1], vehicle_states=log.vehicle_states[:1]),
-         'the run has no scenario step'),
-        (replace(log, vehicle_states=log.vehicle_states[:, :0]), 'nobody drives'),
+         'the run: has no scenario step'),
         (replace(log, vehicle_states=states), 'hv0: its state at scenario step 1 holds no number'),
         (replace(log, xml_text=log.xml_text.replace('Problem id="100"', 'Problem id="7"')),
          'planning problem 100 of av0 is not in it')]
@@ -143,6 +143,29 @@ def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
         with pytest.raises(InputError, match=message):
             write_scenario(bad, folder)
         assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize('problem', [True, False])
+def test_run_in_which_nobody_drives(runs: Any, tmp_path: Path, problem: bool) -> None:
+    """Recorded vehicles alone: the problem stays as it was, or there is one that all meet."""
+    text = runs.own(TRAFFIC)
+    if not problem:
+        text = re.sub('<planningProblem.*</planningProblem>', '', text, flags=re.DOTALL)
+    driven = runs.drive(text, tmp_path, duration_s=0.3)
+    log = replace(driven, descriptions=driven.objects, game=replace(driven.game, avs=()),
+                  vehicle_states=driven.vehicle_states[:, :0])
+    exported = export_scenario(log)
+    scenario, problems = runs.read_back(exported)
+    runs.assert_poses(log, exported, scenario)
+    kept = problems.planning_problem_dict[next(iter(exported.problem_ids.values()))]
+    original = parse_scenario(text, 'x').planning_problems
+    assert len(problems.planning_problem_dict) == 1
+    if problem:
+        assert math.dist(kept.initial_state.position, original[0].initial_state.position) < 1e-4
+        assert kept.goal == original[0].goal
+    else:
+        assert any('no planning problem' in notice for notice in exported.notices)
+        assert kept.goal.is_reached(kept.initial_state)
 
 
 def test_nothing_invalid_is_ever_written(runs: Any, tmp_path: Path) -> None:

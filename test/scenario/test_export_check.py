@@ -84,6 +84,18 @@ def test_intersections_that_the_schema_refuses(runs: Any, tmp_path: Path, patter
     assert before['lanelet'] == after['lanelet']
 
 
+def test_states_and_goals_without_a_time(runs: Any, tmp_path: Path) -> None:
+    """They count as those of time step 0, and as goals for any time; both are told."""
+    text = re.sub(r'<time>.*?</time>', '', runs.own(CUT_IN), flags=re.DOTALL)
+    loaded = parse_scenario(text, 'x')
+    problem = loaded.planning_problems[0]
+    assert problem.initial_state.time_step == 0
+    assert problem.goal.state_list[0].time_step.start == 0
+    assert len([notice for notice in loaded.notices if 'has no time' in notice]) == 2
+    _, problems = runs.read_back(export_scenario(runs.drive(text, tmp_path, duration_s=0.2)))
+    assert problems.planning_problem_dict[100].goal.state_list[0].time_step.end == 100_000
+
+
 @pytest.mark.parametrize(('pattern', 'replacement', 'reason'), [
     ('<length>[0-9.]+</length>', '<length>-4.5</length>', '-4.5'),
     ('<leftBound>', '<leftBound><point><x>1</x><y>2</y></point>', 'points')])
@@ -108,8 +120,8 @@ def test_mutated_files_are_refused_at_once_or_run_whole(
     kinds: Counter[str] = Counter()
     for name in names:
         text = (shared_scenarios / f'{name}.xml').read_bytes()
-        for seed in range(10):
+        for seed in range(7):
             outcome = outcome_of(*mutate(text, f'{name} {seed}'), tmp_path)
             assert outcome.is_good, (name, seed, outcome)
             kinds[outcome.kind] += 1
-    assert kinds['refused'] > 15 and kinds['valid'] > 15
+    assert kinds['refused'] > 10 and kinds['valid'] > 10
