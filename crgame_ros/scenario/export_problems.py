@@ -80,8 +80,8 @@ class ProblemWriter:
         parts += [self._write(name, _initial_row(self._known[number]), self._goals(number, name))
                   for name, number in self._idle.items()]
         if _NOBODY in self.ids:
-            self._notices.append('nobody drove, and the scenario has no planning problem: the file '
-                                 'gets one that every state meets')
+            self._notices.append('nobody drove, and the scenario has no planning problem: the '
+                                 'file gets one that every state meets')
             goal = goal_state((0, len(self._log.ks) - 1), '')
             parts.append(self._write(_NOBODY, self._road_start(), [goal]))
         return ''.join(parts)
