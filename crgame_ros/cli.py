@@ -8,8 +8,13 @@ import json
 from pathlib import Path
 import sys
 import time
+from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError, InputError
+
+# A command that needs no engine starts without it.
+if TYPE_CHECKING:
+    from crgame_ros.simulation.offline import OfflineResult
 
 DESCRIPTION = """\
 Tools around crgame_ros, the driving simulator for motion planning.
@@ -125,8 +130,7 @@ def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.launcher.arguments import RunRequest
     from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.recording.run_log import run_log_of
-    from crgame_ros.scenario.export import write_scenario
-    from crgame_ros.simulation.contacts import contacts_of
+    from crgame_ros.scenario.export import prepare_folder, write_scenario
     from crgame_ros.simulation.offline import run_offline
     from crgame_ros.simulation.replay import recorded_inputs
     if values.latency < 0:
@@ -137,9 +141,11 @@ def _offline(values: argparse.Namespace) -> int:
     setup = effective_setup(request)
     for notice in setup.notices:
         print(f'note: {notice}', file=sys.stderr)
-    if values.out is not None and setup.game.duration < setup.scheduler.time_step_s:
-        raise InputError(f'{setup.game.duration} s are less than a time step of the scenario',
-                         '--out', f'let the run last for {setup.scheduler.time_step_s} s or more')
+    if values.out is not None:
+        if setup.game.duration < setup.scheduler.time_step_s:
+            raise InputError(f'{setup.game.duration} s are less than a time step of the scenario',
+                             '--duration', f'give {setup.scheduler.time_step_s} s or more')
+        prepare_folder(values.out)
     drivers, intervals_s = recorded_inputs(setup)
     triggers = [(round(time_s / setup.scheduler.dt_s), name) for name, time_s in values.trigger]
     start_s = time.perf_counter()
@@ -147,9 +153,19 @@ def _offline(values: argparse.Namespace) -> int:
                          intervals_s=intervals_s, clock_s=time.perf_counter,
                          triggers=triggers)
     wall_s = time.perf_counter() - start_s
-    simulated_s = (len(result.vehicle_states) - 1) * setup.scheduler.dt_s
-    report = {
-        'scenario': setup.loaded.benchmark_id, 'simulated_s': round(simulated_s, 6),
+    print(json.dumps(_summary(result, wall_s), indent=2))
+    if values.out is not None:
+        for notice in write_scenario(run_log_of(result), values.out).notices:
+            print(f'note: {notice}', file=sys.stderr)
+    return 0
+
+
+def _summary(result: 'OfflineResult', wall_s: float) -> dict[str, Any]:
+    """Say what came of a run, as JSON has it."""
+    from crgame_ros.simulation.contacts import contacts_of
+    simulated_s = (len(result.vehicle_states) - 1) * result.setup.scheduler.dt_s
+    return {
+        'scenario': result.setup.loaded.benchmark_id, 'simulated_s': round(simulated_s, 6),
         'wall_s': round(wall_s, 3), 'state_hash': result.state_hash,
         'planners': {
             av_id: {'accepted_ratio': round(record.accepted_ratio, 4),
@@ -174,33 +190,18 @@ def _offline(values: argparse.Namespace) -> int:
                       'side': item.side, 'kind': item.kind, 'speed': round(item.speed, 2),
                       'other_speed': round(item.other_speed, 2), 'avoidable_by': item.verdict}
                      for item in contacts_of(result)]}
-    print(json.dumps(report, indent=2))
-    if values.out is not None:
-        _make_folder_of(values.out)
-        for notice in write_scenario(run_log_of(result), values.out).notices:
-            print(f'note: {notice}', file=sys.stderr)
-    return 0
 
 
 def _convert(values: argparse.Namespace) -> int:
     from crgame_ros.recording.conversion import convert
+    from crgame_ros.scenario.export import prepare_folder
     if values.out is not None:
-        _make_folder_of(values.out)
+        prepare_folder(values.out)
     report = convert(values.bag, values.out, values.epoch)
     for notice in report.notices:
         print(f'note: {notice}')
     print(report.path)
     return 0
-
-
-def _make_folder_of(out: Path) -> None:
-    """Make the folder that a scenario goes to, whether it or the file is named."""
-    folder = out.parent if out.suffix == '.xml' else out
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(folder),
-                         'name another file or folder') from error
 
 
 def _recover(values: argparse.Namespace) -> int:

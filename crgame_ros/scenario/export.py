@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
+import errno
 import os
 from pathlib import Path
 from typing import Any
@@ -124,6 +125,23 @@ def scenario_path(out: Path, benchmark_id: str) -> Path:
         raise InputError('a file that is no exported run is there already', str(path),
                          'name another file or folder')
     return path
+
+
+def prepare_folder(out: Path) -> None:
+    """
+    Make the folder of a file that is to be written later, and see that it can be written there.
+
+    :param out: as for `write_scenario`.
+    :raises InputError: if it can't.
+    """
+    folder = out.parent if out.suffix == '.xml' else out
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise InputError(f'cannot be written to ({error.strerror})', str(folder),
+                         'choose another folder') from error
 
 
 def write_text(text: str, path: Path) -> None:

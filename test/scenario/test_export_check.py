@@ -11,6 +11,7 @@ from typing import Any
 from lxml import etree
 import pytest
 
+from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.scenario.export import export_scenario
 from crgame_ros.scenario.game import Game, HumanSpec
@@ -107,6 +108,20 @@ def test_what_cannot_be_written_is_refused_before_the_first_step(
     with pytest.raises(InputError, match=reason) as caught:
         build_setup(Game(file, humans=(HumanSpec('hv0', 'idle'),)))
     assert caught.value.exit_code == 2 and '\n' not in str(caught.value)
+
+
+def test_where_nothing_can_be_written_is_told_before_the_run(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No report of a run comes before the refusal; a file name is a file, not a folder."""
+    (tmp_path / 'file').touch()
+    for arguments, reason in ((('1', str(tmp_path / 'file' / 'x')), 'Not a directory'),
+                              (('0.05', str(tmp_path / 'out')), 'less than a time step')):
+        assert main(['offline', '--duration', arguments[0], '--out', arguments[1]]) == 2
+        told = capsys.readouterr()
+        assert reason in told.err and told.out == ''
+    assert main(['offline', '--duration', '0.2', '--out', str(tmp_path / 'new' / 'run.xml')]) == 0
+    assert '"contacts": []' in capsys.readouterr().out
+    assert (tmp_path / 'new' / 'run.xml').is_file()
 
 
 @pytest.mark.skipif(not BENCHMARKS.is_dir(), reason='part of the source tree only')
