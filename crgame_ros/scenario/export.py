@@ -67,7 +67,8 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
     :raises CrgameError: if the schema refuses the result.
     """
     if len(log.ks) < 2:
-        raise InputError('has no scenario step', 'the run', 'let it last for a time step or more')
+        raise InputError('the run has no scenario step', 'the run',
+                         'let it last for a time step or more')
     loaded = parse_scenario(log.xml_text, '/scenario/xml')
     shift, notices = int(log.ks[0]), [*log.notices]
     if shift:

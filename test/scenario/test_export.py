@@ -133,7 +133,7 @@ def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
     states[1, 0, 3] = np.nan
     cases = [
         (replace(log, ks=log.ks[:1], vehicle_states=log.vehicle_states[:1]),
-         'the run: has no scenario step'),
+         'the run has no scenario step'),
         (replace(log, vehicle_states=states), 'hv0: its state at scenario step 1 holds no number'),
         (replace(log, xml_text=log.xml_text.replace('Problem id="100"', 'Problem id="7"')),
          'planning problem 100 of av0 is not in it')]
