@@ -52,7 +52,8 @@ def announce(plan: RunPlan) -> None:
                         for index, human in enumerate(setup.humans))
     planners = ', '.join(f'{av.id} planned by {av.spec.planner}' for av in setup.avs)
     say(f'{setup.game.title or setup.loaded.benchmark_id}: '
-        + '; '.join(text for text in (drivers, planners) if text))
+        + ('; '.join(text for text in (drivers, planners) if text)
+           or 'nobody drives, traffic is alone'))
     for notice in setup.notices:
         say(f'note: {notice}')
     reach = 'open network' if network_is_open() else 'this machine only'

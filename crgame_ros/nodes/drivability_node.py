@@ -30,6 +30,7 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.simulation.documents import GameDocument
+from crgame_ros.vehicle.state import STATE_WIDTH
 
 PERIOD_S = 0.005
 HEARTBEAT_S = 1.0
@@ -86,7 +87,8 @@ class DrivabilityNode(Node):
             None if place is None else TiledOccupancy(Path(place)),
             road_transforms(len(game.humans), [RigidTransform(*entry['transform'])
                                                for entry in game.avs]))
-        monitor.prepare(np.array([entry['state'] for entry in (*game.humans, *game.avs)]))
+        states = [entry['state'] for entry in (*game.humans, *game.avs)]
+        monitor.prepare(np.array(states).reshape(-1, STATE_WIDTH))
         for item in driven:
             if item.id not in self._reports:
                 self._reports[item.id] = self._endpoints.publisher('/<v>/drivability', item.id)

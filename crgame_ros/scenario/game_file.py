@@ -104,8 +104,6 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
         table['occupancy'] = _map_file(table['occupancy'], where, base)
     table['base'] = base
     game = build(Game, table, where)
-    if not game.humans and game.avs == ():
-        raise InputError('has neither humans nor AVs', where, 'add one of them')
     if game.timing.dt_min > game.timing.dt_max:
         raise InputError('"dt_min" is larger than "dt_max"', f'{where}: timing')
     return game

@@ -219,8 +219,10 @@ class Simulation:
                 av.believed = localisation.estimate
 
     def _add_to_hash(self) -> None:
-        self._hash.update(np.array(self.states, dtype=np.float64).tobytes())
+        # Of traffic alone there is nothing but where it is.
+        rows = self.states or self.objects.poses
+        self._hash.update(np.array(rows, dtype=np.float64).tobytes())
 
     def state_hash(self) -> str:
-        """Give the SHA-256 over every driven vehicle's state at every step so far."""
+        """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""
         return self._hash.hexdigest()

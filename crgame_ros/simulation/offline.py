@@ -31,7 +31,7 @@ from crgame_ros.simulation.drivers import offline_driver
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 
 DEFAULT_DURATION_S = 20.0
 
@@ -233,7 +233,7 @@ class _Trace:
     """Collects a run's states and violations."""
 
     def __init__(self, setup: Setup, steps: int, check: bool) -> None:
-        self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), 8))
+        self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), STATE_WIDTH))
         self.commands = np.zeros((steps + 1, len(setup.humans), 4))
         self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
@@ -252,7 +252,7 @@ class _Trace:
         ) if check or setup.game.drivability.stop else None
         if self._monitor is not None:
             self._monitor.prepare(np.array([
-                vehicle.state for vehicle in setup.vehicles]))
+                vehicle.state for vehicle in setup.vehicles]).reshape(-1, STATE_WIDTH))
 
     def result(self, simulation: Simulation,
                planners: Mapping[str, PlannerRecord]) -> OfflineResult:
@@ -269,7 +269,7 @@ class _Trace:
         for index, command in enumerate(simulation.commands):
             if command is not None:
                 self.intervals_s[n, index] = effective_s
-        self.vehicles[n] = simulation.states
+        self.vehicles[n] = np.reshape(simulation.states, (-1, STATE_WIDTH))
         for index in range(self.commands.shape[1]):
             self.commands[n, index] = simulation.commands[index] or RELEASED
         if result.objects is not None:

@@ -203,9 +203,6 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
         timeline = load_timeline(source, game.base).to_text() if source.has_timeline else ''
         humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline,
                                  spec.dynamics))
-    if not humans and not avs:
-        raise InputError('has neither humans nor planning problems', loaded.source,
-                         'add a human to the game')
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
     setup = Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler,
                   tuple(notices))
@@ -213,6 +210,9 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
                  [(human.id, human.dynamics, human.vehicle) for human in humans])
     setup.open_occupancy()
     setup = _with_living(setup)
+    if not setup.descriptions:
+        raise InputError('nobody takes part: no human, no planning problem, no traffic and no '
+                         'obstacle', loaded.source, 'add one of them to the game')
     refuse_unwritable(loaded, setup.obstacles.descriptions,
                       [av.planning_problem.planning_problem_id for av in avs])
     return setup

@@ -152,7 +152,6 @@ MALFORMED = {
                        '"planning_problem" is \'first\'', 'give a number'),
     'AV spawn': ('scenario: a.xml\navs: [{spawn: somewhere}]\n', '"spawn" is \'somewhere\'',
                  'use one of problem, lanelet'),
-    'nobody': ('scenario: a.xml\nhumans: []\navs: []\n', 'neither humans nor AVs', 'add one'),
     'prediction mode': ('scenario: a.xml\nprediction: {mode: oracle}\n',
                         'prediction: "mode" is \'oracle\'', 'constant, recorded, plans'),
     'prediction horizon': ('scenario: a.xml\nprediction: {horizon: 600}\n',

@@ -136,8 +136,8 @@ def test_step_of_the_run_divides_the_scenarios(cut_in: LoadedScenario) -> None:
 
 
 def test_run_without_anybody_is_refused(cut_in: LoadedScenario) -> None:
-    """No human and no planning problem: nothing would move."""
-    with pytest.raises(InputError, match='neither humans nor planning problems'):
+    """No human, no planning problem, no traffic, no obstacle: nothing would move."""
+    with pytest.raises(InputError, match='nobody takes part'):
         support.setup_of(replace(cut_in, planning_problems=()))
 
 

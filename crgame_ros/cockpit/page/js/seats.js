@@ -48,10 +48,13 @@ class Seats {
     this.#live.forEach((node) => setAttribute(node, 'hidden', mode === 'replay'));
     setAttribute(this.#replay, 'hidden', mode !== 'replay');
     const rows = this.#order().map((id) => this.#facts(id));
-    const text = JSON.stringify(rows);
+    const none = this.#store.scene?.vehicles.length === 0
+      ? 'Traffic is alone in this game: there is no seat to take.'
+      : 'No seats: the simulation has not told of any yet.';
+    const text = JSON.stringify([rows, none]);
     if (text !== this.#shown) {
       this.#shown = text;
-      this.#rebuild(rows);
+      this.#rebuild(rows, none);
     }
     if (!this.#stale) {
       this.#tell(seats);
@@ -85,12 +88,11 @@ class Seats {
     };
   }
 
-  #rebuild(rows) {
+  #rebuild(rows, none) {
     const focused = document.activeElement?.dataset?.key;
     this.#list.replaceChildren(...rows.map((facts) => this.#row(facts)));
     if (rows.length === 0) {
-      this.#list.append(element('li', { class: 'drive-note',
-        text: 'No seats: the simulation has not told of any yet.' }));
+      this.#list.append(element('li', { class: 'drive-note', text: none }));
     }
     if (focused) {
       this.#list.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
