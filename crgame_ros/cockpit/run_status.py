@@ -41,6 +41,7 @@ class RunStatus:
 
     def __init__(self) -> None:
         self.run = 'waiting'
+        self.awaited: list[str] = []
         self.real_time_factor = 1.0
         self.recording: dict[str, Any] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
                                           'text': 'nothing is recorded'}
@@ -110,8 +111,9 @@ class RunStatus:
 
     def document(self) -> dict[str, Any]:
         """Give what the status document says of the run's health."""
-        return {'run': self.run, 'real_time_factor': self.real_time_factor,
-                'recording': self.recording, 'timing': self.timing, 'planners': self.planners,
+        return {'run': self.run, 'awaited': self.awaited,
+                'real_time_factor': self.real_time_factor, 'recording': self.recording,
+                'timing': self.timing, 'planners': self.planners,
                 'drivability': self.drivability, 'seats_lost': self.seats_lost}
 
     def alarms_document(self) -> dict[str, Any]:
@@ -135,6 +137,7 @@ class RunStatus:
 
     def _take_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
         self.run = text
+        self.awaited = [item for item in values.get('awaited', '').split(',') if item]
         self.real_time_factor = _number(values.get('real_time_factor')) or 1.0
 
     def _take_traffic(self, level: int, text: str, _: Mapping[str, str], t: float) -> None:

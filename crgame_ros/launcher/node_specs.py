@@ -28,8 +28,8 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     viewers = _viewer_specs(plan)
     # With a driver in the browser the run begins when somebody has taken the seat, and step 0
     # must reach the page.
-    paused = any(human.driver == COCKPIT for human in setup.humans)
-    drivers = [spec for spec in viewers if paused and spec.executable == 'cockpit_node']
+    waits = any(human.driver == COCKPIT for human in setup.humans)
+    drivers = [spec for spec in viewers if waits and spec.executable == 'cockpit_node']
     waiting = ', '.join(f'"{spec.name}"' for spec in (*companions, *drivers))
     # Later games may come from the page, and from where the first one was.
     folders = [plan.cockpit / 'games']
@@ -40,7 +40,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
         'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
         'realtime_priority': str(request.realtime_priority).lower(),
         'scenario_directories': f'[{directories}]', 'roster': f'"{plan.roster}"',
-        'start_paused': str(paused).lower(), 'wait_for': f'[{waiting}]'})
+        'wait_for': f'[{waiting}]'})
     return [simulation, *companions, *viewers]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from crgame_ros.driver.source import is_replay
+from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.errors import CrgameError
 from crgame_ros.ros.live_run import LiveRun, Outcome
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -49,6 +49,9 @@ class SimNode(Node):
         self._control.paused = self._control.starts_paused
         epoch, offset_ns = 0, FIRST_OFFSET_NS
         while True:
+            # With a driver in the browser each run begins when somebody says so.
+            if not self._control.started:
+                self._control.paused |= any(item.driver == COCKPIT for item in setup.humans)
             run = LiveRun(self, self._executor, self._control, setup, epoch, offset_ns,
                           self._recorded)
             outcome = run.run(stop)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What sim_node tells of its planners and seats on /diagnostics."""
 
+from collections.abc import Mapping
+
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from crgame_ros.ros.sim_inputs import SimInputs
@@ -31,13 +33,13 @@ class LiveDiagnostics:
                 f'{av_id} plan refused', DiagnosticStatus.WARN, reason, {'n': simulation.n},
                 simulation.scheduler.stamp_ns(simulation.n))
 
-    def run_state(self, state: str, real_time_factor: float) -> None:
+    def run_state(self, state: str, more: Mapping[str, object]) -> None:
         """Tell whether the run is waiting, running, paused or ended."""
         simulation = self._simulation
         self._outputs.publish_diagnostics(
             'run', DiagnosticStatus.OK, state,
-            {'n': simulation.n, 'k': simulation.scheduler.k(simulation.n),
-             'real_time_factor': real_time_factor}, simulation.scheduler.stamp_ns(simulation.n))
+            {'n': simulation.n, 'k': simulation.scheduler.k(simulation.n), **more},
+            simulation.scheduler.stamp_ns(simulation.n))
 
     def late_traffic(self, n: int, k: int, agents_k: int) -> None:
         """Tell that agents of an earlier tick had to do."""

@@ -16,6 +16,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.ros.live_diagnostics import LiveDiagnostics
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.remote_traffic import RemoteTraffic
+from crgame_ros.ros.run_state import RunState
 from crgame_ros.ros.sim_control import SimControl
 from crgame_ros.ros.sim_inputs import SimInputs
 from crgame_ros.ros.sim_outputs import SimOutputs
@@ -35,8 +36,6 @@ SERVICE_SLACK_NS = 1_500_000
 # The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
 WAKE_UP_NS = 120_000
 SETTLE_NS = 200_000_000
-# Discovery is not the same on both sides for up to a second or two.
-NEWCOMERS_NS = 3 * NS_PER_S
 
 
 class Outcome(Enum):
@@ -77,6 +76,7 @@ class LiveRun:
         self._dt_s = scheduler.dt_s
         self._controller = TimeController(setup.game.timing, self._dt_s)
         self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
+        self._state = RunState(self._outputs, self.simulation, self._diagnostics, control)
         duration_s = control.duration_s or setup.game.duration
         self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
         self._feed = feed
@@ -88,9 +88,6 @@ class LiveRun:
         self._sleep_from_ns = 0
         self._stepped = 0
         self._stop = StopFlag()
-        self._state, self._state_ns = '', 0
-        self._listeners = 0
-        self._shown_ns = self._show_until_ns = 0
 
     def run(self, stop: StopFlag) -> Outcome:
         """Run until the game's end, a reset or a stop."""
@@ -118,7 +115,7 @@ class LiveRun:
             gc.unfreeze()
             self._outputs.publish_rows()
             self._diagnostics.publish(self.simulation.n)
-            self._tell_state('ended')
+            self._state.tell('ended')
             self._outputs.wait_until_received()
 
     def destroy(self) -> None:
@@ -135,42 +132,24 @@ class LiveRun:
     def _wait_for_companions(self, result: StepResult) -> Outcome | None:
         """Stay at step 0 until everybody is there, or an order ends it."""
         control = self._control
-        self._tell_state('waiting')
+        self._state.tell('waiting')
         gate = StartGate(self._outputs, self._inputs, self.simulation, result,
                          control.companions, self._take_plan, self._node.get_logger().warning,
                          None if self._feed is None else self._feed.is_ahead)
-        while not (is_open := gate.is_open(time.monotonic_ns(), control.planner_timeout_s)) \
-                or self._stands_still():
+        while True:
+            now_ns = time.monotonic_ns()
+            is_open = gate.is_open(now_ns, control.planner_timeout_s)
+            control.awaited = self._inputs.seats.awaited(now_ns)
+            if is_open and not self._stands_still() and not control.awaited:
+                return None
+            self._state.tell('paused' if is_open and self._stands_still() else 'waiting')
             self._executor.spin_once(timeout_sec=0.005)
-            self._tell_state('paused' if is_open else 'waiting')
             if is_open:
-                self._show_newcomers(time.monotonic_ns())
+                self._state.show_newcomers()
             self._take_orders(time.monotonic_ns())
             outcome = self._ordered_end()
             if outcome is not None:
                 return outcome
-        return None
-
-    def _tell_state(self, state: str) -> None:
-        """Tell a new state at once, and the present one every second."""
-        now_ns = time.monotonic_ns()
-        if state != self._state or now_ns - self._state_ns > NS_PER_S:
-            self._state, self._state_ns = state, now_ns
-            self._diagnostics.run_state(state, self._control.real_time_factor)
-
-    def _show_newcomers(self, now_ns: int) -> None:
-        """
-        Send the world that stands still to who has come since it was published.
-
-        Who has just come may not hear the first message yet: it is told again for a while.
-        """
-        listeners = self._outputs.listeners
-        if listeners > self._listeners:
-            self._show_until_ns = now_ns + NEWCOMERS_NS
-        self._listeners = listeners
-        if self._shown_ns + NS_PER_S < now_ns < self._show_until_ns:
-            self._shown_ns = now_ns
-            self._outputs.resend_world(self.simulation)
 
     def _ordered_end(self) -> Outcome | None:
         control = self._control
@@ -263,13 +242,13 @@ class LiveRun:
 
     def _stay_paused(self) -> None:
         """Serve orders while everything else stands still."""
-        self._listeners = self._outputs.listeners
+        self._state.stand()
         self._outputs.publish_rows()
-        self._tell_state('paused')
+        self._state.tell('paused')
         while self._stands_still() and self._ordered_end() is None:
             self._executor.spin_once(timeout_sec=0.02)
-            self._tell_state('paused')
-            self._show_newcomers(time.monotonic_ns())
+            self._state.tell('paused')
+            self._state.show_newcomers()
             self._take_orders(time.monotonic_ns())
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)
@@ -317,7 +296,7 @@ class LiveRun:
 
     def _at_tick(self, result: StepResult) -> None:
         """Do what is due with the scenario's time."""
-        self._tell_state('running')
+        self._state.tell('running')
         for event in result.fired:
             self._node.get_logger().info(
                 f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')

@@ -29,6 +29,8 @@ MAX_SOURCE_LENGTH = 40
 COMMAND_DEPTH = 10
 # Orders read in one cycle: a flood must not cost it.
 MAX_ORDERS = 10
+# A page with somebody's hands on the controls says so every 50 ms [ns].
+PRESENT_NS = 500_000_000
 
 
 class Seat:
@@ -111,6 +113,13 @@ class Seat:
         return self.recording is not None and self.source == self.home \
             and self.recording.drives(n)
 
+    def awaits_driver(self, now_ns: int) -> bool:
+        """Tell whether the game leaves the seat to the cockpit and no hands are on the controls."""
+        if self.home != COCKPIT or self.source != COCKPIT:
+            return False
+        self.listen(now_ns)
+        return self._heard_ns is None or now_ns - self._heard_ns > PRESENT_NS
+
     def command(self, now_ns: int, dt_s: float, speed: float, n: int = 0) -> DriverCommand | None:
         """
         Give the command for this cycle; released, then gentle braking, after a loss.
@@ -180,6 +189,10 @@ class Seats:
               for seat, human in zip(self.humans, simulation.humans, strict=True)),
             *(seat.command(now_ns, dt_s, av.state.speed, n)
               for seat, av in zip(self.avs, simulation.avs, strict=True))]
+
+    def awaited(self, now_ns: int) -> tuple[str, ...]:
+        """Name the seats whose driver must come before the run can begin."""
+        return tuple(seat.id for seat in self.humans if seat.awaits_driver(now_ns))
 
     def document(self) -> str:
         """Write /seats."""

@@ -32,6 +32,10 @@ class SimControl:
         self.steps_wanted = 0
         self.reset_wanted = False
         self.stop_wanted = False
+        # Somebody has said start since the last reset.
+        self.started = False
+        # Seats whose driver must come before the run begins.
+        self.awaited: tuple[str, ...] = ()
         self.seat_sources: dict[str, str] = {}
         self._declare()
         # Read at every cycle, so kept beside the parameter.
@@ -173,8 +177,9 @@ class SimControl:
                 self.real_time_factor = float(parameter.value)
 
     def _on_start(self, _: Any, response: Any) -> Any:
-        self.paused = False
-        return _answer(response, True, 'running')
+        self.paused, self.started = False, True
+        return _answer(response, True, f'waiting for the driver of {" and ".join(self.awaited)}'
+                       if self.awaited else 'running')
 
     def _on_pause(self, _: Any, response: Any) -> Any:
         self.paused = True
@@ -187,7 +192,7 @@ class SimControl:
         return _answer(response, True, 'advancing by one scenario step')
 
     def _on_reset(self, _: Any, response: Any) -> Any:
-        self.reset_wanted = True
+        self.reset_wanted, self.started = True, False
         return _answer(response, True, 'resetting')
 
     def _on_stop(self, _: Any, response: Any) -> Any:

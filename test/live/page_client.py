@@ -26,6 +26,7 @@ class PageClient:
     """
 
     def __init__(self, page: str) -> None:
+        self.page = page
         address = urlsplit(page)
         self._socket = websocket.create_connection(
             f'ws://{address.netloc}/ws', origin=f'http://{address.netloc}', timeout=30)

@@ -254,11 +254,16 @@ def test_another_game_with_more_vehicles(graph: Graph, page: PageClient) -> None
     wait_until(lambda: page.documents['scene']['time']['epoch'] > before, 'the new game')
     assert [vehicle['id'] for vehicle in page.documents['scene']['vehicles']] \
         == ['hv0', 'av0', 'av1']
+    assert page.request('claim', seat='hv0')['ok']
+    page.hold_keys('hv0', [0, 0, 0, 0])
+    assert page.request('control', action='start')['ok']
     wait_until(lambda: page.documents['status']['planners'].get('av1', {}).get('accepted', 0) > 5,
                'plans of the second AV')
     assert graph.launcher.says('planner_node_av1: process')
     assert page.documents['status']['planners']['av1']['planner'] == 'constant-velocity'
     assert page.documents['seats']['seats']['hv0']['driver'] == 'cockpit'
+    page.let_go()
+    assert page.request('release', seat='hv0')['ok']
     steady = next(entry for entry in entries if entry['name'] == 'cut_in.yaml')
     _post(f'{graph.page}api/load', {'id': steady['id'], 'humans': [], 'avs': []})
     wait_until(lambda: len(page.documents['scene']['vehicles']) == 2, 'the first game')
