@@ -73,7 +73,8 @@ def launched(folder: Path, *arguments: str) -> Iterator[str]:
     with log.open('wb') as stream:
         process = subprocess.Popen(
             [sys.executable, '-m', 'crgame_ros.launcher.main', '--port', port, *arguments],
-            stdout=stream, stderr=subprocess.STDOUT, env=environment, start_new_session=True)
+            stdout=stream, stderr=subprocess.STDOUT, env=environment, start_new_session=True,
+            cwd=folder)
     try:
         yield address(process, log)
     finally:
@@ -248,11 +249,21 @@ def take_perception(folder: Path) -> None:
         shoot(person.browser, 'perception')
 
 
+def take_over(folder: Path) -> None:
+    """Let a script drive to the end of its game, and see what the page says then."""
+    # Where its files are is in the picture, too: as with run.sh.
+    with page(folder, 'light', str(scenarios_directory() / 'merge.yaml')) as person:
+        person.browser.wait("document.querySelector('.outcome-files[data-complete]')",
+                            'the end of the run', START_LIMIT_S)
+        time.sleep(SETTLES_S)
+        shoot(person.browser, 'over')
+
+
 SESSIONS = (
     Session(('driving',), take_driving), Session(('light',), take_light),
     Session(('4k',), take_4k), Session(('history', 'timing'), take_figures),
     Session(('events', 'scenario'), take_events), Session(('alarm', 'replay'), take_alarm),
-    Session(('perception',), take_perception),
+    Session(('perception',), take_perception), Session(('over',), take_over),
 )
 
 

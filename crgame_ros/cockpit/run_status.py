@@ -40,8 +40,6 @@ class RunStatus:
     """Takes statuses of `/diagnostics` and `/<v>/drivability` as they come."""
 
     def __init__(self) -> None:
-        self.run = 'waiting'
-        self.awaited: list[str] = []
         self.real_time_factor = 1.0
         self.recording: dict[str, Any] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
                                           'text': 'nothing is recorded'}
@@ -58,11 +56,21 @@ class RunStatus:
     def begin(self, vehicles: Sequence[str]) -> None:
         """Begin a run with these vehicles."""
         self._vehicles = tuple(vehicles)
+        self.run = 'waiting'
+        self.reason = ''
+        self.stays = False
+        self.awaited: list[str] = []
         self.timing: dict[str, Any] | None = None
         self.planners: dict[str, dict[str, Any]] = {}
         self.drivability: dict[str, dict[str, Any]] = {}
         self.seats_lost = {}
+        self.contacts: list[dict[str, Any]] = []
+        self.departures: list[dict[str, Any]] = []
         self._traffic_late_t = -math.inf
+        self._calm()
+
+    def _calm(self) -> None:
+        """Forget what is wrong, but for the recording."""
         self._alarms = {key: alarm for key, alarm in self._alarms.items()
                         if alarm.kind == 'recording'}
 
@@ -109,12 +117,21 @@ class RunStatus:
         elif node == 'driver_node':
             self._alarm('lost_device', vehicle, level == ERROR, text, t)
 
+    def lose(self) -> None:
+        """Take note that the simulation is silent."""
+        if self.run != 'ended':
+            self.run, self.reason = 'ended', 'silence'
+            self._calm()
+
     def document(self) -> dict[str, Any]:
         """Give what the status document says of the run's health."""
-        return {'run': self.run, 'awaited': self.awaited,
+        over = self.run == 'ended'
+        return {'run': self.run, 'reason': self.reason, 'stays': self.stays,
+                'awaited': self.awaited, 'contacts': self.contacts,
+                'departures': self.departures,
                 'real_time_factor': self.real_time_factor, 'recording': self.recording,
                 'timing': self.timing, 'planners': self.planners,
-                'drivability': self.drivability, 'seats_lost': self.seats_lost}
+                'drivability': self.drivability, 'seats_lost': {} if over else self.seats_lost}
 
     def alarms_document(self) -> dict[str, Any]:
         """Give the alarms document."""
@@ -124,7 +141,8 @@ class RunStatus:
 
     def _alarm(self, kind: str, subject: str, on: bool, text: str, t: float) -> None:
         alarm = Alarm(kind, subject, text, t)
-        if not on:
+        # What still stands when a run has ended is told as its result.
+        if not on or (self.run == 'ended' and kind != 'recording'):
             self._alarms.pop(alarm.id, None)
         elif alarm.id not in self._alarms or self._alarms[alarm.id].text != text:
             self._alarms[alarm.id] = alarm
@@ -136,7 +154,10 @@ class RunStatus:
             'last_refusal': '', 'tracking': None})
 
     def _take_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
-        self.run = text
+        self.run, self.reason = text, values.get('reason', '')
+        self.stays = values.get('stays') == 'True'
+        if text == 'ended':
+            self._calm()
         self.awaited = [item for item in values.get('awaited', '').split(',') if item]
         self.real_time_factor = _number(values.get('real_time_factor')) or 1.0
 
@@ -157,7 +178,8 @@ class RunStatus:
         failed = level == ERROR
         megabytes = (_number(values.get('bytes')) or 0.0) / 1e6
         self.recording = {
-            'state': 'failed' if failed else 'recording', 'text': text,
+            'state': 'failed' if failed else
+            'recorded' if values.get('closed') == 'True' else 'recording', 'text': text,
             'messages': int(_number(values.get('messages')) or 0), 'megabytes': megabytes}
         self._alarm('recording', 'recorder', failed, text, t)
 
@@ -165,9 +187,23 @@ class RunStatus:
         collision = values.get('collision') == 'true'
         off_road = values.get('road_compliance') == 'false'
         hit = [item for item in values.get('hit', '').split(',') if item]
+        self._note_violations(vehicle, hit, off_road, t)
         self.drivability[vehicle] = {'collision': collision, 'off_road': off_road, 'hit': hit}
         self._alarm('collision', vehicle, collision, 'collision with ' + ', '.join(hit), t)
         self._alarm('off_road', vehicle, off_road, 'off the road', t)
+
+    def _note_violations(self, vehicle: str, hit: Sequence[str], off_road: bool,
+                         t: float) -> None:
+        """Note what a verdict says that the one before did not."""
+        nothing: dict[str, Any] = {'hit': (), 'off_road': False}
+        before = self.drivability.get(vehicle, nothing)
+        for other in hit:
+            # Both of two driven vehicles tell of their contact.
+            told = vehicle in self.drivability.get(other, nothing)['hit']
+            if other not in before['hit'] and not told:
+                self.contacts.append({'vehicle': vehicle, 'with': other, 't': t})
+        if off_road and not before['off_road']:
+            self.departures.append({'vehicle': vehicle, 't': t})
 
     def _take_plans(self, vehicle: str, level: int, text: str, values: Mapping[str, str],
                     t: float) -> None:

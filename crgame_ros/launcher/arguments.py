@@ -92,7 +92,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--problem', action='append', type=int, default=[], metavar='ID', dest='problems',
         help=PROBLEM_HELP)
     add('--duration', type=_positive, metavar='S', dest='duration_s',
-        help="end after so many simulated seconds (default: the game's, else Ctrl-C)")
+        help='end after so many simulated seconds (default: a run lasts as long as its game says, '
+        'and the program stays for the next one until Ctrl-C, unless it is headless)')
     add('--rate', type=_positive, metavar='R', dest='rate_hz',
         help="simulation rate in Hz (default: the game's, else 100)")
     add('--real-time-factor', type=_factor, default=1.0, metavar='F',

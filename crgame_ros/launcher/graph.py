@@ -9,6 +9,7 @@ import signal
 import time
 from types import FrameType
 
+from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
 from crgame_ros.launcher.node_specs import Roster
 
@@ -26,12 +27,14 @@ class Graph:
     :param specs: the nodes; the first is the one whose end ends the run.
     :param say: prints one line.
     :param roster: tells of further vehicles, which get their nodes.
+    :param finisher: finishes the recordings of runs that are over.
     """
 
     def __init__(self, specs: Sequence[NodeSpec], say: Callable[[str], None],
-                 roster: Roster | None = None) -> None:
+                 roster: Roster | None = None, finisher: Finisher | None = None) -> None:
         self._say = say
         self._roster = roster
+        self._finisher = finisher
         self._selector = selectors.DefaultSelector()
         self._signal: int | None = None
         self._restarts: dict[str, int] = {}
@@ -55,6 +58,8 @@ class Graph:
                 self._relay(0.1)
                 self._look_after(first)
                 self._welcome()
+                if self._finisher is not None:
+                    self._finisher.look()
             return self._end(first)
         finally:
             for node in self._nodes.values():

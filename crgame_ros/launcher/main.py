@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command behind `run.sh`: check, run, and turn the recording into a scenario."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 import os
 import sys
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import parse_arguments
+from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.launcher.graph import Graph
 from crgame_ros.launcher.node_specs import node_specs, Roster
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
@@ -34,8 +34,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                                 say=say)
         plan = plan_run(request)
         announce(plan)
-        code = Graph(node_specs(plan), say, Roster(plan.roster)).run()
-        return max(code, finish(plan))
+        finisher = Finisher(plan.folder, say)
+        code = Graph(node_specs(plan), say, Roster(plan.roster), finisher).run()
+        plan.roster.unlink(missing_ok=True)
+        return max(code, finisher.finish_all())
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)
         return error.exit_code
@@ -58,40 +60,6 @@ def announce(plan: RunPlan) -> None:
         say(f'note: {notice}')
     reach = 'open network' if network_is_open() else 'this machine only'
     say(f'ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]} ({reach}); files go to {plan.folder}')
-
-
-def finish(plan: RunPlan) -> int:
-    """
-    Complete the recording and derive the scenario and the timing report from it.
-
-    :return: 0, or 1 if something could not be written.
-    """
-    from crgame_ros.recording.conversion import convert
-    from crgame_ros.recording.recover import recover
-    from crgame_ros.recording.timing_report import write_timing_report
-    if not plan.bag.is_dir():
-        say('nothing was recorded: the run ended before its first step')
-        return 1
-    plan.roster.unlink(missing_ok=True)
-    code = 0
-    # A reset begins another bag, a recorder that was started again too.
-    bags = sorted(path for path in plan.folder.glob(f'{plan.bag.name}*') if path.is_dir())
-    steps: list[Callable[[], object]] = [partial(recover, bag) for bag in bags]
-    for bag in bags:
-        # The first bag gives the run's files their names, later ones their own.
-        suffix = bag.name.removeprefix(plan.bag.name)
-        timing = plan.folder / f'timing{suffix}.json'
-        scenario = plan.folder / f'{bag.name}.xml' if suffix else plan.folder
-        steps += [partial(write_timing_report, bag, timing), partial(convert, bag, scenario)]
-    for step in steps:
-        try:
-            step()
-        except (CrgameError, OSError) as error:
-            say(f'error: {error}')
-            code = 1
-    for path in sorted(plan.folder.iterdir()):
-        say(f'  {path}')
-    return code
 
 
 if __name__ == '__main__':

@@ -6,9 +6,11 @@ import json
 from pathlib import Path
 
 from crgame_ros.driver.source import COCKPIT, is_replay
+from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.node_process import NodeSpec
 from crgame_ros.launcher.run_plan import RunPlan
 from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.simulation.roster import Participants
 
 COMPANION_NICE = 5
@@ -37,11 +39,19 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
         folders.append(request.game.resolve().parent)
     directories = ', '.join(f'"{folder}"' for folder in folders)
     simulation = NodeSpec('sim_node', 'sim_node', {
+        'at_end': at_end(request), 'folder': f'"{plan.folder}"',
         'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
         'realtime_priority': str(request.realtime_priority).lower(),
         'scenario_directories': f'[{directories}]', 'roster': f'"{plan.roster}"',
         'wait_for': f'[{waiting}]'})
     return [simulation, *companions, *viewers]
+
+
+def at_end(request: RunRequest) -> str:
+    """Say what follows the end of a run: who can begin another one wants to see how it went."""
+    if request.headless:
+        return EXIT
+    return STAY if request.duration_s is None else STAY_IF_CHOSEN
 
 
 def participant_specs(who: Participants) -> list[NodeSpec]:
@@ -69,7 +79,8 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
         viewers.append(NodeSpec('cockpit_node', 'cockpit_node', {
             'port': str(request.port), 'listen': f'"{request.listen or "127.0.0.1"}"',
             'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
-            'directory': f'"{plan.cockpit}"'}, nice=COMPANION_NICE, restart=True))
+            'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"'},
+            nice=COMPANION_NICE, restart=True))
     return viewers
 
 

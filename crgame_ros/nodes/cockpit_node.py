@@ -33,6 +33,9 @@ class CockpitNode(Node):
         self._folders: list[str] = declare('folders', [''], ParameterDescriptor(
             description="folders of games and scenarios beside the package's own",
             read_only=True)).value
+        self._runs: str = declare('runs', '', ParameterDescriptor(
+            description="folder of the session's files, which the page names; none if empty",
+            read_only=True)).value
         self._work: str = declare('directory', 'cockpit', ParameterDescriptor(
             description='folder for uploaded scenarios and for the games that people choose',
             read_only=True)).value
@@ -46,7 +49,7 @@ class CockpitNode(Node):
         folders += [(Path(item).name, Path(item)) for item in self._folders if item]
         work = Path(self._work)
         access = Access.guarded(self._host, self._port)
-        app = create_app(LiveBackend(self), access,
+        app = create_app(LiveBackend(self, Path(self._runs) if self._runs else None), access,
                          Library(folders, work / 'uploads', work / 'games'))
         runner, port = await listen(app, self._host, self._port)
         if port != self._port:

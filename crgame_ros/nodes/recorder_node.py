@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""recorder_node: every recorded topic of the contract, raw, into MCAP; one bag an epoch."""
+"""recorder_node: every recorded topic of the contract, raw, into MCAP; one bag a run."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +15,11 @@ from std_msgs.msg import String
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import TopicQos
+from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.recording.writer import BagWriter
 from crgame_ros.ros.contract import load_contract, Topic
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.spinning import poll
 from crgame_ros.simulation.documents import GAME_TOPIC, parse_game_document
@@ -26,6 +28,9 @@ PERIOD_S = 0.01
 REPORT_S = 1.0
 # Ten seconds of the busiest topic fit into the queue, should the disk stall.
 QUEUE_DEPTH = 2000
+DIAGNOSTICS_TOPIC = '/diagnostics'
+# After a run has ended, what the others said last is taken in [s].
+DRAIN_S = 0.3
 
 
 @dataclass
@@ -51,13 +56,16 @@ class RecorderNode(Node):
         super().__init__('recorder_node')
         self._directory = Path(self.declare_parameter(
             'directory', 'bag', ParameterDescriptor(
-                description='folder of the bag; later epochs go to <directory>_1, _2, …',
+                description='folder of the bag; those of later runs have its name and are in '
+                'run_2, run_3, … beside it',
                 read_only=True)).value)
         self._endpoints = Endpoints(self)
         self._diagnostics = self._endpoints.publisher('/diagnostics')
         self._topics: dict[str, RecordedTopic] = {}
         self._writer: BagWriter | None = None
-        self._bags = 0
+        self._offset_ns = 0
+        self._ended_s: float | None = None
+        self._closed: dict[str, int] | None = None
         self._game_text = b''
         self._report_s = 0.0
         self._subscribe((), ())
@@ -97,12 +105,18 @@ class RecorderNode(Node):
                 self._writer.flush_if_due()
             except RecordingError as error:
                 self._tell(error)
-            if time.monotonic() - self._report_s > REPORT_S:
-                self._report_s = time.monotonic()
-                self._report(self._writer)
+            if self._ended_s is not None and time.monotonic() - self._ended_s > DRAIN_S:
+                self._close()
+        if time.monotonic() - self._report_s > REPORT_S:
+            self._report_s = time.monotonic()
+            self._report(self._writer)
 
-    def _report(self, writer: BagWriter) -> None:
-        """Tell how the recording is going."""
+    def _report(self, writer: BagWriter | None) -> None:
+        """Tell how the recording is going, or that it is done."""
+        if writer is None:
+            if self._closed is not None:
+                self._publish_status(DiagnosticStatus.OK, 'recorded', self._closed)
+            return
         failed = writer.failed is not None
         self._publish_status(
             DiagnosticStatus.ERROR if failed else DiagnosticStatus.OK,
@@ -122,7 +136,18 @@ class RecorderNode(Node):
                 if recorded.name == GAME_TOPIC and data != self._game_text:
                     self._begin_bag(data)
                     continue
+            elif recorded.name == DIAGNOSTICS_TOPIC and b'sim_node: run' in data \
+                    and b'ended' in data:
+                self._take_end(data)
             self._write(recorded, data, published_ns, received_ns)
+
+    def _take_end(self, data: bytes) -> None:
+        """Note that the run has ended; an end that is told late may be that of the run before."""
+        message: DiagnosticArray = deserialize_message(data, DiagnosticArray)
+        if self._ended_s is None and from_time(message.header.stamp) >= self._offset_ns \
+                and any(item.name == 'sim_node: run' and item.message == 'ended'
+                        for item in message.status):
+            self._ended_s = time.monotonic()
 
     def _begin_bag(self, game_data: bytes) -> None:
         """Open the bag of a new game, with every latched message that is already there."""
@@ -133,8 +158,9 @@ class RecorderNode(Node):
             self._close()
             self._subscribe(tuple(entry['id'] for entry in game.humans),
                             tuple(entry['id'] for entry in game.avs))
-            self._writer = BagWriter(self._next_folder(), now_ns=time.monotonic_ns)
-            self._bags += 1
+            self._writer = BagWriter(self._folder_of(game.epoch), now_ns=time.monotonic_ns)
+            self._offset_ns, self._ended_s = game.scheduler.clock_offset_ns, None
+            self._closed = None
             for recorded in self._topics.values():
                 qos = recorded.topic.qos
                 recorded.channel = self._writer.add_topic(
@@ -148,10 +174,14 @@ class RecorderNode(Node):
         except CrgameError as error:
             self._tell(error)
 
-    def _next_folder(self) -> Path:
-        if self._bags == 0:
-            return self._directory
-        return self._directory.with_name(f'{self._directory.name}_{self._bags}')
+    def _folder_of(self, epoch: int) -> Path:
+        """Choose a folder; a simulation that was started again begins with the first run anew."""
+        folder = wanted = run_folder(self._directory.parent, epoch) / self._directory.name
+        number = 1
+        while folder.exists():
+            number += 1
+            folder = wanted.with_name(f'{wanted.name}_{number}')
+        return folder
 
     def _write(self, recorded: RecordedTopic, data: bytes, published_ns: int,
                received_ns: int) -> None:
@@ -177,6 +207,9 @@ class RecorderNode(Node):
             self._tell(error)
             return
         if writer.failed is None:
+            self._closed = {'messages': writer.message_count, 'bytes': writer.bytes_written,
+                            'closed': True}
+            self._report(None)
             self.get_logger().info(f'{writer.message_count} messages in {writer.folder}')
 
 

@@ -12,9 +12,12 @@ from rclpy.node import Node
 
 from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.errors import CrgameError
+from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.live_run import LiveRun, Outcome
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.sim_control import SimControl
+from crgame_ros.scenario.game import Game
+from crgame_ros.scenario.game_file import dump_game
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.timing.time_slice import shorten_time_slice
@@ -60,6 +63,9 @@ class SimNode(Node):
             self.get_logger().info(
                 f'{outcome.name.lower()} at {(now_ns - offset_ns) / NS_PER_S:.2f} s '
                 f'(n = {simulation.n})')
+            if outcome is not Outcome.RESET and self._control.stays and not stop.requested:
+                self.get_logger().info('the page can begin another run; Ctrl-C ends everything')
+                outcome = run.linger()
             run.destroy()
             if outcome is not Outcome.RESET:
                 return
@@ -67,6 +73,7 @@ class SimNode(Node):
             self._control.steps_wanted = 0
             setup = self._next_setup(setup)
             epoch += 1
+            self._write_game(setup.game, epoch)
             offset_ns = (now_ns // NS_PER_S + 2) * NS_PER_S
 
     def _next_setup(self, present: Setup) -> Setup:
@@ -105,6 +112,17 @@ class SimNode(Node):
         try:
             fresh.write_text(json.dumps(content), encoding='utf-8')
             fresh.replace(path)
+        except OSError as error:
+            self.get_logger().error(f'{path}: cannot be written ({error.strerror})')
+
+    def _write_game(self, game: Game, epoch: int) -> None:
+        """Write the game as it is run beside its recording."""
+        if self._control.folder is None:
+            return
+        path = run_folder(self._control.folder, epoch) / 'game.yaml'
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(dump_game(game), encoding='utf-8')
         except OSError as error:
             self.get_logger().error(f'{path}: cannot be written ({error.strerror})')
 

@@ -40,12 +40,14 @@ class LiveBackend:
     Stands behind the page of a live run.
 
     :param node: owner of the endpoints.
+    :param runs: folder of the session's files; None where nobody keeps any.
     """
 
     mode: Literal['live', 'replay'] = 'live'
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, runs: Path | None = None) -> None:
         self._node = node
+        self._runs = runs
         self._endpoints = Endpoints(node)
         self._orders = CockpitOrders(node, self._endpoints)
         self._seat_slot = self._endpoints.polled('/seats')
@@ -60,7 +62,7 @@ class LiveBackend:
     async def start(self, hub: Hub) -> None:
         """Begin to pass the run on."""
         self._hub = hub
-        self._feed = CockpitFeed(self._endpoints, hub)
+        self._feed = CockpitFeed(self._endpoints, hub, self._runs)
         self._pump = asyncio.create_task(self._run())
 
     async def stop(self) -> None:

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import asdict
 import json
+from pathlib import Path
 import time
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -21,12 +22,14 @@ from crgame_ros.cockpit.frames import (
 )
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.perception_frames import Place
+from crgame_ros.cockpit.run_files import files_document
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError
 from crgame_ros.planner.joints import vehicles_from_joints
 from crgame_ros.ros.av_feed import AvFeed, place_of
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.simulation.documents import MALFORMED, parse_events_document
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, TIMING_COLUMNS
@@ -50,11 +53,13 @@ class CockpitFeed:
 
     :param endpoints: of the node.
     :param hub: all pages.
+    :param runs: folder of the session's files; None where nobody keeps any.
     """
 
-    def __init__(self, endpoints: Endpoints, hub: Hub) -> None:
+    def __init__(self, endpoints: Endpoints, hub: Hub, runs: Path | None = None) -> None:
         self._endpoints = endpoints
         self._hub = hub
+        self._runs = runs
         self.status = RunStatus()
         self._documents = ScenarioDocuments(endpoints)
         self._avs = AvFeed(endpoints, hub)
@@ -223,10 +228,16 @@ class CockpitFeed:
                 message = slot.take()
                 if message is None:
                     break
+                stamp_ns = from_time(message.header.stamp)
                 for status in message.status:
-                    self._take_status(status)
+                    self._take_status(status, stamp_ns)
 
-    def _take_status(self, status: DiagnosticStatus) -> None:
+    def _take_status(self, status: DiagnosticStatus, stamp_ns: int) -> None:
+        simulated = status.name.startswith('sim_node: ') or status.name.endswith('/drivability')
+        if simulated and self.scenario is not None \
+                and stamp_ns < self.scenario.game.scheduler.clock_offset_ns:
+            # Of the run before.
+            return
         values = {item.key: item.value for item in status.values}
         self.status.take(status.name, int.from_bytes(status.level, 'little'), status.message,
                          values, self.t)
@@ -237,7 +248,7 @@ class CockpitFeed:
         if self.scenario is None:
             return
         if now_s - self._run_heard_s > SILENCE_S:
-            self.status.run = 'ended'
+            self.status.lose()
         since_s, since_n = self._pace
         if now_s - since_s >= 1.0:
             passed = (self.n - since_n) * self.scenario.game.scheduler.dt_s
@@ -251,6 +262,8 @@ class CockpitFeed:
             'k': game.scheduler.k(self.n), 'epoch': game.epoch,
             'measured_factor': self._measured_factor, 'frames_skipped': self.frames_skipped,
             'clients': len(self._hub.clients)})
+        if self.status.run == 'ended' and self._runs is not None:
+            self._hub.set_document('files', files_document(self._runs, game.epoch))
         self._hub.set_document('alarms', self.status.alarms_document())
 
 

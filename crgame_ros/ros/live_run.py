@@ -16,7 +16,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.ros.live_diagnostics import LiveDiagnostics
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.remote_traffic import RemoteTraffic
-from crgame_ros.ros.run_state import RunState
+from crgame_ros.ros.run_state import RunState, SIGNAL
 from crgame_ros.ros.sim_control import SimControl
 from crgame_ros.ros.sim_inputs import SimInputs
 from crgame_ros.ros.sim_outputs import SimOutputs
@@ -86,8 +86,8 @@ class LiveRun:
         self._second = max(1, round(1.0 / self._dt_s))
         self._setup = setup
         self._sleep_from_ns = 0
-        self._stepped = 0
         self._stop = StopFlag()
+        self._reason = ''
 
     def run(self, stop: StopFlag) -> Outcome:
         """Run until the game's end, a reset or a stop."""
@@ -100,6 +100,8 @@ class LiveRun:
             self._settle()
         outcome = self._wait_for_companions(result)
         if outcome is not None:
+            self._reason = self._reason_for(outcome)
+            self._state.tell('ended', self._reason)
             return outcome
         gc.collect()
         gc.freeze()
@@ -109,14 +111,35 @@ class LiveRun:
             self._controller.start(now_ns)
             self._controller.resume(now_ns, self._control.real_time_factor)
             self._inputs.forgive(now_ns)
-            return self._loop()
+            outcome = self._loop()
+            self._reason = self._reason or self._reason_for(outcome)
+            return outcome
         finally:
             gc.enable()
             gc.unfreeze()
             self._outputs.publish_rows()
             self._diagnostics.publish(self.simulation.n)
-            self._state.tell('ended')
+            self._state.tell('ended', self._reason)
             self._outputs.wait_until_received()
+
+    def linger(self) -> Outcome:
+        """Show how the run has ended until it is begun anew, or everything is to end."""
+        control = self._control
+        control.over, control.stop_wanted = True, False
+        self._state.stand()
+        while not (self._stop.requested or control.reset_wanted):
+            self._state.tell('ended', self._reason)
+            self._executor.spin_once(timeout_sec=0.02)
+            self._state.show_newcomers()
+            self._take_orders(time.monotonic_ns())
+        control.over = False
+        return Outcome.STOPPED if self._stop.requested else Outcome.RESET
+
+    def _reason_for(self, outcome: Outcome) -> str:
+        """Say why the run has ended: duration, reset, stop, or signal."""
+        if outcome is Outcome.STOPPED:
+            return SIGNAL if self._stop.requested else 'stop'
+        return 'duration' if outcome is Outcome.FINISHED else 'reset'
 
     def destroy(self) -> None:
         """Release the endpoints."""
@@ -140,9 +163,9 @@ class LiveRun:
             now_ns = time.monotonic_ns()
             is_open = gate.is_open(now_ns, control.planner_timeout_s)
             control.awaited = self._inputs.seats.awaited(now_ns)
-            if is_open and not self._stands_still() and not control.awaited:
+            if is_open and not control.stands_still and not control.awaited:
                 return None
-            self._state.tell('paused' if is_open and self._stands_still() else 'waiting')
+            self._state.tell('paused' if is_open and control.stands_still else 'waiting')
             self._executor.spin_once(timeout_sec=0.005)
             if is_open:
                 self._state.show_newcomers()
@@ -173,6 +196,7 @@ class LiveRun:
         self._node.get_logger().warning(
             f'{vehicle_id} violates drivability (n = {violation_n}): stopping at n = {n}')
         self._control.stop_wanted = True
+        self._reason = f'drivability of {vehicle_id}'
 
     def _take_plan(self, av_id: str) -> bool:
         """Offer an AV the plan that has come for it; tell whether it was accepted."""
@@ -212,7 +236,7 @@ class LiveRun:
 
     def _loop(self) -> Outcome:
         while self.simulation.n != self._last_n:
-            if self._stands_still():
+            if self._control.stands_still:
                 self._stay_paused()
             if self._control.real_time_factor != self._controller.real_time_factor:
                 self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
@@ -222,30 +246,16 @@ class LiveRun:
             if outcome is not None:
                 return outcome
             # A pause ordered while waiting holds from this very step on.
-            if not self._stands_still():
+            if not self._control.stands_still:
                 self._cycle()
         return Outcome.FINISHED
-
-    def _stands_still(self) -> bool:
-        return self._control.paused and not self._control.steps_wanted
-
-    def _count_single_steps(self) -> None:
-        """Count down the scenario steps that were ordered during a pause: N steps each."""
-        control = self._control
-        if not (control.paused and control.steps_wanted):
-            control.steps_wanted = self._stepped = 0
-            return
-        self._stepped += 1
-        if self._stepped == self.simulation.scheduler.steps_per_tick:
-            self._stepped = 0
-            control.steps_wanted -= 1
 
     def _stay_paused(self) -> None:
         """Serve orders while everything else stands still."""
         self._state.stand()
         self._outputs.publish_rows()
         self._state.tell('paused')
-        while self._stands_still() and self._ordered_end() is None:
+        while self._control.stands_still and self._ordered_end() is None:
             self._executor.spin_once(timeout_sec=0.02)
             self._state.tell('paused')
             self._state.show_newcomers()
@@ -285,7 +295,7 @@ class LiveRun:
         outputs.publish_step(simulation, result)
         if result.tick:
             self._at_tick(result)
-        self._count_single_steps()
+        self._control.count_step(simulation.scheduler.steps_per_tick)
         if outputs.rows.full:
             outputs.publish_rows()
         busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S

@@ -10,6 +10,8 @@ from crgame_ros.ros.sim_outputs import SimOutputs
 from crgame_ros.simulation.engine import Simulation
 
 NS_PER_S = 1_000_000_000
+# Why a run has ended: it was to end with everything else.
+SIGNAL = 'signal'
 # Discovery is not the same on both sides for up to a second or two.
 NEWCOMERS_NS = 3 * NS_PER_S
 
@@ -46,6 +48,7 @@ class RunState:
             self._told, self._told_ns = news, now_ns
             self._diagnostics.run_state(state, {
                 'real_time_factor': self._control.real_time_factor, 'reason': reason,
+                'stays': self._control.stays and reason != SIGNAL,
                 'awaited': ','.join(self._control.awaited)})
 
     def stand(self) -> None:

@@ -114,7 +114,7 @@ class Seat:
             and self.recording.drives(n)
 
     def awaits_driver(self, now_ns: int) -> bool:
-        """Tell whether the game leaves the seat to the cockpit and no hands are on the controls."""
+        """Tell whether the seat is the cockpit's by the game, and no hands are on its controls."""
         if self.home != COCKPIT or self.source != COCKPIT:
             return False
         self.listen(now_ns)

@@ -14,9 +14,12 @@ from crgame_ros.driver.source import is_replay
 from crgame_ros.errors import InputError
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.scenario.game import Game, HumanSpec
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+
+OVER = 'the run is over: reset begins it anew'
 
 
 class SimControl:
@@ -30,8 +33,13 @@ class SimControl:
         self._node = node
         self.paused = False
         self.steps_wanted = 0
+        self._stepped = 0
         self.reset_wanted = False
         self.stop_wanted = False
+        # The run has ended, and the node stays for another one.
+        self.over = False
+        # Somebody has chosen a game or scenario since the start.
+        self.chosen_later = False
         # Somebody has said start since the last reset.
         self.started = False
         # Seats whose driver must come before the run begins.
@@ -51,9 +59,9 @@ class SimControl:
         # What the command line names is trusted; later orders may come from any DDS peer.
         self._directories = [Path(item).resolve() for item in self._value('scenario_directories')
                              if item] + [scenarios_directory().resolve()]
-        first = self._value(self._chosen)
-        if first:
-            self._directories.append(Path(first).resolve().parent)
+        self._first = self._value(self._chosen)
+        if self._first:
+            self._directories.append(Path(self._first).resolve().parent)
 
     def _declare(self) -> None:
         declare = self._node.declare_parameter
@@ -81,6 +89,12 @@ class SimControl:
         declare('roster', '', ParameterDescriptor(
             description='file that tells the launcher which vehicles the game has; none if empty',
             read_only=True))
+        declare('folder', '', ParameterDescriptor(
+            description="folder of the run's files, in which later runs get their own; each "
+            'later game is written there; none if empty', read_only=True))
+        declare('at_end', EXIT, ParameterDescriptor(
+            description='what follows the end of a run: exit, stay until a reset or a signal, or '
+            'stay-if-chosen: exit unless its game was chosen after the start', read_only=True))
         declare('planner_timeout', 10.0, ParameterDescriptor(
             description='seconds to wait for planners and companions at the start',
             read_only=True))
@@ -115,9 +129,36 @@ class SimControl:
         return Path(value) if value else None
 
     @property
+    def folder(self) -> Path | None:
+        """Folder of the run's files."""
+        value = self._value('folder')
+        return Path(value) if value else None
+
+    @property
+    def stays(self) -> bool:
+        """Whether the node stays when a run has ended."""
+        at_end = self._value('at_end')
+        return at_end == STAY or (at_end == STAY_IF_CHOSEN and self.chosen_later)
+
+    @property
     def planner_timeout_s(self) -> float:
         """How long to wait for planners and companions [s]."""
         return float(self._value('planner_timeout'))
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether the run is paused and no step of it is ordered."""
+        return self.paused and not self.steps_wanted
+
+    def count_step(self, steps_per_tick: int) -> None:
+        """Count down the scenario steps, of so many steps each, ordered during a pause."""
+        if not (self.paused and self.steps_wanted):
+            self.steps_wanted = self._stepped = 0
+            return
+        self._stepped += 1
+        if self._stepped == steps_per_tick:
+            self._stepped = 0
+            self.steps_wanted -= 1
 
     def first_game(self) -> Game:
         """
@@ -136,6 +177,7 @@ class SimControl:
         :raises InputError: if it cannot be used or lies outside the configured directories.
         """
         name = self._value(self._chosen)
+        self.chosen_later |= name != self._first
         if self._chosen != 'scenario' or not name:
             return self._game(str(self._allowed(name)) if name else '')
         path = self._allowed(name)
@@ -177,15 +219,21 @@ class SimControl:
                 self.real_time_factor = float(parameter.value)
 
     def _on_start(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
         self.paused, self.started = False, True
         return _answer(response, True, f'waiting for the driver of {" and ".join(self.awaited)}'
                        if self.awaited else 'running')
 
     def _on_pause(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
         self.paused = True
         return _answer(response, True, 'paused')
 
     def _on_step(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
         if not self.paused:
             return _answer(response, False, 'not paused: call /sim/pause first')
         self.steps_wanted += 1
@@ -196,6 +244,8 @@ class SimControl:
         return _answer(response, True, 'resetting')
 
     def _on_stop(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
         self.stop_wanted = True
         return _answer(response, True, 'stopping')
 

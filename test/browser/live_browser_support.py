@@ -67,14 +67,15 @@ class Graph(NamedTuple):
 
 
 @contextmanager
-def live_graph(game: Path, out: Path) -> Iterator[Graph]:
+def live_graph(game: Path, out: Path, *options: str) -> Iterator[Graph]:
     """
     Start the graph of a game with its cockpit, and end it.
 
     :param game: game file.
     :param out: folder of the run.
+    :param options: of the command line.
     """
-    with Launcher([game], out, headless=False) as launcher, \
+    with Launcher([game, *options], out, headless=False) as launcher, \
             Peer(launcher.domain, *_TOPICS) as peer:
         address = launcher.page
         peer.wait_until(lambda: peer.games, 'the game')
@@ -199,9 +200,13 @@ class LivePage:
         """Begin anew by the button, and wait until the new run is shown and goes on."""
         epoch = self.run('return crgame.store.status.epoch')
         self.order('reset')
-        self.wait('crgame.store.status.epoch > arguments[0] && crgame.store.status.n > 0'
-                  ' && crgame.world.shown?.epoch === crgame.store.status.epoch'
-                  ' && crgame.store.status.run === "running"', 'a new run', epoch)
+        self.wait('crgame.store.status.epoch > arguments[0]'
+                  ' && ["running", "paused"].includes(crgame.store.status.run)', 'a reset', epoch)
+        if self.run('return crgame.store.status.run') == 'paused':
+            # The game's driver is somebody in a browser: it begins when they say so.
+            self.order('start')
+        self.wait('crgame.store.status.n > 0 && crgame.store.status.run === "running"'
+                  ' && crgame.world.shown?.epoch === crgame.store.status.epoch', 'a new run')
 
     def vehicle(self, index: int) -> NDArray[np.float64]:
         """Give the 12 numbers of a vehicle as it was drawn last."""

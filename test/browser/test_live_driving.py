@@ -21,6 +21,8 @@ import pytest
 from recorded_poses import DT_C_S, DT_S, read_recorded
 from selenium.webdriver.common.keys import Keys
 
+from crgame_ros.recording.run_folder import run_folder
+
 # The person stands on the lane that leads to -x, so that the heading is at the border of +-pi;
 # the AV, the leader and the pedestrian are 400 m ahead.
 GAME = f"""
@@ -264,9 +266,9 @@ requestAnimationFrame(collect);
 def test_poses_as_drawn_are_those_of_the_bag(only_page: LivePage) -> None:
     """To a micrometre, in each frame that stood between two samples of the run."""
     page = only_page
+    take_the_wheel(page)
     # The leader's recording is short: it is to drive all the time.
     page.reset()
-    take_the_wheel(page)
     page.wait('crgame.driving.away === null', 'the hands on the controls')
     page.run(COLLECT)
     for key in ('w', 'a', 'd'):
@@ -278,8 +280,9 @@ def test_poses_as_drawn_are_those_of_the_bag(only_page: LivePage) -> None:
     frames = page.run('return window.drawn;')
     page.order('stop')
     epoch = int(frames[0]['epoch'])
-    page.graph.launcher.wait_for(f'messages in .*bag_{epoch}')
-    recorded = read_recorded(page.graph.launcher.out / f'bag_{epoch}', epoch)
+    bag = run_folder(page.graph.launcher.out, epoch) / 'bag'
+    page.graph.launcher.wait_for(f'messages in .*{bag.parent.name}/bag')
+    recorded = read_recorded(bag, epoch)
     # The others ran ahead of what had come: on a busy machine some do.
     between = [frame for frame in frames if frame['before'] >= 0 and frame['after'] >= 0
                and frame['step'] == recorded.k0 + int(frame['t'] / DT_C_S + 1e-9)]

@@ -153,3 +153,63 @@ def test_vehicles_that_take_no_part_leave_nothing() -> None:
                  'x' * 500 + '/drivability'):
         status.take(name, 2, 'collision', values, 0.0)
     assert status.document()['drivability'] == {} and _kinds(status) == []
+
+
+def _verdict(status: RunStatus, vehicle: str, hit: str, off_road: bool, t: float) -> None:
+    status.take(f'{vehicle}/drivability', 2 if hit or off_road else 0, '', {
+        'collision': str(bool(hit)).lower(), 'road_compliance': str(not off_road).lower(),
+        'hit': hit}, t)
+
+
+def test_contacts_and_departures_are_kept_until_the_next_run() -> None:
+    """Each once, also where both vehicles tell of it; again when it has been over."""
+    status = _begun()
+    _verdict(status, 'hv0', 'av0', False, 1.0)
+    _verdict(status, 'av0', 'hv0', False, 1.0)
+    _verdict(status, 'hv0', 'av0,o7', True, 2.0)
+    _verdict(status, 'hv0', 'av0,o7', True, 3.0)
+    _verdict(status, 'hv0', '', False, 4.0)
+    _verdict(status, 'av0', '', False, 4.0)
+    _verdict(status, 'av0', 'hv0', False, 5.0)
+    document = status.document()
+    assert [(item['vehicle'], item['with'], item['t']) for item in document['contacts']] == [
+        ('hv0', 'av0', 1.0), ('hv0', 'o7', 2.0), ('av0', 'hv0', 5.0)]
+    assert document['departures'] == [{'vehicle': 'hv0', 't': 2.0}]
+    status.begin(('hv0', 'av0'))
+    assert status.document()['contacts'] == status.document()['departures'] == []
+
+
+def test_the_end_of_a_run_leaves_no_alarm_but_a_failed_recording() -> None:
+    """What stood then is its result; drivers that fall silent afterwards are nobody's worry."""
+    status = _begun()
+    _verdict(status, 'hv0', 'av0', True, 1.0)
+    status.take('recorder_node: recording', 2, 'disk full', {}, 1.0)
+    status.take('sim_node: run', 0, 'ended', {'reason': 'duration'}, 2.0)
+    status.take('sim_node: hv0 seat', 1, 'driver lost', {}, 2.1)
+    _verdict(status, 'av0', 'hv0', False, 2.1)
+    assert _kinds(status) == ['recording:recorder']
+    document = status.document()
+    assert (document['run'], document['reason'], document['seats_lost']) == (
+        'ended', 'duration', {})
+    status.begin(('hv0', 'av0'))
+    assert (status.run, status.reason) == ('waiting', '')
+
+
+def test_a_recording_that_is_done_says_so() -> None:
+    """Its size stays to be seen."""
+    status = _begun()
+    status.take('recorder_node: recording', 0, 'recorded', {
+        'messages': '12', 'bytes': '2500000', 'closed': 'True'}, 1.0)
+    assert status.recording == {
+        'state': 'recorded', 'text': 'recorded', 'messages': 12, 'megabytes': 2.5}
+
+
+def test_a_silent_simulation_is_no_end_that_it_told_itself() -> None:
+    """The page tells the two apart."""
+    status = _begun()
+    status.take('sim_node: run', 0, 'running', {}, 2.0)
+    status.lose()
+    assert (status.run, status.reason) == ('ended', 'silence')
+    status.take('sim_node: run', 0, 'ended', {'reason': 'stop'}, 2.0)
+    status.lose()
+    assert status.reason == 'stop'

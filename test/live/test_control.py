@@ -3,7 +3,6 @@
 """Pause, step, reset, pace, another scenario and stop: the orders that a running graph takes."""
 
 from collections.abc import Iterator
-from pathlib import Path
 import time
 
 from live_peer import Peer
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import bags_of, run_folder, run_folders
 from crgame_ros.recording.run_log import read_cycles
 from crgame_ros.ros.messages import from_time, to_time
 
@@ -112,9 +112,9 @@ def test_reset_begins_a_new_epoch_and_bag(graph: tuple[Launcher, Peer], peer: Pe
     starts = [rows[rows[:, 0] == game.scheduler.clock_offset_ns][0, 1:]
               for game in (first, second)]
     assert np.array_equal(*starts)
-    launcher.wait_for(rf'recording into .*bag_{epoch + 1}$')
+    launcher.wait_for(rf'recording into .*/run_{epoch + 2}/bag$')
     # The bag of the epoch before is finished, and holds every cycle of it and no other's.
-    bag = launcher.out / f'bag_{epoch}'
+    bag = run_folder(launcher.out, epoch) / 'bag'
     with BagReader(bag) as reader:
         assert reader.complete
     cycles = read_cycles(bag, epoch).column('n')
@@ -259,7 +259,7 @@ def test_stop_ends_the_run_well(graph: tuple[Launcher, Peer]) -> None:
     assert peer.call('/sim/stop').success
     assert launcher.wait() == 0, launcher.text
     assert not any(is_node(pid) for _, pid in launcher.started)
-    bags = [path for path in Path(launcher.out).glob('bag*') if path.is_dir()]
+    bags = [bag for folder in run_folders(launcher.out) for bag in bags_of(folder)]
     assert len(bags) == peer.games[-1].epoch + 1
     for bag in bags:
         with BagReader(bag) as reader:

@@ -4,7 +4,6 @@
 
 from collections.abc import Iterator
 import json
-from pathlib import Path
 import time
 import urllib.request
 

@@ -20,6 +20,7 @@ const PARTS = [
   ['./panels/events.js', 'createEvents', '#panel-events', 'events'],
   ['./panels/planners.js', 'createPlanners', '#planners', 'planners'],
   ['./panels/timing.js', 'createTiming', '#timekeeping', 'timing'],
+  ['./panels/outcome.js', 'createOutcome', '#outcome', 'outcome'],
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],

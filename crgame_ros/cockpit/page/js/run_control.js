@@ -16,9 +16,9 @@ const ORDERS = {
     title: 'Begin anew at the first step',
     confirm: ['Reset the run?', 'All vehicles go back to where they began. The recording so far '
       + 'is kept; a new one begins.'] },
-  stop: { label: 'Stop', in: ['waiting', 'running', 'paused'], title: 'End the simulation',
-    confirm: ['Stop the simulation?',
-      'The run ends for everybody and its recording is closed. It cannot go on afterwards.'] },
+  stop: { label: 'Stop', in: ['waiting', 'running', 'paused'], title: 'End the run',
+    confirm: ['Stop the run?',
+      'It ends for everybody and its recording is closed. It cannot go on afterwards.'] },
 };
 const FACTORS = [0.1, 0.2, 0.25, 0.5, 1, 2, 3, 5, 10];
 const RUN_TEXTS = {
@@ -72,7 +72,7 @@ class RunControl {
     setAttribute(this.#clock.node, 'hidden', status === null);
     if (status) {
       this.#clock.show(status, connected);
-      this.#lamp.show(status.recording ?? { state: 'none' });
+      this.#lamp.show(recordingNow(status, connected));
       if (document.activeElement !== this.#factor) {
         this.#offer(status.real_time_factor ?? 1);
       }
@@ -139,8 +139,9 @@ function buildClock(node) {
       setText(step, `k ${k ?? '–'}`);
       setText(factor, run === 'running' && Number.isFinite(measured_factor)
         ? `× ${measured_factor.toFixed(2)}` : '');
-      setText(state, connected ? RUN_TEXTS[run] ?? run : 'No connection');
-      setAttribute(state, 'data-run', connected ? run : 'lost');
+      const told = connected || run === 'ended';
+      setText(state, told ? RUN_TEXTS[run] ?? run : 'No connection');
+      setAttribute(state, 'data-run', told ? run : 'lost');
     },
   };
 }
@@ -153,12 +154,23 @@ function buildLamp(node) {
     show({ state, megabytes, text: reason }) {
       setAttribute(node, 'data-state', state);
       const size = Number.isFinite(megabytes) ? ` ${megabytes.toFixed(1)} MB` : '';
-      setText(text, state === 'recording' ? `Recording${size}`
-        : state === 'failed' ? `Recording failed: ${reason || 'no reason given'}`
-          : 'Not recording');
+      setText(text, {
+        recording: `Recording${size}`, recorded: `Recorded${size}`, unknown: '',
+        failed: `Recording failed: ${reason || 'no reason given'}`,
+      }[state] ?? 'Not recording');
       setAttribute(node, 'title', reason || null);
     },
   };
+}
+
+/** What is known of the recording: nothing without a connection, unless the run was over before. */
+function recordingNow({ recording, run }, connected) {
+  const told = recording ?? { state: 'none' };
+  if (connected) {
+    return told;
+  }
+  return run !== 'ended' ? { state: 'unknown' }
+    : { ...told, state: told.state === 'recording' ? 'recorded' : told.state };
 }
 
 function buildConfirmation() {

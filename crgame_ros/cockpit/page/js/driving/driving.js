@@ -107,8 +107,9 @@ export class Driving {
       this.#lost = '';
     } else if (this.#lost === '') {
       // Told again at each vain attempt to connect.
-      this.#lost = this.seat === null ? 'Connection lost: this is how it was last seen.'
-        : `Connection lost: ${this.seat} brakes by itself.`;
+      this.#lost = this.#store.status?.run === 'ended' ? ''
+        : this.seat === null ? 'Connection lost: this is how it was last seen.'
+          : `Connection lost: ${this.seat} brakes by itself.`;
       this.#leaveSeat();
     }
   }

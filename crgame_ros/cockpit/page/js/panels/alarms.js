@@ -77,7 +77,8 @@ export function createAlarms(root, store) {
 
 /** What only the page can know: that it hears nothing from the server any more. */
 function ownAlarms(store) {
-  return store.connected ? [] : [{
+  // After the end of a run the program may well be ended, too.
+  return store.connected || store.status?.run === 'ended' ? [] : [{
     id: 'page-connection', kind: 'connection', subject: '',
     text: 'This page has lost its connection to the simulation and tries to get it back.',
   }];

@@ -12,8 +12,8 @@ const ms = (digits) => (value) => `${fixed(value, digits)} ms`;
 const percent = (digits) => (value) => `${fixed(100 * value, digits)} %`;
 const ratio = (value) => fixed(value, 3);
 
-// key of the figure: [name, explanation, format, when it is late (value, step [ms])]
-const TABLE_I = [
+/** Key of the figure: [name, explanation, format, when it is late (value, step [ms])]. */
+export const TABLE_I = [
   ['final_error_ms', 'Lag now', 'E_f: simulated behind wall-clock time, resets added back',
     ms(2), (value, step) => value > LATE_STEPS * step],
   ['mean_step_error_ms', 'Mean step error', 'mean of |e_n| over all steps', ms(3),
@@ -91,7 +91,12 @@ export function createTiming(root, store) {
   update();
 }
 
-function valueOf(timing, key) {
+/**
+ * @param {object} timing figures by key, live or as `timing.json` has them
+ * @param {string} key of the figure
+ * @returns {number} NaN where there is none
+ */
+export function valueOf(timing, key) {
   const nested = key.match(/^(real_time_ratio)_(\w+)$/);
   const value = nested && !(key in timing) ? timing[nested[1]]?.[nested[2]] : timing[key];
   return value ?? NaN;

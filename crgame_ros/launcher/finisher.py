@@ -1,0 +1,90 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Finishing the recordings of runs that are over, while the graph stays for another one."""
+
+from collections.abc import Callable
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+from crgame_ros.recording.metadata import METADATA_FILE
+from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
+
+LOOK_S = 0.5
+
+
+class Finisher:
+    """
+    Finishes what is over, the latest first and one at a time, while no run goes on.
+
+    It would cost a run that goes on its time: after a reset it waits for the next end.
+
+    :param session: folder of the session, which is that of its first run.
+    :param say: prints one line.
+    """
+
+    def __init__(self, session: Path, say: Callable[[str], None]) -> None:
+        self._session = session
+        self._say = say
+        self._process: subprocess.Popen[str] | None = None
+        self._codes: dict[Path, int] = {}
+        self._folder = session
+        self._looked_s = 0.0
+
+    def look(self) -> None:
+        """Report what has been finished, and begin with the next where no run goes on."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s < LOOK_S:
+            return
+        self._looked_s = now_s
+        if self._process is not None:
+            self._collect(self._process)
+            return
+        folders = run_folders(self._session)
+        left = [folder for folder in folders if folder not in self._codes]
+        if left and _is_closed(folders[-1]):
+            self._start(left[-1])
+
+    def finish_all(self) -> int:
+        """
+        Finish, now that the graph has ended, what is left.
+
+        :return: 0, or 1 if something could not be written, or nothing was recorded at all.
+        """
+        # It takes a second to import.
+        from crgame_ros.recording.finish import EMPTY, finish_run, OK
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+        folders = run_folders(self._session)
+        for folder in folders:
+            if folder not in self._codes:
+                self._codes[folder] = finish_run(folder, self._say)
+            (folder / FINISHED_MARK).unlink(missing_ok=True)
+        codes = set(self._codes.values())
+        # A first game that nobody drove, before they chose another one, is no failure.
+        return 0 if OK in codes and codes <= {OK, EMPTY} else 1
+
+    def _start(self, folder: Path) -> None:
+        self._folder = folder
+        # Ctrl-C is for the launcher, which then finishes all by itself.
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'crgame_ros.recording.finish', str(folder)],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            text=True, start_new_session=True)
+
+    def _collect(self, process: subprocess.Popen[str]) -> None:
+        code = process.poll()
+        if code is None:
+            return
+        for line in process.communicate()[0].splitlines():
+            self._say(line)
+        self._codes[self._folder] = code
+        self._process = None
+
+
+def _is_closed(folder: Path) -> bool:
+    """Tell whether the recorder has closed a run's last recording."""
+    bags = bags_of(folder)
+    return bool(bags) and (bags[-1] / METADATA_FILE).is_file()

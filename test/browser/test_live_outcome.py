@@ -1,0 +1,163 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""An afternoon at the page: one run after the other, what it says of each, and their files."""
+
+from collections.abc import Iterator
+import math
+from pathlib import Path
+import re
+import shutil
+import signal
+from typing import Any
+
+from browser_support import Browser
+import commonroad
+from live_browser_support import Graph, live_graph, LivePage, SCENARIOS
+from lxml import etree
+import pytest
+import yaml
+
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import run_folders
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.setup import build_setup
+
+CUT_IN, TRAFFIC = 'ZAM_CutIn-1_1_T-1', 'ZAM_Intersection-1_1_T-1'
+SCHEMA = Path(commonroad.__file__).parent.joinpath(
+    'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')
+SHORT_S = 3.0
+
+
+def write_games(folder: Path) -> Path:
+    """Write the first game, one in which the AV hits the human's car, and one of traffic alone."""
+    games: dict[str, dict[str, Any]] = {
+        'first': {'scenario': f'{CUT_IN}.xml', 'humans': [{'id': 'hv0', 'driver': 'idle'}]},
+        'crash': {
+            'title': 'A crash', 'scenario': f'{CUT_IN}.xml', 'duration': SHORT_S,
+            'humans': [{'id': 'hv0', 'driver': 'idle', 'spawn': {
+                'x': 60.0, 'y': 0.0, 'yaw': 0.0, 'speed': 0.0}}],
+            'avs': [{'id': 'av0', 'planning_problem': 100, 'planner': 'constant-velocity'}]},
+        'alone': {
+            'title': 'Alone', 'scenario': f'{TRAFFIC}.xml', 'duration': SHORT_S,
+            'humans': [], 'avs': [], 'traffic': {'agents': 8}}}
+    for scenario in (CUT_IN, TRAFFIC):
+        shutil.copy(SCENARIOS / f'{scenario}.xml', folder)
+    for name, game in games.items():
+        (folder / f'{name}.yaml').write_text(yaml.safe_dump(game))
+    return folder / 'first.yaml'
+
+
+@pytest.fixture(scope='module')
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+    """Keep one graph, whose first game would go on for ten minutes."""
+    folder = tmp_path_factory.mktemp('outcome')
+    with live_graph(write_games(folder), folder / 'run', '--duration', '600') as running:
+        yield running
+
+
+@pytest.fixture(scope='module')
+def page(graph: Graph, module_browser: Browser) -> LivePage:
+    """Open the page once; the tests are one afternoon, in their order."""
+    return LivePage(graph, module_browser)
+
+
+def start(page: LivePage, name: str) -> None:
+    """Choose a game in the panel and start it."""
+    epoch = page.run('return crgame.store.status.epoch')
+    page.click(f'button.scenario[title="{name}"]')
+    page.wait('document.querySelector("button.scenario[aria-checked=true]")?.title'
+              ' === arguments[0]', 'the choice', name)
+    page.click('.start-area button.primary')
+    page.wait('crgame.store.status.epoch > arguments[0]', 'the next run', epoch)
+
+
+def wait_for_card(page: LivePage) -> str:
+    """Wait until the run is over and its files are written; give what the card says."""
+    page.wait_for_run('ended')
+    page.wait('document.querySelector(".outcome-files[data-complete]")', 'the files of the run')
+    return page.text('#outcome')
+
+
+def folder_on_card(page: LivePage) -> Path:
+    """Give the folder that the card names."""
+    return Path(page.text('.outcome-files code'))
+
+
+def test_a_run_is_over_at_its_own_duration_and_says_how_it_went(page: LivePage) -> None:
+    """The crash at the second that the gap gives; no alarm is left; everything goes on."""
+    page.tab('scenario')
+    start(page, 'crash.yaml')
+    text = wait_for_card(page)
+    assert page.run('return crgame.store.status.t') == SHORT_S
+    assert 'The run is over' in text and f'Its duration of {SHORT_S:.1f} s is over' in text
+    setup = build_setup(load_game(page.graph.launcher.out.parent / 'crash.yaml'))
+    human, av = setup.humans[0].state, setup.avs[0].state
+    gap = math.dist((human.x, human.y), (av.x, av.y)) - setup.avs[0].vehicle.shape.length
+    (told,) = re.findall(r'hv0 with av0 at ([0-9.]+) s|av0 with hv0 at ([0-9.]+) s', text)
+    # The page rounds to 0.1 s and learns of it within the next 0.1 s.
+    assert float(told[0] or told[1]) == pytest.approx(gap / av.speed, abs=0.3)
+    accepted = int(re.search(r'(\d+) plans accepted', text)[1])
+    assert 0.5 * 10 * SHORT_S < accepted <= 10 * SHORT_S
+    assert {'Mean step error', 'Largest lag', 'Precision ratio'} <= set(page.run(
+        'return [...document.querySelectorAll("#outcome dt")].map((node) => node.textContent)'))
+    assert folder_on_card(page) == page.graph.launcher.out / 'run_2'
+    assert page.run('return crgame.store.alarms') == []
+    assert page.text('#recording').startswith('Recorded')
+    assert page.text('.clock-state') == 'Ended'
+    assert page.browser.console_errors() == []
+
+
+def test_again_and_another_game(page: LivePage) -> None:
+    """The same once more, then traffic by itself; the card gives way to each run."""
+    page.click('#outcome [data-action=again]')
+    page.wait('crgame.store.status.run === "running"'
+              ' && document.querySelector("#outcome").hidden', 'the run, without the card')
+    wait_for_card(page)
+    assert folder_on_card(page).name == 'run_3'
+    page.click('#outcome [data-action=close]')
+    page.click('#outcome [data-action=reopen]')
+    page.tab('drive')
+    page.click('#outcome [data-action=another]')
+    start(page, 'alone.yaml')
+    page.wait('crgame.store.status.run === "running" && crgame.world.shown.objects.length > 0',
+              'agents of traffic')
+    assert 'Traffic is alone' in page.text('#panel-drive')
+    assert 'traffic was alone' in wait_for_card(page)
+    assert folder_on_card(page).name == 'run_4'
+    assert page.browser.console_errors() == []
+
+
+def test_the_end_of_the_program_is_no_alarm(page: LivePage) -> None:
+    """Somebody ends it at the terminal: the page shows what was last, and says so."""
+    launcher = page.graph.launcher
+    launcher.signal(signal.SIGINT)
+    page.wait_for_text('#outcome', 'no longer there')
+    assert page.run('return [crgame.alarms.kinds(), crgame.driving.seat]') == [[], None]
+    assert page.text('.clock-state') == 'Ended'
+    assert page.run('return document.querySelector("#outcome [data-action=again]").disabled')
+    assert launcher.wait() == 0, launcher.text
+
+
+def test_each_run_has_its_own_files(graph: Graph) -> None:
+    """Bag, scenario, timing report and game of each, and nothing of another."""
+    folders = run_folders(graph.launcher.out)
+    assert [folder.name for folder in folders] == ['run', 'run_2', 'run_3', 'run_4']
+    schema = etree.XMLSchema(etree.parse(str(SCHEMA)))
+    for folder, scenario in zip(folders, (CUT_IN, CUT_IN, CUT_IN, TRAFFIC), strict=True):
+        game = load_game(folder / 'game.yaml')
+        assert game.scenario.name == f'{scenario}.xml'
+        (xml,) = folder.glob('*.xml')
+        root = etree.parse(str(xml))
+        schema.assertValid(root)
+        assert root.getroot().get('benchmarkID').removeprefix('C-') == scenario
+        driven = len(game.humans) + len(game.avs or ())
+        assert len(root.findall('planningProblem')) == max(1, driven)
+        assert (folder / 'timing.json').is_file()
+        assert not (folder / '.finished').exists()
+        with BagReader(folder / 'bag') as reader:
+            assert reader.complete
+            last = max(item.message.header.stamp.sec for item in reader.decoded(
+                ['/vehicles/state']))
+            first = min(item.message.header.stamp.sec for item in reader.decoded(
+                ['/vehicles/state']))
+        assert folder == folders[0] or last - first <= SHORT_S
