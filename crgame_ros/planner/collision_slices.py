@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.errors import PlanningError
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.planner.interface import PlanRequest
 from crgame_ros.planner.obstacles import outline, prolong
 from crgame_ros.scenario.objects import ObjectDescription
@@ -20,6 +21,11 @@ Array = NDArray[np.float64]
 
 # Farther than this beyond what the ego can cover, an obstacle cannot matter [m].
 REACH = 15.0
+# What is nearer now than its margin is enlarged less, what touches is made smaller, until the ego
+# is free: then a plan may stand or leave, and none drives on into it [m].
+CORES = (0.0, -0.1, -0.2, -0.4, -0.8)
+# Of half the size of a core nothing less is left [m].
+SMALLEST = 0.02
 
 
 class CollisionSlices:
@@ -27,8 +33,8 @@ class CollisionSlices:
     A stand-in for the drivability checker's `CollisionChecker`, sliced by time beforehand.
 
     `time_slice` of the original rebuilds the slice at each call, which costs more than the
-    check. Left out are obstacles that cannot be avoided by any plan: those that touch the ego
-    now, and followers in the ego's own lane, whose drivers keep the distance.
+    check. Left out are followers in the ego's own lane, whose drivers keep the distance, and
+    what the ego is in the middle of, which no plan avoids.
 
     :param objects: description of everything that may appear.
     :param vehicle: parameters of the ego.
@@ -52,13 +58,14 @@ class CollisionSlices:
         poses, _ = prolong(request, steps)
         self._k = request.k
         ego = self._footprint(request.ego)
-        chosen = [column for column in self._near(request, poses)
-                  if not self._unavoidable(request, poses[0, column], column, ego)]
+        chosen = [(column, margin) for column in self._near(request, poses)
+                  if (margin := self._margin_of(request, poses[0, column], column, ego))
+                  is not None]
         self._slices = []
         for step in range(steps):
             checker = pycrcc.CollisionChecker()
-            for column in chosen:
-                body = self._body(request.obstacle_ids[column], poses[step, column])
+            for column, margin in chosen:
+                body = self._body(request.obstacle_ids[column], poses[step, column], margin)
                 if body is not None:
                     checker.add_collision_object(body)
             self._slices.append(checker)
@@ -73,38 +80,53 @@ class CollisionSlices:
         distance = np.hypot(poses[..., 0] - ego.x, poses[..., 1] - ego.y)
         return np.flatnonzero((np.nan_to_num(distance, nan=np.inf) < reach).any(axis=0))
 
-    def _unavoidable(self, request: PlanRequest, pose: Array, column: int,
-                     ego: pycrcc.RectOBB) -> bool:
-        body = self._body(request.obstacle_ids[column], pose)
-        if body is None:
-            return False
-        if ego.collide(body):
-            return True
-        here = request.ego
-        dx, dy = float(pose[0]) - here.x, float(pose[1]) - here.y
-        cos, sin = math.cos(here.yaw), math.sin(here.yaw)
-        same_way = math.cos(float(pose[2]) - here.yaw) > 0.5
-        return (same_way and dx * cos + dy * sin < 0.0
+    def _margin_of(self, request: PlanRequest, pose: Array, column: int,
+                   ego: pycrcc.RectOBB) -> float | None:
+        """Choose by how much to enlarge an obstacle; None leaves it out."""
+        name = request.obstacle_ids[column]
+        if self._follows(request.ego, pose, name):
+            return None
+        for margin in (self._margin, *CORES):
+            body = self._body(name, pose, margin)
+            if body is None or not ego.collide(body):
+                return margin
+        return None
+
+    def _follows(self, ego: VehicleState, pose: Array, name: str) -> bool:
+        """Tell whether an obstacle drives behind the ego's rear in its lane."""
+        dx, dy = float(pose[0]) - ego.x, float(pose[1]) - ego.y
+        cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+        rear = self._vehicle.rear_to_center - 0.5 * self._vehicle.length
+        half_length = 0.5 * self._described(name).length
+        return (math.cos(float(pose[2]) - ego.yaw) > 0.5
+                and dx * cos + dy * sin + half_length < rear
                 and abs(dy * cos - dx * sin) < 0.5 * self._vehicle.width + 1.0)
 
     def _footprint(self, ego: VehicleState) -> pycrcc.RectOBB:
         x, y = ego.center(self._vehicle.rear_to_center)
         return pycrcc.RectOBB(0.5 * self._vehicle.length, 0.5 * self._vehicle.width, ego.yaw, x, y)
 
-    def _body(self, name: str, pose: Array) -> pycrcc.RectOBB | pycrcc.Circle | None:
-        """Place an obstacle; polygons by the rectangle around them."""
-        x, y, yaw = pose.tolist()
-        if math.isnan(x):
-            return None
+    def _described(self, name: str) -> Shape:
         if name not in self._objects:
             raise PlanningError(f'the request names "{name}", which was never described')
-        shape = self._objects[name].shape
+        return self._objects[name].shape
+
+    def _body(self, name: str, pose: Array,
+              margin: float) -> pycrcc.RectOBB | pycrcc.Circle | None:
+        """Place an obstacle; polygons by the rectangle around them."""
+        x, y, yaw = pose.tolist()
+        shape = self._described(name)
+        if math.isnan(x):
+            return None
         if shape.kind == 'circle':
-            return pycrcc.Circle(shape.radius + self._margin, x, y)
+            radius = shape.radius + margin
+            return pycrcc.Circle(radius, x, y) if radius > SMALLEST else None
         corners = outline(shape)
         low, high = corners.min(axis=0), corners.max(axis=0)
         along, across = (0.5 * (low + high)).tolist()
-        half_length, half_width = (0.5 * (high - low) + self._margin).tolist()
+        half_length, half_width = (0.5 * (high - low) + margin).tolist()
+        if min(half_length, half_width) <= SMALLEST:
+            return None
         cos, sin = math.cos(yaw), math.sin(yaw)
         return pycrcc.RectOBB(half_length, half_width, yaw, x + cos * along - sin * across,
                               y + sin * along + cos * across)
