@@ -3,6 +3,7 @@
 """The drivable path of a planning problem: routed, smoothed, prolonged beyond the goal."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
@@ -164,4 +165,21 @@ def _spans(roads: RoadNetwork, route: Route,
         ends, _ = path.project(line.points[[0, -1]], low, high)
         spans[row] = ends
         at = max(at, float(ends[1]))
+    # Beside each other run the lanelets of a lane change: the one ends where the other begins.
+    last = -1
+    for leg, following in pairwise(route.legs):
+        last += len(leg)
+        spans[last, 1] = spans[last + 1, 0] = _crossing(
+            roads, path, (leg[-1], following[0]), spans[last:last + 2])
     return lanelets, spans
+
+
+def _crossing(roads: RoadNetwork, path: ReferencePath, pair: tuple[int, int],
+              spans: Array) -> float:
+    """Find where the path is nearer to the second of two lanelets than to the first."""
+    first = float(spans[:, 0].max())
+    s = np.arange(first, max(float(spans[:, 1].min()), first + path.step), path.step)
+    points = path.pose_at(s)[:, :2]
+    aside = [np.abs(roads.line(lanelet).project(points)[1]) for lanelet in pair]
+    over = np.flatnonzero(aside[1] < aside[0])
+    return float(s[over[0]] if len(over) else s[-1])

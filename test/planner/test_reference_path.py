@@ -124,3 +124,30 @@ def test_paths_on_real_maps_are_drivable(path: Path, vehicle: VehicleParameters)
     roads = driving.roads
     outside = [point for point in curve.points[inside][::8] if roads.lanelet_at(*point) is None]
     assert not outside
+
+
+def test_lanelets_of_a_lane_change_share_no_part_of_the_path(vehicle: VehicleParameters) -> None:
+    """Three lanes beside each other, from the right one to the left one: each has its part."""
+    x = np.linspace(-50.0, 600.0, 131)
+    lanes = []
+    for number in (1, 2, 3):
+        links: dict[str, object] = {}
+        if number > 1:
+            links |= {'adjacent_right': number - 1, 'adjacent_right_same_direction': True}
+        if number < 3:
+            links |= {'adjacent_left': number + 1, 'adjacent_left_same_direction': True}
+        line = np.column_stack((x, np.full_like(x, 3.5 * (number - 1))))
+        lanes.append(support.strip(line, 3.5, number, **links))
+    goal = Rectangle(20.0, 2.0, np.array([500.0, 7.0]))
+    task = support.problem(10.0, position=goal)
+    driving = plan_driving_path(support.road(lanes), task, VehicleState(0.0, 0.0, 0.0, 10.0),
+                                vehicle)
+    assert driving.lanelets == (1, 2, 3)
+    spans = driving.lanelet_spans
+    assert spans[0, 1] == spans[1, 0]
+    assert spans[1, 1] == spans[2, 0]
+    assert (spans[:, 1] > spans[:, 0]).all()
+    for number, (first, last) in enumerate(spans):
+        middle = driving.path.pose_at(np.linspace(first, last, 50)[5:-5])[:, 1]
+        # Nearer to this lane's centre line than to any other.
+        assert (np.abs(middle - 3.5 * number) <= 1.76).all()
