@@ -14,6 +14,7 @@ import shapely
 from crgame_ros.drivability.footprint import Footprint, triangle_corners
 from crgame_ros.drivability.road_surface import (
     lanelet_polygons,
+    PATCH_OVERLAP,
     polygons_of,
     road_surface,
     seam_patches,
@@ -114,6 +115,26 @@ class RoadBoundary:
         """
         x, y = x_center - self._origin[0], y_center - self._origin[1]
         return bool(shapely.contains(self._surface, self._footprint(shape).polygon(x, y, yaw)))
+
+    def overhang(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> float:
+        """
+        Measure how far a footprint reaches beyond the road: 0 on it [m].
+
+        It is the distance from the road to the footprint's farthest point, also of one that is
+        off the road as a whole; infinite where there is no road. Parameters as in `is_off_road`.
+        """
+        x, y = x_center - self._origin[0], y_center - self._origin[1]
+        polygon = self._footprint(shape).polygon(x, y, yaw)
+        if shapely.contains(self._surface, polygon):
+            return 0.0
+        if not len(self._pieces):
+            return math.inf
+        near = self._pieces[shapely.distance(self._pieces, polygon) < PATCH_OVERLAP]
+        outside = polygon.difference(shapely.union_all(near)) if len(near) else polygon
+        corners = shapely.points(shapely.get_coordinates(outside))
+        if not len(corners):
+            return 0.0
+        return float(shapely.distance(self._pieces[:, None], corners).min(axis=0).max())
 
     def _footprint(self, shape: Shape) -> Footprint:
         footprint = self._footprints.get(shape)

@@ -131,7 +131,8 @@ class PlannerNode(Node):
         options = {} if self._choice and self._choice != entry['planner'] else entry['options']
         context = PlannerContext(
             self._vehicle_id, loaded.scenario, problem, VehicleParameters(**entry['vehicle']),
-            objects, game.scheduler.time_step_s, game.scheduler.k0, int(game.content['seed']))
+            objects, game.scheduler.time_step_s, game.scheduler.k0, int(game.content['seed']),
+            game.drivability.road)
         crew = PlannerCrew(context, name, options, game.events, time.perf_counter)
         self._reader = RequestReader(self._vehicle_id, objects, game.scheduler)
         self._crew, self._game = crew, game

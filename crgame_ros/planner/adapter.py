@@ -11,6 +11,7 @@ from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.planner.braking import braking_plan
 from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
 from crgame_ros.planner.plan_check import check_start
+from crgame_ros.planner.road_limit import RoadLimit
 
 Clock = Callable[[], float]
 
@@ -37,8 +38,9 @@ class PlannerAdapter:
     Run a planner so that it always answers.
 
     Any exception of its `setup` or `plan`, and any plan that has the wrong stamp, numbers that
-    are not finite or another first state than the request, is replaced by a braking plan along
-    the last one (`Plan.fallback` is set) and counted. Exits and interrupts pass.
+    are not finite or another first state than the request, or that leaves the road further than
+    it starts off it, is replaced by a braking plan along the last one (`Plan.fallback` is set)
+    and counted. Exits and interrupts pass.
 
     :param planner: the planner.
     :param clock: seconds from a steady clock, to time each call; None measures nothing.
@@ -66,6 +68,7 @@ class PlannerAdapter:
         self._setup_failure = None
         self.last_reason = None
         try:
+            self._limit = RoadLimit(context)
             self.planner.setup(context)
         except Exception as error:
             self._setup_failure = self.last_reason = f'setup failed: {describe(error)}'
@@ -106,6 +109,8 @@ class PlannerAdapter:
             if not isinstance(plan, Plan):
                 return None, f'the planner returned a {type(plan).__name__}, not a Plan'
             reason = check_start(plan, request.ego, request.stamp_ns)
+            if reason is None:
+                reason = self._limit.refusal(plan.states)
         except Exception as error:
             return None, describe(error)
         return (plan, None) if reason is None else (None, reason)

@@ -10,6 +10,7 @@ rear-axle poses, those of obstacles are centre poses, all in the CommonRoad scen
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar, TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,8 @@ from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
 if TYPE_CHECKING:
     from commonroad.planning.planning_problem import PlanningProblem
     from commonroad.scenario.scenario import Scenario
+
+    from crgame_ros.drivability.road_boundary import RoadBoundary
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class PlannerContext:
     :param time_step_s: scenario step Delta t_c [s], the grid of requests and plans.
     :param k0: scenario time step at which the run starts.
     :param seed: seed for planners that draw random numbers.
+    :param keep_road: whether a plan may not leave the road; the game's `drivability: {road:}`.
     """
 
     vehicle_id: str
@@ -50,6 +54,13 @@ class PlannerContext:
     time_step_s: float
     k0: int = 0
     seed: int = 0
+    keep_road: bool = True
+
+    @cached_property
+    def road(self) -> 'RoadBoundary':
+        """The boundary of the scenario's road, made at first use: ask for it in `setup`."""
+        from crgame_ros.drivability.road_boundary import RoadBoundary
+        return RoadBoundary(self.scenario.lanelet_network)
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,8 @@ class PlannerSeat:
         self._reader = RequestReader(av.id, objects, simulation.scheduler)
         context = PlannerContext(
             av.id, setup.loaded.scenario, av.planning_problem, av.vehicle, objects,
-            setup.scheduler.time_step_s, setup.scheduler.k0, setup.game.seed)
+            setup.scheduler.time_step_s, setup.scheduler.k0, setup.game.seed,
+            setup.game.drivability.road)
         self.crew = PlannerCrew(
             context, av.spec.planner, av.spec.options, setup.game.events, clock_s)
         self.perception: Perception | None = None

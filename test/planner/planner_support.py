@@ -50,6 +50,12 @@ def straight(length: float = 2000.0) -> Scenario:
     return road([strip(np.column_stack((x, np.zeros_like(x))), 3.5, 1)])
 
 
+def plain() -> Scenario:
+    """Make one lane so wide that nobody leaves it."""
+    x = np.linspace(-50.0, 500.0, 56)
+    return road([strip(np.column_stack((x, np.zeros_like(x))), 100.0, 1)])
+
+
 def problem(speed: float, x: float = 0.0, y: float = 0.0, yaw: float = 0.0,
             position: object = None) -> PlanningProblem:
     """Make a planning problem with the centre at x, y."""

@@ -7,6 +7,7 @@ import dataclasses
 from itertools import count
 from typing import ClassVar
 
+from commonroad.scenario.scenario import Scenario
 import numpy as np
 import planner_support as support
 import pytest
@@ -41,10 +42,11 @@ class Scripted(Planner):
         return self._answer(request)
 
 
-def adapter(answer: Answer, setup: Exception | None = None) -> PlannerAdapter:
+def adapter(answer: Answer, setup: Exception | None = None,
+            road: Scenario | None = None) -> PlannerAdapter:
     ticks = count()
     made = PlannerAdapter(Scripted(answer, setup), clock=lambda: 0.25 * next(ticks))
-    made.setup(support.context(support.straight(), support.problem(10.0)))
+    made.setup(support.context(road or support.plain(), support.problem(10.0)))
     return made
 
 
@@ -98,6 +100,45 @@ def test_good_plans_pass_unchanged_and_are_timed() -> None:
     assert made.statistics.durations_s == [0.25]
 
 
+def sideways(distance: float) -> Answer:
+    """Answer with 3 s straight ahead at 10 m/s that move aside evenly, to the left [m]."""
+    def answer(request: PlanRequest) -> Plan:
+        states = np.tile(np.array(request.ego), (31, 1))
+        states[:, 0] += np.arange(31)
+        states[:, 1] += np.linspace(0.0, distance, 31)
+        return Plan(request.stamp_ns, states)
+    return answer
+
+
+# The lane reaches 1.75 m to either side, and the vehicle is 1.61 m wide: 0.945 m are free, and
+# 0.2 m more are tolerated.
+@pytest.mark.parametrize(('start', 'aside', 'refused'), [
+    (0.0, 0.9, False), (0.0, 1.1, False), (0.0, 1.2, True), (0.0, -3.0, True),
+    # One that starts 0.55 m off the road may go along it and return, but not further away.
+    (1.5, 0.0, False), (1.5, 0.15, False), (1.5, 0.3, True), (1.5, -1.5, False),
+    # 9 m from the road likewise.
+    (10.0, 0.1, False), (10.0, 1.0, True), (10.0, -5.0, False),
+])
+def test_plan_that_leaves_the_road_is_refused(start: float, aside: float, refused: bool) -> None:
+    made = adapter(sideways(aside), road=support.straight())
+    plan = made.plan(support.request(VehicleState(0.0, start, 0.0, 10.0)))
+    assert plan.fallback is refused
+    if refused:
+        assert made.last_reason is not None
+        assert made.last_reason.startswith('the plan leaves the road by ')
+        assert len(made.statistics.reasons) == 1
+        assert 'leaves the road by # m at state #' in next(iter(made.statistics.reasons))
+
+
+def test_road_with_slits_refuses_nothing() -> None:
+    """Lanelets of converted maps leave centimetres between them, which no vehicle falls into."""
+    x = np.linspace(-50.0, 500.0, 56)
+    lanes = [support.strip(np.column_stack((x, np.full_like(x, y))), 3.45, number)
+             for number, y in ((1, 0.0), (2, 3.5))]
+    made = adapter(sideways(3.5), road=support.road(lanes))
+    assert not made.plan(support.request(VehicleState(0.0, 0.0, 0.0, 10.0))).fallback
+
+
 def test_reasons_are_counted_without_their_numbers() -> None:
     distances = count(5)
     made = adapter(lambda request: changed(0, 0, float(next(distances)))(request))
@@ -111,7 +152,7 @@ def test_failed_setup_brakes_until_the_next_setup() -> None:
     assert made.plan(support.request(EGO)).fallback
     assert made.last_reason == 'setup failed: ValueError: no map'
     made.planner = Scripted(good)
-    assert made.setup(support.context(support.straight(), support.problem(10.0))) is None
+    assert made.setup(support.context(support.plain(), support.problem(10.0))) is None
     assert made.plan(support.request(EGO)).stamp_ns == 0
     assert made.last_reason is None
 

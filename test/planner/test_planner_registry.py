@@ -92,7 +92,7 @@ def test_the_documented_example_plans(tmp_path: Path, vehicle: VehicleParameters
     file = tmp_path / 'stop_and_go.py'
     file.write_text(code[1], encoding='utf-8')
     adapter = PlannerAdapter(registry.create_planner(f'{file}:StopAndGo', {'speed': 6.0}))
-    adapter.setup(support.context(support.straight(), support.problem(5.0)))
+    adapter.setup(support.context(support.plain(), support.problem(5.0)))
     ego = VehicleState(0.0, 0.0, 0.3, 5.0, 0.05)
     for obstacles, expected in (((), 6.0), (((15.0, 4.6, 0.0, 0.0),), 0.0)):
         asked = support.request(ego, 0, obstacles)

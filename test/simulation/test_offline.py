@@ -18,6 +18,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
 from crgame_ros.scenario.game import AvSpec, HumanSpec
+from crgame_ros.scenario.game import DrivabilitySpec, HumanSpec
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
@@ -64,7 +65,9 @@ class Weaving(DriverSource):
 def ideal_setup(loaded: LoadedScenario, course: str, **timing: object) -> Setup:
     """Make a run of one AV that starts at 10 m/s behind the ideal planner."""
     return support.setup_of(support.moved(loaded, 10.0),
-                            avs=support.av_of(IDEAL, options=COURSES[course]), **timing)
+                            avs=support.av_of(IDEAL, options=COURSES[course]),
+                            # The circle leaves the road, and is not to be refused for that.
+                            drivability=DrivabilitySpec(road=False), **timing)
 
 
 def ways(result: OfflineResult) -> Array:
