@@ -109,6 +109,7 @@ setup(
             f'idm = {PACKAGE}.planner.idm:IdmPlanner',
             f'idm-package = {PACKAGE}.planner.idm_package:IdmPackagePlanner',
             f'reactive = {PACKAGE}.planner.reactive:ReactivePlanner',
+            f'reactive-package = {PACKAGE}.planner.reactive_package:ReactivePackagePlanner',
             f'constant-velocity = {PACKAGE}.planner.constant_velocity:ConstantVelocityPlanner',
         ],
     },

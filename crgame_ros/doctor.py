@@ -36,7 +36,7 @@ MODULES = (
     'commonroad_clcs.clcs', 'commonroad_dc.pycrcc', 'commonroad_idm_planner.idm_planner',
     'commonroad_rp.reactive_planner', 'mcap.writer', 'mcap_ros2.decoder', 'rosbags.highlevel',
 )
-# For polygon3, which is compiled and which only the planners reactive and idm-package need.
+# For polygon3, which is compiled and which only the planners of CommonRoad's packages need.
 COMPILE_FIX = 'apt install gcc python3-dev, remove .venv and start again'
 PROBE_TIMEOUT_S = 60.0
 JITTER_SLEEPS = 200

@@ -173,7 +173,7 @@ _crgame_make() {
         return 1
     fi
     if ! compgen -G "$venv/lib/python*/site-packages/polygon3-*.dist-info" >/dev/null; then
-        _crgame_say 'polygon3 did not compile: no planners reactive and idm-package;' \
+        _crgame_say 'polygon3 did not compile: no planners reactive, reactive-package, idm-package;' \
             'apt install gcc python3-dev, remove .venv and start again'
     fi
     _crgame_stamp

@@ -127,7 +127,7 @@ def test_every_entry_point_resolves(wheel: Path) -> None:
         parser.read_string(archive.read(name).decode())
     assert set(parser['console_scripts']) == {*NODES, 'crgame'}
     assert set(parser['crgame_ros.planners']) == {'idm', 'idm-package', 'reactive',
-                                                  'constant-velocity'}
+                                                  'reactive-package', 'constant-velocity'}
     missing = []
     for section in parser.sections():
         for entry, target in parser[section].items():

@@ -33,8 +33,8 @@ driver sources: cockpit (the run waits for somebody in the browser), auto (wheel
 keyboard, whichever is found), evdev[:NAME], keys:FILE, joy:FILE (scripted), joy (an external joy
 node), replay:BAG (without a game the recording's own), idle. Whoever they are, somebody in the
 browser can take the seat.
-planners: idm, idm-package, reactive, constant-velocity, a registered name, module:Class or
-file.py:Class."""
+planners: idm, idm-package, reactive, reactive-package, constant-velocity, a registered name,
+module:Class or file.py:Class."""
 
 
 @dataclass(frozen=True)

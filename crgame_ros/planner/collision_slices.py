@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predicted obstacles as one collision checker for each step of a request."""
 
-from collections.abc import Mapping
 import math
 
 from commonroad_dc import pycrcc
@@ -11,10 +10,9 @@ from numpy.typing import NDArray
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.planner.interface import PlanRequest
+from crgame_ros.planner.interface import PlannerContext, PlanRequest
 from crgame_ros.planner.obstacles import outline, prolong
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.vehicle.state import VehicleState
 
 Array = NDArray[np.float64]
@@ -28,6 +26,23 @@ CORES = (0.0, -0.1, -0.2, -0.4, -0.8)
 SMALLEST = 0.02
 
 
+class _Slice:
+    """
+    The obstacles at one time step, and the road.
+
+    :param checker: with the obstacles.
+    :param whole: asked for the road.
+    """
+
+    def __init__(self, checker: pycrcc.CollisionChecker, whole: 'CollisionSlices') -> None:
+        self._checker = checker
+        self._whole = whole
+
+    def collide(self, body: pycrcc.RectOBB) -> bool:
+        """Tell whether the ego there touches an obstacle or is off the road."""
+        return self._checker.collide(body) or self._whole.is_off_road(body)
+
+
 class CollisionSlices:
     """
     A stand-in for the drivability checker's `CollisionChecker`, sliced by time beforehand.
@@ -36,18 +51,21 @@ class CollisionSlices:
     check. Left out are followers in the ego's own lane, whose drivers keep the distance, and
     what the ego is in the middle of, which no plan avoids.
 
-    :param objects: description of everything that may appear.
-    :param vehicle: parameters of the ego.
+    What is off the road, further than the ego is now, collides too.
+
+    :param context: of the planner.
     :param margin: by which obstacles are enlarged on each side [m]
     """
 
-    def __init__(self, objects: Mapping[str, ObjectDescription], vehicle: VehicleParameters,
-                 margin: float) -> None:
-        self._objects = objects
-        self._vehicle = vehicle
+    def __init__(self, context: PlannerContext, margin: float) -> None:
+        self._objects = context.objects
+        self._vehicle = context.vehicle
         self._margin = margin
-        self._slices: list[pycrcc.CollisionChecker] = []
+        self._limit = RoadLimit(context)
+        self._slices: list[_Slice] = []
         self._k = 0
+        # By how much samples may leave the road beyond the ego's present place [m].
+        self.road_tolerance = 0.0
 
     def update(self, request: PlanRequest, steps: int) -> None:
         """
@@ -61,6 +79,8 @@ class CollisionSlices:
         chosen = [(column, margin) for column in self._near(request, poses)
                   if (margin := self._margin_of(request, poses[0, column], column, ego))
                   is not None]
+        self._limit.start(request.ego)
+        self.road_tolerance = 0.0
         self._slices = []
         for step in range(steps):
             checker = pycrcc.CollisionChecker()
@@ -68,9 +88,14 @@ class CollisionSlices:
                 body = self._body(request.obstacle_ids[column], poses[step, column], margin)
                 if body is not None:
                     checker.add_collision_object(body)
-            self._slices.append(checker)
+            self._slices.append(_Slice(checker, self))
 
-    def time_slice(self, k: int) -> pycrcc.CollisionChecker:
+    def is_off_road(self, body: pycrcc.RectOBB) -> bool:
+        """Tell whether a pose of the ego is off the road, further than now."""
+        x, y = body.center()
+        return self._limit.is_beyond(float(x), float(y), body.orientation(), self.road_tolerance)
+
+    def time_slice(self, k: int) -> '_Slice':
         """Give the obstacles at scenario time step k, the last ones beyond the horizon."""
         return self._slices[min(max(k - self._k, 0), len(self._slices) - 1)]
 

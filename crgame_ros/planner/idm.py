@@ -7,16 +7,22 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.planner.interface import Plan, PlanRequest
+from crgame_ros.planner.lane_gap import has_gap
 from crgame_ros.planner.obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_following import Longitudinal, PathPosition
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
 from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.planner.side_lanes import OWN_LANE, SideLane
 from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds
 from crgame_ros.planner.stop_lines import StopLines
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import StateColumn
+
+Array = NDArray[np.float64]
 
 LINE_GAP = 0.5
 STANDING = 0.1
@@ -102,30 +108,49 @@ class IdmPlanner(PathPlanner):
             self._longitudinal(request, position, leaders))
         return self.answer(request, states)
 
-    def target_speed(self, request: PlanRequest, time_s: float) -> float:
+    def speeds(self, request: PlanRequest, lane: SideLane = OWN_LANE, there: bool = False,
+               alone: bool = False) -> Array:
         """
-        Give the speed that the model reaches after a time, for planners that need a target.
+        Give the model's speeds over the horizon, for planners that need a target.
 
-        :param time_s: at most the horizon [s]
+        :param lane: for which to ask.
+        :param there: as if the ego were in that lane already.
+        :param alone: as if there were no obstacles.
+        :return: (S) [m/s]
         """
-        states = self.plan(request).states
-        return float(states[min(round(time_s / request.time_step_s), len(states) - 1), 3])
+        position = self.locate(request)
+        steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
+        leaders: list[Leader] = []
+        if not alone:
+            place = position._replace(d=lane.offset) if there else position
+            obstacles = self._obstacles(request, place, steps, lane.offset)
+            leaders = _leaders(obstacles, request, position.s, self._context.vehicle)
+        states = self.follower.drive(
+            request.ego, position, steps, request.time_step_s,
+            self._longitudinal(request, position, leaders, lane.end_s))
+        return states[:, StateColumn.SPEED]
 
-    def _obstacles(self, request: PlanRequest, position: PathPosition,
-                   steps: int) -> PathObstacles:
+    def has_gap(self, request: PlanRequest, lane: SideLane) -> bool:
+        """Tell whether the ego may change into a lane beside the path."""
+        return has_gap(self._projector, self._driving.path, request, self.locate(request).s,
+                       lane.offset, self._context.vehicle)
+
+    def _obstacles(self, request: PlanRequest, position: PathPosition, steps: int,
+                   offset: float = 0.0) -> PathObstacles:
         speed = max(request.ego.speed, 0.0)
         model = self._model
+        aside = position._replace(d=position.d - offset)
         corridor = Corridor(
-            position.s, position.d, self.follower.correction_length(position, speed),
+            position.s, position.d, self.follower.correction_length(aside, speed),
             40.0 + speed * (model.time_headway + self._horizon) + speed ** 2 / (2.0 * model.b),
-            0.5 * self._context.vehicle.width + self._lateral_margin, self._front)
+            0.5 * self._context.vehicle.width + self._lateral_margin, self._front, offset)
         return self._projector.project(self._driving.path, corridor, request, steps + 1)
 
-    def _longitudinal(self, request: PlanRequest, position: PathPosition,
-                      leaders: list[Leader]) -> Longitudinal:
+    def _longitudinal(self, request: PlanRequest, position: PathPosition, leaders: list[Leader],
+                      end_s: float = math.inf) -> Longitudinal:
         model, dt_s = self._model, request.time_step_s
         front, middle = self._front, self._context.vehicle.rear_to_center
-        halts = [self._driving.end_s]
+        halts = [min(self._driving.end_s, end_s)]
         line = self._stop_lines.halt_before(
             request.k, position.s + front, max(request.ego.speed, 0.0))
         if line is not None:

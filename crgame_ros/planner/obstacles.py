@@ -30,10 +30,12 @@ class Corridor:
 
     :param s: arc length of the ego's rear axle now [m]
     :param d: its offset to the left now [m]
-    :param return_length: length over which it takes the offset back [m]
+    :param return_length: length over which it moves to the target [m]
     :param ahead: how far obstacles matter [m]
     :param half_width: half the ego's width and the margin [m]
     :param front: distance from the rear axle to the front bumper [m]
+    :param target: offset to which it moves; 0 is the path itself [m]
+    :param behind: how far obstacles behind the ego are looked at [m]
     """
 
     s: float
@@ -42,11 +44,18 @@ class Corridor:
     ahead: float
     half_width: float
     front: float
+    target: float = 0.0
+    behind: float = 30.0
+
+    @property
+    def aside(self) -> float:
+        """Greatest distance of the ego from the path [m]."""
+        return max(abs(self.d), abs(self.target))
 
     def bounds(self, path: ReferencePath, s: Array) -> tuple[Array, Array]:
         """Give the least and the greatest offset that the ego covers at arc lengths s [m]."""
         u = np.clip((s - self.front - self.s) / max(self.return_length, 1.0), 0.0, 1.0)
-        offset = self.d * (1.0 - u * u * (3.0 - 2.0 * u))
+        offset = self.d + (self.target - self.d) * (u * u * (3.0 - 2.0 * u))
         # In a curve the front swings out of the rear axle's path.
         swing = path.pose_at(s - 0.5 * self.front)[..., 3] * (0.5 * self.front ** 2)
         swing = np.clip(swing, -1.0, 1.0)
@@ -104,7 +113,8 @@ class ObstacleProjector:
         low, high = corridor.bounds(path, s)
         with np.errstate(invalid='ignore'):
             close = ((d - radius < high) & (d + radius > low)
-                     & (s > corridor.s - 30.0) & (s < corridor.s + corridor.ahead + radius))
+                     & (s > corridor.s - corridor.behind)
+                     & (s < corridor.s + corridor.ahead + radius))
         kept = np.flatnonzero(close.any(axis=0))
         near, s = near[kept], s[:, kept]
         rear, front, right, left = _extents(path, poses[:, near], s, self._outlines[near])
@@ -124,9 +134,10 @@ class ObstacleProjector:
         """Choose the obstacles that may come near; their columns and centres (s, d), (S, K)."""
         near = self._near(path, corridor, poses)
         anchors = np.unique(np.linspace(0, len(poses) - 1, ANCHORS).astype(np.intp))
-        found, aside = path.project(poses[anchors[:, None], near, :2], corridor.s - 30.0,
+        found, aside = path.project(poses[anchors[:, None], near, :2],
+                                    corridor.s - corridor.behind,
                                     corridor.s + corridor.ahead + 40.0)
-        limit = self._radii[near] + corridor.half_width + abs(corridor.d) + ASIDE
+        limit = self._radii[near] + corridor.half_width + corridor.aside + ASIDE
         with np.errstate(invalid='ignore'):
             away = (aside > limit).all(axis=0) | (aside < -limit).all(axis=0)
         kept = np.flatnonzero(~away)
@@ -152,11 +163,11 @@ class ObstacleProjector:
         origin = np.take_along_axis(poses, first[None, :, None], axis=0)[0, :, :2]
         moved = np.hypot(*np.moveaxis(poses[..., :2] - origin, -1, 0))
         reach = np.nanmax(np.where(present, moved, 0.0), axis=0, initial=0.0)
-        low = max(0, int((corridor.s - 30.0) / path.step))
+        low = max(0, int((corridor.s - corridor.behind) / path.step))
         line = path.points[low:int((corridor.s + corridor.ahead) / path.step) + 2:8]
         distance = np.hypot(origin[:, 0, None] - line[None, :, 0],
                             origin[:, 1, None] - line[None, :, 1])
-        limit = reach + self._radii + corridor.half_width + abs(corridor.d) + 6.0
+        limit = reach + self._radii + corridor.half_width + corridor.aside + 6.0
         nearest = np.where(present.any(axis=0), distance.min(axis=1), np.inf)
         return np.flatnonzero(nearest < limit)
 

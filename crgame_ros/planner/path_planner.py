@@ -53,6 +53,11 @@ class PathPlanner(Planner):
         self._context = context
         self._plan_path(initial_state(context))
 
+    @property
+    def driving(self) -> DrivingPath:
+        """The path that is followed now; `locate` may replace it."""
+        return self._driving
+
     @abstractmethod
     def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
         """Prepare for a new path."""

@@ -1,47 +1,38 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The sampling-based planner commonroad-reactive-planner 2025.1, made fit for real time."""
+"""A reactive sampling planner that changes lanes, on commonroad-reactive-planner 2025.1."""
 
-import logging
+from collections.abc import Iterator
 import math
-import os
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
-# commonroad-clcs imports pyplot, which costs a second with a backend that has windows.
-os.environ.setdefault('MPLBACKEND', 'Agg')
+import numpy as np
+from numpy.typing import NDArray
 
-from commonroad.scenario.scenario import Scenario  # noqa: E402
-from commonroad_clcs.config import CLCSParams  # noqa: E402
-from commonroad_rp import reactive_planner as package  # noqa: E402
-from commonroad_rp.state import ReactivePlannerState  # noqa: E402
-from commonroad_rp.utility.config import ReactivePlannerConfiguration  # noqa: E402
-from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem  # noqa: E402
-import numpy as np  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
-
-from crgame_ros.errors import PlanningError  # noqa: E402
-from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
-from crgame_ros.geometry.curvilinear import CurvilinearFrame  # noqa: E402
-from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
-from crgame_ros.planner.idm import IdmPlanner  # noqa: E402
-from crgame_ros.planner.interface import Plan, PlannerContext, PlanRequest  # noqa: E402
-from crgame_ros.planner.path_following import PathPosition  # noqa: E402
-from crgame_ros.planner.path_planner import check_positive, PathPlanner  # noqa: E402
-from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
-from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
-from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState  # noqa: E402
+from crgame_ros.errors import PlanningError
+from crgame_ros.planner.idm import IdmPlanner
+from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.path_following import PathPosition
+from crgame_ros.planner.path_planner import check_positive
+from crgame_ros.planner.reactive_core import configuration, ReactiveCore, STANDING
+from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.planner.road_limit import TOLERANCE
+from crgame_ros.planner.side_lanes import OWN_LANE, road_bounds, side_lanes, SideLane
 
 Array = NDArray[np.float64]
 
 # The model's first stretch, from which the target speed is drawn [s].
 FIRST_S = 1.0
-STANDING = 0.05
-LOW_VELOCITY = 4.0
-# The frame is renewed when less than this lies ahead of the vehicle [m].
-FRAME_LENGTH = 400.0
-FRAME_RESERVE = 160.0
-ROAD_MARGIN = 0.2
 LEVELS = 3
+# What it must gain to leave the route's lane (the package's cost of an offset of one lane is that
+# of 2.5 m/s less than desired), to do so to the right, and to go where it is not heading [m/s].
+LEAVING = 2.5
+RIGHT = 0.5
+TURNING = 1.0
+# Nearer than this to a lane's centre line the ego is in that lane [m].
+INSIDE = 1.0
+# Lanes are looked for at least so far ahead [m].
+SHORTEST_LOOK = 15.0
 
 
 class _Samples:
@@ -57,15 +48,33 @@ class _Samples:
         return self._levels[level]
 
 
-class ReactivePlanner(PathPlanner):
+class _Aim(NamedTuple):
     """
-    Run commonroad-reactive-planner, a sampling planner in the curvilinear frame.
+    A lane to drive in, and how fast.
 
-    It samples quartic speed profiles around the speed that the Intelligent Driver Model would
-    reach, and quintic offsets; samples that break the vehicle's limits or hit a predicted
-    obstacle are dropped, the cheapest of the rest is the plan. Three sets of samples are tried
-    in turn: comfortable in the lane, evading within the lanes of the same direction, and
-    emergency braking and evading on the whole carriageway. Their number bounds the time.
+    :param loss: speed that is lost there against a free road, with what a change costs [m/s]
+    :param offset: of the lane's centre line to the left of the path [m]
+    :param speed: to aim at over the horizon [m/s]
+    """
+
+    loss: float
+    offset: float
+    speed: float
+
+
+class ReactivePlanner(Planner):
+    """
+    Sample trajectories in the curvilinear frame and drive the cheapest that is free.
+
+    This is the reactive planner of CRG IV (figures 10 and 11) on the package of its authors: it
+    predicts others at constant velocity and leaves its lane where another one of the same
+    direction is faster and free. For each lane the Intelligent Driver Model tells which speed it
+    allows; a lane is aimed at if it wins so much that the change pays, and if there is a gap.
+    The package then samples quartic speed profiles and quintic offsets to that lane; samples
+    that break the vehicle's limits, hit a predicted obstacle or leave the road are dropped, the
+    cheapest of the rest is the plan. If none is left the next best lane is tried, then evading
+    within the lanes of the same direction, then emergency braking and evading on the whole
+    carriageway. The number of samples bounds the time.
 
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
     :param horizon: length of a plan [s]
@@ -83,18 +92,15 @@ class ReactivePlanner(PathPlanner):
 
     def setup(self, context: PlannerContext) -> None:
         """Plan the path and build the package's planner."""
-        logging.getLogger('RP_LOGGER').setLevel(logging.ERROR)
+        self._context = context
         self._idm.setup(context)
-        self._steps = max(10, math.ceil(self._horizon / context.time_step_s - 1e-9))
-        self._slices = CollisionSlices(context.objects, context.vehicle, self._margin)
-        super().setup(context)
-
-    def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
-        """Build the package's planner and its coordinate system for a new path."""
-        self._lanes = _road_bounds(driving, vehicle, False)
-        self._carriageway = _road_bounds(driving, vehicle, True)
-        self._build_frame(driving.start_s)
-        self._planner = package.ReactivePlanner(self._configuration())
+        steps = max(10, math.ceil(self._horizon / context.time_step_s - 1e-9))
+        self._span_s = steps * context.time_step_s
+        config = configuration(context, steps)
+        config.sampling.num_sampling_levels = LEVELS
+        self._core = ReactiveCore(context, config, self._margin)
+        self._heading_for = 0.0
+        self._prepare(self._idm.driving)
 
     def plan(self, request: PlanRequest) -> Plan:
         """
@@ -102,152 +108,115 @@ class ReactivePlanner(PathPlanner):
 
         :raises PlanningError: if no sample is feasible and free of collisions.
         """
-        position = self.locate(request)
-        ego = request.ego
-        if ego.speed < -STANDING:
-            raise PlanningError('the vehicle rolls backwards, which the package cannot plan')
-        # A profile that has the whole horizon to change its speed begins gently, and only its
-        # beginning is driven before the next replanning: the target goes on from what the model
-        # does first, so that the beginning brakes as the model does.
-        first = self._idm.target_speed(request, FIRST_S)
-        target = max(0.0, ego.speed + (first - ego.speed) * self._horizon / FIRST_S)
-        if first > ego.speed:
-            target = self._idm.target_speed(request, self._horizon)
-        if ego.speed < STANDING and target < 5.0 * STANDING:
-            return self.answer(request, self._hold(ego))
-        if position.s > self._frame.last - FRAME_RESERVE:
-            self._build_frame(position.s)
-        self._slices.update(request, self._steps + 1)
-        self._reset(request, position)
-        self._set_samples(position, ego.speed, target)
-        for level in range(LEVELS):
-            found = self._planner.plan(level)
-            if found is not None:
-                return self.answer(request, self._states(request, found[0].state_list))
-        if ego.speed < STANDING:
-            return self.answer(request, self._hold(ego))
-        raise PlanningError('no sample is feasible and free of collisions')
+        position = self._idm.locate(request)
+        if self._idm.driving is not self._driving:
+            self._prepare(self._idm.driving)
+        self._core.start(request, self._driving, position)
+        aims = []
+        for aim in self._aims(request, position):
+            aims.append(aim)
+            states = self._comfortable(aim, position, request.ego.speed)
+            if states is not None:
+                self._heading_for = aim.offset
+                return Plan(request.stamp_ns, states)
+        states = self._evading(aims, position, request.ego.speed)
+        if states is None:
+            raise PlanningError('no sample is feasible and free of collisions')
+        return Plan(request.stamp_ns, states)
 
-    def _configuration(self) -> ReactivePlannerConfiguration:
-        context, vehicle = self._context, self._context.vehicle
-        config = ReactivePlannerConfiguration()
-        config.planning.dt = context.time_step_s
-        config.planning.time_steps_computation = self._steps
-        config.planning.low_vel_mode_threshold = LOW_VELOCITY
-        config.sampling.num_sampling_levels = LEVELS
-        config.sampling.t_min = max(config.sampling.t_min, 2.0 * context.time_step_s)
-        config.debug.multiproc = False
-        config.debug.logging_level = 'ERROR'
-        parameters = config.vehicle
-        parameters.length, parameters.width = vehicle.length, vehicle.width
-        parameters.wb_rear_axle = vehicle.rear_to_center
-        parameters.wb_front_axle = vehicle.wheelbase - vehicle.rear_to_center
-        parameters.a_max, parameters.v_switch = vehicle.max_acceleration, vehicle.switching_speed
-        parameters.delta_max = vehicle.max_steering_angle
-        parameters.delta_min = -vehicle.max_steering_angle
-        parameters.v_delta_max = vehicle.max_steering_rate
-        parameters.v_delta_min = -vehicle.max_steering_rate
-        parameters.__post_init__()
-        # The constructor would change the planning problem and build a collision checker of
-        # the whole scenario, which the slices replace: it gets neither.
-        config.update(Scenario(context.time_step_s), None)
-        return config
+    def _prepare(self, driving: DrivingPath) -> None:
+        """Take over a new path."""
+        self._driving = driving
+        self._lanes = road_bounds(driving, self._context.vehicle, False)
+        self._carriageway = road_bounds(driving, self._context.vehicle, True)
 
-    def _build_frame(self, s: float) -> None:
-        """Build the coordinate system of the path from behind the vehicle on."""
-        self._frame = CurvilinearFrame(self._driving.path, s - 30.0, s + FRAME_LENGTH)
-        points = self._frame.points
-        self._system = CoordinateSystem(points, preprocess_reference=False,
-                                        clcs_params=CLCSParams())
+    def _aims(self, request: PlanRequest, position: PathPosition) -> Iterator[_Aim]:
+        """Go through the lanes that may be driven in, the best first."""
+        look = position.s + max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
+        sides = side_lanes(self._driving, look, self._context.vehicle)
+        nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
+        free = float(self._idm.speeds(request, alone=True)[-1])
+        own = self._aim(request, position, OWN_LANE, nearest, free)
+        if own is not None and own.loss < LEAVING:
+            # No other lane can be better: they are looked at only if this one fails.
+            yield own
+            own = None
+        aims = [own, *(self._aim(request, position, lane, nearest, free) for lane in sides)]
+        yield from sorted(aim for aim in aims if aim is not None)
 
-    def _reset(self, request: PlanRequest, position: PathPosition) -> None:
-        """Hand the state over; the package compares headings without wrapping them."""
-        ego = request.ego
-        planner = self._planner
-        planner._low_vel_mode = ego.speed < LOW_VELOCITY
-        system = self._system
-        here = system.convert_to_curvilinear_coords(ego.x, ego.y)
-        heading = float(np.interp(here[0], system.ref_pos, system.ref_theta))
-        self._turn = heading + wrap_pi(ego.yaw - heading) - ego.yaw
-        limit = self._context.vehicle.max_steering_angle
-        state = ReactivePlannerState(
-            time_step=request.k, position=np.array([ego.x, ego.y]),
-            orientation=ego.yaw + self._turn, velocity=max(ego.speed, 0.0),
-            acceleration=ego.acceleration, yaw_rate=ego.yaw_rate,
-            steering_angle=min(max(ego.steering_angle, -limit), limit))
-        planner.reset(initial_state_cart=state, collision_checker=self._slices,
-                      coordinate_system=system)
+    def _aim(self, request: PlanRequest, position: PathPosition, lane: SideLane,
+             nearest: SideLane, free: float) -> _Aim | None:
+        """Judge one lane; None if there is no gap in it."""
+        inside = lane is nearest or abs(lane.offset - position.d) < INSIDE
+        if not inside and not self._idm.has_gap(request, lane):
+            return None
+        # Whom it passes on the way over is no leader: the samples keep clear of them.
+        speeds = self._idm.speeds(request, lane, there=not inside)
+        loss = free - float(speeds[-1])
+        if lane is not OWN_LANE:
+            loss += LEAVING + RIGHT * (lane.offset < 0.0)
+        if abs(lane.offset - self._heading_for) > INSIDE:
+            loss += TURNING
+        return _Aim(loss, lane.offset, self._target(request, speeds))
 
-    def _set_samples(self, position: PathPosition, speed: float, target: float) -> None:
-        planner, horizon = self._planner, self._steps * self._context.time_step_s
-        # Told the current speed, the package would take the goal's speed instead at 0 m/s.
-        planner.set_desired_velocity(target)
+    def _target(self, request: PlanRequest, speeds: Array) -> float:
+        """
+        Draw the speed to aim at from the model's speeds.
+
+        A profile that has the whole horizon to change its speed begins gently, and only its
+        beginning is driven before the next replanning: the target goes on from what the model
+        does first, so that the beginning brakes as the model does.
+        """
+        speed = request.ego.speed
+        first = float(speeds[min(round(FIRST_S / request.time_step_s), len(speeds) - 1)])
+        target = max(0.0, speed + (first - speed) * self._horizon / FIRST_S)
+        if first > speed:
+            target = float(speeds[-1])
+        # At rest the package keeps standing, where less than this is wanted.
+        return 0.0 if speed < STANDING and target < 5.0 * STANDING else target
+
+    def _comfortable(self, aim: _Aim, position: PathPosition, speed: float) -> Array | None:
+        """Drive to the lane and its speed."""
+        middle, late = self._time(0.6), self._time(1.0)
+        slower = max(aim.speed - 2.0, 0.0)
+        # Over to another lane it takes the whole horizon, for comfort.
+        over = abs(aim.offset - position.d) > INSIDE
+        return self._sample(0, aim, {late} if over else {middle, late},
+                            {aim.speed, slower, 0.5 * (aim.speed + speed)}, {aim.offset})
+
+    def _evading(self, aims: list[_Aim], position: PathPosition, speed: float) -> Array | None:
+        """Try wider samples, then emergency braking and evading."""
+        # In the lane that the ego is in somebody may have left no speed at all.
+        aim = aims[0] if aims else _Aim(0.0, position.d, 0.0)
+        times = {self._time(0.34), self._time(0.6), self._time(1.0)}
         low, high = self._within(self._lanes, position.s, speed)
-        lowest, highest = self._within(self._carriageway, position.s, speed)
+        states = self._sample(1, aim, times, {aim.speed, 0.5 * aim.speed, 0.0, speed},
+                              {low, high, *(aim.offset for aim in aims)})
+        if states is not None:
+            return states
+        low, high = self._within(self._carriageway, position.s, speed)
+        self._core.slices.road_tolerance = TOLERANCE
+        return self._sample(2, aim, times, {0.0, 0.5 * speed, speed}, {low, high})
+
+    def _sample(self, level: int, aim: _Aim, times: set[float], speeds: set[float],
+                offsets: set[float]) -> Array | None:
+        planner = self._core.planner
+        # Told the current speed, the package would take the goal's speed instead at 0 m/s.
+        planner.set_desired_velocity(aim.speed)
+        planner.cost_function.desired_d = aim.offset
         space = planner.sampling_space
-        early, middle, late = (_grid(share, horizon, self._context.time_step_s)
-                               for share in (0.34, 0.6, 1.0))
-        space.samples_t = _Samples({middle, late}, {early, middle, late},
-                                   {early, middle, late})
-        slower = max(target - 2.0, 0.0)
-        space.samples_v = _Samples(
-            {target, slower, 0.5 * (target + speed)},
-            {target, 0.5 * target, 0.0, speed},
-            {0.0, 0.5 * speed, speed})
         # The package adds the present offset to each set.
-        space.samples_d = _Samples({0.0}, {0.0, low, high}, {lowest, highest})
+        for name, values in (('t', times), ('v', speeds), ('d', offsets)):
+            setattr(space, f'samples_{name}', _Samples(*[values] * LEVELS))
+        return self._core.plan(level)
+
+    def _time(self, share: float) -> float:
+        """Round a share of the horizon to the time grid, at least two steps [s]."""
+        dt_s = self._context.time_step_s
+        return max(2, round(share * self._span_s / dt_s)) * dt_s
 
     def _within(self, bounds: Array, s: float, speed: float) -> tuple[float, float]:
         """Give the offsets that stay within bounds as far as the vehicle can get."""
         first = int(s / self._driving.path.step)
         last = first + int((speed + 5.0) * self._horizon / self._driving.path.step) + 1
         return float(bounds[first:last, 0].max()), float(bounds[first:last, 1].min())
-
-    def _states(self, request: PlanRequest, found: list[ReactivePlannerState]) -> Array:
-        """Take over the package's states; at standstill it returns one too few."""
-        states = np.zeros((max(len(found), self._steps + 1), STATE_WIDTH))
-        for row, state in zip(states, found, strict=False):
-            row[:7] = (*state.position, state.orientation - self._turn, state.velocity,
-                       state.steering_angle, state.acceleration, state.yaw_rate)
-        states[len(found):, :5] = states[len(found) - 1, :5]
-        states[:-1, 7] = np.diff(states[:, 4]) / request.time_step_s
-        states[0] = request.ego
-        return states
-
-    def _hold(self, ego: VehicleState) -> Array:
-        """Stand still."""
-        states = np.zeros((self._steps + 1, STATE_WIDTH))
-        states[:] = (ego.x, ego.y, ego.yaw, 0.0, ego.steering_angle, 0.0, 0.0, 0.0)
-        states[0] = ego
-        return states
-
-
-def _grid(share: float, horizon: float, dt_s: float) -> float:
-    """Round a share of the horizon to the time grid, at least two steps [s]."""
-    return max(2, round(share * horizon / dt_s)) * dt_s
-
-
-def _road_bounds(driving: DrivingPath, vehicle: VehicleParameters, oncoming: bool) -> Array:
-    """
-    Find how far the rear axle may leave the path before the vehicle leaves the carriageway.
-
-    :param oncoming: count neighbouring lanes of the other direction as carriageway too.
-    :return: (N, 2) least and greatest offset at the path's samples [m]
-    """
-    roads, s = driving.roads, driving.path.s
-    bounds = np.zeros((len(s), 2))
-    reserve = 0.5 * vehicle.width + ROAD_MARGIN
-    for lanelet, (first, last) in zip(driving.lanelets, driving.lanelet_spans, strict=True):
-        inside = (s >= first) & (s <= last)
-        middle = 0.5 * roads.line(lanelet).length
-        half = 0.5 * roads.width_at(lanelet, middle)
-        own = roads.lanelet_network.find_lanelet_by_id(lanelet)
-        sides = []
-        for neighbour, same_way in ((own.adj_right, own.adj_right_same_direction),
-                                    (own.adj_left, own.adj_left_same_direction)):
-            usable = (neighbour in roads.lanelet_ids and roads.is_for_cars(neighbour)
-                      and (same_way or oncoming))
-            sides.append(max(0.0, half - reserve
-                             + (roads.width_at(neighbour, middle) if usable else 0.0)))
-        bounds[inside] = (-sides[0], sides[1])
-    return bounds

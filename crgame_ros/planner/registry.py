@@ -15,6 +15,7 @@ BUILT_IN = {
     'idm': 'crgame_ros.planner.idm:IdmPlanner',
     'idm-package': 'crgame_ros.planner.idm_package:IdmPackagePlanner',
     'reactive': 'crgame_ros.planner.reactive:ReactivePlanner',
+    'reactive-package': 'crgame_ros.planner.reactive_package:ReactivePackagePlanner',
     'constant-velocity': 'crgame_ros.planner.constant_velocity:ConstantVelocityPlanner',
 }
 

@@ -15,7 +15,7 @@ HALF_CAR = 2.25
 
 def slices(vehicle: VehicleParameters, obstacle: tuple[float, ...]) -> CollisionSlices:
     given = support.context(support.straight(), support.problem(5.0))
-    made = CollisionSlices(given.objects, vehicle, 0.15)
+    made = CollisionSlices(given, 0.15)
     made.update(support.request(VehicleState(0.0, 0.0, 0.0, 5.0), 0, (obstacle,)), 31)
     return made
 

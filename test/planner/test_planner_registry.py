@@ -23,8 +23,8 @@ DOCUMENT = Path(__file__).resolve().parents[2] / 'docs' / 'planners.md'
 
 
 def test_names_begin_with_the_built_in_ones() -> None:
-    assert registry.planner_names()[:4] == ('idm', 'idm-package', 'reactive',
-                                            'constant-velocity')
+    assert registry.planner_names()[:5] == ('idm', 'idm-package', 'reactive',
+                                            'reactive-package', 'constant-velocity')
 
 
 @pytest.mark.parametrize('name', ['idm', 'crgame_ros.planner.idm:IdmPlanner'])
@@ -48,7 +48,8 @@ def test_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(('name', 'message'), [
-    ('idem', 'there is no planner "idem".*idm, idm-package, reactive, constant-velocity'),
+    ('idem', 'there is no planner "idem".*idm, idm-package, reactive, reactive-package, '
+     'constant-velocity'),
     ('no_such_module:Planner', 'cannot import no_such_module'),
     ('crgame_ros.planner.idm:Nothing', 'has no class "Nothing"'),
     ('crgame_ros.planner.idm:Leader', 'is no planner'),

@@ -17,8 +17,7 @@ from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
-from crgame_ros.scenario.game import AvSpec, HumanSpec
-from crgame_ros.scenario.game import DrivabilitySpec, HumanSpec
+from crgame_ros.scenario.game import AvSpec, DrivabilitySpec, HumanSpec
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline

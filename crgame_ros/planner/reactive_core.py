@@ -1,0 +1,169 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What both planners on commonroad-reactive-planner 2025.1 need to run it on plan requests."""
+
+from copy import deepcopy
+import logging
+import os
+
+# commonroad-clcs imports pyplot, which costs a second with a backend that has windows.
+os.environ.setdefault('MPLBACKEND', 'Agg')
+
+from commonroad.scenario.scenario import Scenario  # noqa: E402
+from commonroad_clcs.config import CLCSParams  # noqa: E402
+from commonroad_rp import reactive_planner as package  # noqa: E402
+from commonroad_rp.state import ReactivePlannerState  # noqa: E402
+from commonroad_rp.trajectories import TrajectoryBundle, TrajectorySample  # noqa: E402
+from commonroad_rp.utility.config import ReactivePlannerConfiguration  # noqa: E402
+from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem  # noqa: E402
+import numpy as np  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
+
+from crgame_ros.errors import PlanningError  # noqa: E402
+from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
+from crgame_ros.geometry.curvilinear import CurvilinearFrame  # noqa: E402
+from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
+from crgame_ros.planner.interface import PlannerContext, PlanRequest  # noqa: E402
+from crgame_ros.planner.path_following import PathPosition  # noqa: E402
+from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
+from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
+from crgame_ros.vehicle.state import STATE_WIDTH  # noqa: E402
+
+Array = NDArray[np.float64]
+
+# A vehicle that rolls backwards no faster is taken to stand [m/s].
+STANDING = 0.05
+# The frame begins so far behind the vehicle, is so long, and is renewed when less lies ahead [m].
+FRAME_BEHIND = 30.0
+FRAME_LENGTH = 500.0
+FRAME_RESERVE = 300.0
+
+
+def configuration(context: PlannerContext, steps: int) -> ReactivePlannerConfiguration:
+    """
+    Make the package's default configuration, with the vehicle, the grid and the horizon set.
+
+    :param steps: length of a plan in scenario steps.
+    """
+    config = ReactivePlannerConfiguration()
+    config.planning.dt = context.time_step_s
+    config.planning.time_steps_computation = steps
+    # It refuses to sample times below two steps.
+    config.sampling.t_min = max(config.sampling.t_min, 2.0 * context.time_step_s)
+    # Its processes wait for ever when one of them fails.
+    config.debug.multiproc = False
+    config.debug.logging_level = 'ERROR'
+    _describe(config, context.vehicle)
+    return config
+
+
+def _describe(config: ReactivePlannerConfiguration, vehicle: VehicleParameters) -> None:
+    parameters = config.vehicle
+    parameters.length, parameters.width = vehicle.length, vehicle.width
+    parameters.wb_rear_axle = vehicle.rear_to_center
+    parameters.wb_front_axle = vehicle.wheelbase - vehicle.rear_to_center
+    parameters.a_max, parameters.v_switch = vehicle.max_acceleration, vehicle.switching_speed
+    parameters.delta_max = vehicle.max_steering_angle
+    parameters.delta_min = -vehicle.max_steering_angle
+    parameters.v_delta_max = vehicle.max_steering_rate
+    parameters.v_delta_min = -vehicle.max_steering_rate
+    parameters.__post_init__()
+
+
+class _Planner(package.ReactivePlanner):
+    """The package's planner, which at rest fails over its own message if no sample is feasible."""
+
+    def _get_optimal_trajectory(self, trajectory_bundle: TrajectoryBundle,
+                                ) -> TrajectorySample | None:
+        found = super()._get_optimal_trajectory(trajectory_bundle)
+        if found is None and self.x_0.velocity <= STANDING:
+            # It goes on to stand, and wants to compare the costs with those of a sample.
+            standing = self._compute_standstill_trajectory()
+            standing.cost = self.cost_function
+            trajectory_bundle.trajectories = [standing]
+        return found
+
+
+class ReactiveCore:
+    """
+    Runs the package's planner on a driving path, one request after the other.
+
+    :param context: of the planner.
+    :param config: what the package is to be set to.
+    :param margin: by which obstacles are enlarged on each side [m]
+    """
+
+    def __init__(self, context: PlannerContext, config: ReactivePlannerConfiguration,
+                 margin: float) -> None:
+        logging.getLogger('RP_LOGGER').setLevel(logging.ERROR)
+        self._vehicle = context.vehicle
+        self._steps: int = config.planning.time_steps_computation
+        self._low_velocity: float = config.planning.low_vel_mode_threshold
+        self.slices = CollisionSlices(context, margin)
+        # The constructor would build a collision checker of the whole scenario, which the slices
+        # replace, and it changes the planning problem: it gets an empty scenario and a copy.
+        config.update(Scenario(context.time_step_s), None)
+        self.planner = _Planner(config)
+        config.planning_problem = deepcopy(context.planning_problem)
+        self._driving: DrivingPath | None = None
+
+    def start(self, request: PlanRequest, driving: DrivingPath, position: PathPosition) -> None:
+        """
+        Hand a request over to the package.
+
+        :param driving: the path that its curvilinear frame follows.
+        :param position: where the ego is on it.
+        :raises PlanningError: if the ego rolls backwards or an obstacle was never described.
+        """
+        ego = request.ego
+        if ego.speed < -STANDING:
+            raise PlanningError('the vehicle rolls backwards, which the package cannot plan')
+        if driving is not self._driving or position.s > self._frame.last - FRAME_RESERVE:
+            self._build_frame(driving, position.s)
+        self.slices.update(request, self._steps + 1)
+        system = self._system
+        here = system.convert_to_curvilinear_coords(ego.x, ego.y)
+        heading = float(np.interp(here[0], system.ref_pos, system.ref_theta))
+        # The package compares headings without wrapping them.
+        self._turn = heading + wrap_pi(ego.yaw - heading) - ego.yaw
+        limit = self._vehicle.max_steering_angle
+        state = ReactivePlannerState(
+            time_step=request.k, position=np.array([ego.x, ego.y]),
+            orientation=ego.yaw + self._turn, velocity=max(ego.speed, 0.0),
+            acceleration=ego.acceleration, yaw_rate=ego.yaw_rate,
+            steering_angle=min(max(ego.steering_angle, -limit), limit))
+        # It needs this before `reset`, but sets it after.
+        self.planner._low_vel_mode = ego.speed < self._low_velocity
+        self.planner.reset(initial_state_cart=state, collision_checker=self.slices,
+                           coordinate_system=system)
+        self._request = request
+
+    def plan(self, level: int | None = None) -> Array | None:
+        """
+        Let the package plan the request of `start`.
+
+        :param level: of sampling; None goes through all but the coarsest, as shipped
+        :return: (S, 8) rear-axle states, or None if no sample is feasible.
+        """
+        # It divides by the spread of the costs, which may be 0, for a message that nobody reads.
+        with np.errstate(divide='ignore', invalid='ignore'):
+            found = self.planner.plan(level)
+        return None if found is None else self._states(found[0].state_list)
+
+    def _build_frame(self, driving: DrivingPath, s: float) -> None:
+        """Build the coordinate system of the path from behind the vehicle on."""
+        self._driving = driving
+        self._frame = CurvilinearFrame(driving.path, s - FRAME_BEHIND, s + FRAME_LENGTH)
+        self._system = CoordinateSystem(self._frame.points, preprocess_reference=False,
+                                        clcs_params=CLCSParams())
+
+    def _states(self, found: list[ReactivePlannerState]) -> Array:
+        """Take over the package's states; at standstill it returns one too few."""
+        states = np.zeros((max(len(found), self._steps + 1), STATE_WIDTH))
+        for row, state in zip(states, found, strict=False):
+            row[:7] = (*state.position, state.orientation - self._turn, state.velocity,
+                       state.steering_angle, state.acceleration, state.yaw_rate)
+        states[len(found):, :5] = states[len(found) - 1, :5]
+        states[:-1, 7] = np.diff(states[:, 4]) / self._request.time_step_s
+        states[0] = self._request.ego
+        return states

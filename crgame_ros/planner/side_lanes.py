@@ -1,0 +1,117 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The lanes beside a path that a vehicle may use, and how far the carriageway reaches."""
+
+from collections.abc import Iterator
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+Array = NDArray[np.float64]
+
+ROAD_MARGIN = 0.2
+# Between the samples at which widths are looked up [m].
+SPACING = 5.0
+# The centre lines of lanes that run beside each other are so far apart [m].
+NEAREST, FARTHEST = 2.0, 6.0
+
+
+class SideLane(NamedTuple):
+    """
+    A lane beside the path.
+
+    :param offset: of its centre line to the left of the path [m]
+    :param end_s: arc length of the path up to which the lane goes on beside it [m]
+    """
+
+    offset: float
+    end_s: float
+
+
+OWN_LANE = SideLane(0.0, math.inf)
+
+
+def side_lanes(driving: DrivingPath, s: float, vehicle: VehicleParameters) -> list[SideLane]:
+    """
+    List the lanes of the same direction beside the path at an arc length, the left one first.
+
+    :param s: [m]
+    """
+    roads, spans = driving.roads, driving.lanelet_spans
+    inside = np.flatnonzero((spans[:, 0] <= s) & (s <= spans[:, 1]))
+    if not len(inside):
+        return []
+    first = int(inside[0])
+    point = driving.path.pose_at(np.array([s]))[:, :2]
+    found = []
+    for neighbour_of in (RoadNetwork.left_of, RoadNetwork.right_of):
+        beside = neighbour_of(roads, driving.lanelets[first])
+        if beside not in roads.lanelet_ids or not roads.is_for_cars(beside):
+            continue
+        along, aside = roads.line(beside).project(point)
+        offset = -float(aside[0])
+        if (NEAREST < abs(offset) < FARTHEST
+                and roads.width_at(beside, float(along[0])) > vehicle.width + 2.0 * ROAD_MARGIN):
+            found.append(SideLane(offset, _end(driving, first, neighbour_of)))
+    return found
+
+
+def _end(driving: DrivingPath, first: int, neighbour_of: object) -> float:
+    """Follow the path's lanelets as long as the next one has that neighbour too."""
+    roads = driving.roads
+    beside = neighbour_of(roads, driving.lanelets[first])  # type: ignore[operator]
+    for index in range(first, len(driving.lanelets)):
+        if index == len(driving.lanelets) - 1:
+            return np.inf
+        following = driving.lanelets[index + 1]
+        successors = roads.lanelet_network.find_lanelet_by_id(beside).successor
+        beside = neighbour_of(roads, following)  # type: ignore[operator]
+        if beside not in successors:
+            return float(driving.lanelet_spans[index, 1])
+    return np.inf
+
+
+def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, oncoming: bool) -> Array:
+    """
+    Find how far the rear axle may leave the path before the vehicle leaves the carriageway.
+
+    :param oncoming: count neighbouring lanes of the other direction as carriageway too.
+    :return: (N, 2) least and greatest offset at the path's samples [m]
+    """
+    s = driving.path.s
+    bounds = np.zeros((len(s), 2))
+    reserve = 0.5 * vehicle.width + ROAD_MARGIN
+    for lanelet, (first, last) in zip(driving.lanelets, driving.lanelet_spans, strict=True):
+        inside = (s >= first) & (s <= last)
+        if not inside.any():
+            continue
+        at = np.append(np.arange(first, last, SPACING), last)
+        points = driving.path.pose_at(at)[:, :2]
+        along, aside = driving.roads.line(lanelet).project(points)
+        widths = np.array([list(_widths(driving.roads, lanelet, float(place), oncoming))
+                           for place in along])
+        half = 0.5 * widths[:, 0]
+        # The path is not in the lane's middle while it changes lanes.
+        right = np.maximum(half + aside - reserve + widths[:, 1], 0.0)
+        left = np.maximum(half - aside - reserve + widths[:, 2], 0.0)
+        bounds[inside] = np.column_stack((np.interp(s[inside], at, -right),
+                                          np.interp(s[inside], at, left)))
+    return bounds
+
+
+def _widths(roads: RoadNetwork, lanelet: int, s: float, oncoming: bool) -> Iterator[float]:
+    """Give the widths of a lanelet and of what may be used on its right and left [m]."""
+    own = roads.lanelet_network.find_lanelet_by_id(lanelet)
+    yield roads.width_at(lanelet, s)
+    for neighbour, same_way in ((own.adj_right, own.adj_right_same_direction),
+                                (own.adj_left, own.adj_left_same_direction)):
+        usable = (neighbour in roads.lanelet_ids and roads.is_for_cars(neighbour)
+                  and (same_way or oncoming))
+        place = s if same_way or not usable else roads.line(neighbour).length - s
+        yield roads.width_at(neighbour, place) if usable else 0.0

@@ -1,0 +1,99 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The cut-in of the paper (CRG figures 8 to 11): idm stops behind the human, reactive passes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_game, with_planners
+from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.scenario.export import write_scenario
+from crgame_ros.scenario.game import Game, LaneletSpawn
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
+
+LANE_WIDTH = 3.75
+
+
+@pytest.fixture
+def game(project_root: Path) -> Game:
+    """Give the cut-in."""
+    return effective_game(RunRequest(game=project_root / 'scenarios' / 'cut_in.yaml'))
+
+
+def perturbed(game: Game, ahead: float, speed: float) -> Game:
+    """Let the human start elsewhere, at another speed."""
+    human = game.humans[0]
+    assert isinstance(human.spawn, LaneletSpawn)
+    spawn = replace(human.spawn, s=human.spawn.s + ahead, speed=speed)
+    return replace(game, humans=(replace(human, spawn=spawn),))
+
+
+def run(game: Game, planner: str, latency: int) -> OfflineResult:
+    """Run the game, and check that the AV touches nobody and stays on the road."""
+    result = run_offline(with_planners(build_setup(game), (planner,)), latency_steps=latency)
+    assert [item for item in result.violations if not item.is_valid] == []
+    return result
+
+
+def check_passed(result: OfflineResult) -> None:
+    """Check that the AV went round the human through the lane beside, and drove on."""
+    av, human = result.states_of('av0'), result.states_of('hv0')
+    # The human stands in the AV's lane at the end, and the AV is far beyond, fast and back.
+    assert abs(human[-1, 1]) < 0.5
+    assert human[-1, 3] < 0.1
+    assert av[-1, 0] > human[-1, 0] + 50.0
+    assert av[-1, 3] > 15.0
+    assert abs(av[-1, 1]) < 0.5
+    beside = np.argmin(np.abs(av[:, 0] - human[:, 0]) + 1e3 * (np.abs(av[:, 1]) < 1.0))
+    assert abs(av[beside, 1] - human[beside, 1]) == pytest.approx(LANE_WIDTH, abs=1.0)
+    record = result.planners['av0']
+    # All answers are the package's: none a fallback, none refused.
+    assert record.accepted_ratio == 1.0
+    assert record.statistics.fallbacks == record.counters.refused == 0
+
+
+@pytest.mark.parametrize('latency', [0, 5])
+def test_idm_brakes_behind_the_human_and_stops(game: Game, latency: int) -> None:
+    result = run(game, 'idm', latency)
+    av, human = result.states_of('av0'), result.states_of('hv0')
+    assert av[-1, 3] < 0.1
+    assert np.abs(av[:, 1]).max() < 0.1
+    # Rear axle to rear axle: a car's length of 4.5 m and a gap of about s0 = 2 m.
+    assert 5.5 < human[-1, 0] - av[-1, 0] < 9.5
+
+
+@pytest.mark.parametrize('latency', [0, 5])
+def test_reactive_passes_beside(game: Game, latency: int) -> None:
+    check_passed(run(game, 'reactive', latency))
+
+
+@pytest.mark.parametrize(('ahead', 'speed'), [(-6.0, 26.0), (10.0, 26.0), (4.0, 24.0)],
+                         ids=['later', 'earlier', 'slower'])
+def test_both_do_so_in_other_games(game: Game, ahead: float, speed: float) -> None:
+    other = perturbed(game, ahead, speed)
+    check_passed(run(other, 'reactive', 5))
+    assert run(other, 'idm', 5).states_of('av0')[-1, 3] < 0.1
+
+
+def test_exported_cut_in_stays_on_the_road_driven_again(game: Game, tmp_path: Path) -> None:
+    """
+    Also as the human's planning problem has it, whose route changes lanes to the right.
+
+    The lanelets of that lane change had common parts of the path, so that the bounds of the one
+    were taken for those of the other, and the AV left the road for 1.8 s.
+    """
+    first = run(game, 'reactive', 0)
+    path = tmp_path / 'driven.xml'
+    write_scenario(run_log_of(first), path)
+    again = effective_game(RunRequest(scenario=path, driver='idle', duration_s=10.0))
+    setup = with_planners(build_setup(again), ('reactive',))
+    result = run_offline(setup)
+    violations = [item for item in result.violations if item.vehicle_id.startswith('av')]
+    assert not any(item.off_road for item in violations)
+    for av in setup.avs:
+        assert result.planners[av.id].accepted_ratio >= 0.95
