@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
-from crgame_ros.planner.interface import Plan, PlanRequest
+from crgame_ros.planner.interface import Plan, PlannerContext, PlanRequest
+from crgame_ros.planner.lane_change import LaneChange, Verdict
 from crgame_ros.planner.lane_gap import has_gap
 from crgame_ros.planner.obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_following import Longitudinal, PathPosition
@@ -20,7 +21,7 @@ from crgame_ros.planner.side_lanes import OWN_LANE, SideLane
 from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds
 from crgame_ros.planner.stop_lines import StopLines
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import StateColumn
+from crgame_ros.vehicle.state import StateColumn, VehicleState
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ STANDING = 0.1
 START_SHARE = 0.2
 # Who may still come into the way is answered less hard than who is in the way [m/s^2].
 ANTICIPATION_LIMIT = 3.0
+# Share of the desired speed with which it lets others by while it waits for a gap beside it.
+YIELDING = 0.8
 PASSING_MARGIN_S = 0.5
 PASSING_MARGIN = 2.0
 
@@ -58,7 +61,8 @@ class IdmPlanner(PathPlanner):
 
     At each step of the horizon a = a0 (1 - (v / v0)^4 - (s* / s)^2) with the nearest obstacle
     that the request predicts to be in the corridor then; red lights, stop signs and the end of
-    the road count as standing obstacles; curves and speed limits bound the speed.
+    the road count as standing obstacles; curves and speed limits bound the speed. Where the route
+    changes lanes it does so into a gap, and keeps its lane, to the end if need be, without one.
 
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
     :param time_headway: T [s]
@@ -89,17 +93,48 @@ class IdmPlanner(PathPlanner):
         """Compute the speeds along a new path and find its stop lines."""
         context = self._context
         desired = desired_speeds(driving, self._v0, default_speed(context.planning_problem))
+        if self._change is not None and driving is self._change.kept:
+            desired = YIELDING * desired
         self._desired: list[float] = np.minimum(desired, vehicle.max_speed).tolist()
         self._admissible: list[float] = admissible_speeds(
             driving, desired, vehicle, self._lateral_acceleration, self._model.b).tolist()
         self._stop_lines = StopLines(context.scenario, driving, self._model.b_max,
                                      self._model.b + 1.0)
-        self._projector = ObstacleProjector(context.objects)
         self._front = vehicle.rear_to_center + 0.5 * vehicle.length
+
+    def setup(self, context: PlannerContext) -> None:
+        """Plan the path from the planning problem's initial state."""
+        self._projector = ObstacleProjector(context.objects)
+        self._change: LaneChange | None = None
+        super().setup(context)
+
+    def follow(self, request: PlanRequest) -> PathPosition:
+        """
+        Find the ego on its path, and put the route's next lane change off until there is a gap.
+
+        :raises PlanningError: if there is no road to follow.
+        """
+        position = self.locate(request)
+        change = self._change
+        if change is None:
+            return position
+        verdict = change.judge(request)
+        keeping = self._driving is change.kept
+        if verdict is Verdict.BLOCKED and not keeping:
+            self._take_path(change.kept, request.ego)
+        elif verdict is Verdict.DONE or (keeping and verdict is Verdict.FREE):
+            # From here on, into the gap; or on to the next change, if there is one.
+            self._plan_path(request.ego)
+        return self.locate(request)
+
+    def _plan_path(self, start: VehicleState) -> None:
+        super()._plan_path(start)
+        self._change = None if self._driving.change_to is None else LaneChange(
+            self._context, self._driving, start, self._projector)
 
     def plan(self, request: PlanRequest) -> Plan:
         """Plan over the horizon; see the class."""
-        position = self.locate(request)
+        position = self.follow(request)
         steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
         obstacles = self._obstacles(request, position, steps)
         leaders = _leaders(obstacles, request, position.s, self._context.vehicle)

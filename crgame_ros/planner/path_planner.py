@@ -88,12 +88,17 @@ class PathPlanner(Planner):
 
     def _plan_path(self, start: VehicleState) -> None:
         context = self._context
-        self._driving = plan_driving_path(
-            context.scenario, context.planning_problem, start, context.vehicle, self.follow_lane)
+        self._take_path(plan_driving_path(
+            context.scenario, context.planning_problem, start, context.vehicle,
+            self.follow_lane), start)
+
+    def _take_path(self, driving: DrivingPath, start: VehicleState) -> None:
+        """Follow a path that was planned from where the vehicle is."""
+        self._driving = driving
         self._planned_at = (start.x, start.y)
-        self._last_s = self._driving.start_s
-        self.follower = PathFollower(self._driving.path, context.vehicle)
-        self.prepare(self._driving, context.vehicle)
+        self._last_s = driving.start_s
+        self.follower = PathFollower(driving.path, self._context.vehicle)
+        self.prepare(driving, self._context.vehicle)
 
     def _locate(self, ego: VehicleState) -> PathPosition:
         """Search near the last position first, because a closed loop passes a place twice."""

@@ -108,7 +108,7 @@ class ReactivePlanner(Planner):
 
         :raises PlanningError: if no sample is feasible and free of collisions.
         """
-        position = self._idm.locate(request)
+        position = self._idm.follow(request)
         if self._idm.driving is not self._driving:
             self._prepare(self._idm.driving)
         self._core.start(request, self._driving, position)

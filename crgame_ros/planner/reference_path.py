@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.geometry.polyline import arc_length, ReferencePath
-from crgame_ros.planner.route import find_route, goal_lanelets, Route, start_lanelet
+from crgame_ros.planner.route import find_route, goal_lanelets, in_lane, Route, start_lanelet
 from crgame_ros.scenario.road_network import LaneLine, RoadNetwork
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -24,6 +24,8 @@ BEYOND = 250.0
 LENGTH = 1500.0
 CHANGE_TIME = 4.0
 CHANGE_MIN = 25.0
+# So far from its lane's centre line a path has begun to change lanes [m].
+BEGUN = 0.2
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,8 @@ class DrivingPath:
     :param lanelets: ids of the lanelets passed.
     :param lanelet_spans: (n, 2) arc lengths at which each is entered and left [m]
     :param reaches_goal: True if the route leads to the goal's position.
+    :param change_s: arc length at which its first lane change begins; infinite without one [m]
+    :param change_to: lanelet into which it changes.
     """
 
     roads: RoadNetwork
@@ -47,10 +51,13 @@ class DrivingPath:
     lanelets: tuple[int, ...]
     lanelet_spans: Array
     reaches_goal: bool
+    change_s: float = np.inf
+    change_to: int | None = None
 
 
 def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: VehicleState,
-                      vehicle: VehicleParameters, follow_lane: bool = False) -> DrivingPath:
+                      vehicle: VehicleParameters, follow_lane: bool = False,
+                      keep_lane: bool = False) -> DrivingPath:
     """
     Route a planning problem and make its path.
 
@@ -60,6 +67,7 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: Vehic
 
     :param start: where the vehicle is (rear axle); it need not be on the road.
     :param follow_lane: ignore the goal and follow the lane.
+    :param keep_lane: follow the route up to its first lane change, and then the lane.
     :raises PlanningError: if the scenario has no lanelets or no usable geometry.
     """
     if not scenario.lanelet_network.lanelets:
@@ -68,6 +76,8 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: Vehic
     lanelet, s = start_lanelet(roads, start.x, start.y, start.yaw)
     goals = frozenset[int]() if follow_lane else goal_lanelets(roads, problem)
     route = find_route(roads, lanelet, s, goals, LENGTH)
+    if keep_lane:
+        route = in_lane(roads, route, LENGTH)
     change = max(CHANGE_MIN, CHANGE_TIME * abs(start.speed))
     try:
         line = _center_line(roads, route, s, change)
@@ -82,7 +92,9 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: Vehic
     start_s = float(path.project(np.array([[start.x, start.y]]), 0.0, BEHIND + s + 20.0)[0][0])
     end_s = float(path.length - BEYOND) if route.road_ends else np.inf
     lanelets, spans = _spans(roads, route, path)
-    return DrivingPath(roads, path, start_s, end_s, lanelets, spans, route.goal is not None)
+    change_s, change_to = _first_change(roads, route, path, spans)
+    return DrivingPath(roads, path, start_s, end_s, lanelets, spans, route.goal is not None,
+                       change_s, change_to)
 
 
 def _center_line(roads: RoadNetwork, route: Route, start_s: float, change: float) -> Array:
@@ -172,6 +184,20 @@ def _spans(roads: RoadNetwork, route: Route,
         spans[last, 1] = spans[last + 1, 0] = _crossing(
             roads, path, (leg[-1], following[0]), spans[last:last + 2])
     return lanelets, spans
+
+
+def _first_change(roads: RoadNetwork, route: Route, path: ReferencePath,
+                  spans: Array) -> tuple[float, int | None]:
+    """Find where the path begins to leave its first lane, and for which lanelet."""
+    if len(route.legs) < 2:
+        return np.inf, None
+    leg = route.legs[0]
+    first, last = spans[len(leg) - 1]
+    s = np.arange(max(first, 0.0), max(last, first + path.step), path.step)
+    aside = np.abs(roads.line(leg[-1]).project(path.pose_at(s)[:, :2])[1])
+    # From the crossing back to where the path is still in the lane's middle.
+    inside = np.flatnonzero(aside < BEGUN)
+    return float(s[inside[-1]] if len(inside) else s[0]), route.legs[1][0]
 
 
 def _crossing(roads: RoadNetwork, path: ReferencePath, pair: tuple[int, int],

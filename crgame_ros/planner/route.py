@@ -78,15 +78,19 @@ def find_route(roads: RoadNetwork, start: int, start_s: float, goals: frozenset[
         if changed:
             legs.append([])
         legs[-1].append(lanelet)
-    remaining = length
-    current: int | None = legs[-1][-1]
-    for _ in range(MAX_LANELETS):
-        current = _onward(roads, legs[-1][-1])
-        if current is None or remaining <= 0.0:
-            break
-        legs[-1].append(current)
-        remaining -= roads.line(current).length
-    return Route(tuple(tuple(leg) for leg in legs), goal, current is None)
+    ends = _prolong(roads, legs[-1], length)
+    return Route(tuple(tuple(leg) for leg in legs), goal, ends)
+
+
+def in_lane(roads: RoadNetwork, route: Route, length: float) -> Route:
+    """
+    Give the route without its lane changes: the first leg, prolonged.
+
+    :param length: distance that the route shall go on [m]
+    """
+    leg = list(route.legs[0])
+    ends = _prolong(roads, leg, length)
+    return Route((tuple(leg),), None, ends)
 
 
 def start_lanelet(roads: RoadNetwork, x: float, y: float, yaw: float) -> tuple[int, float]:
@@ -155,6 +159,18 @@ def _onward(roads: RoadNetwork, lanelet: int) -> int | None:
         ends = not network.find_lanelet_by_id(successor).successor
         scored.append((not roads.is_for_cars(successor), turn + 0.5 * ends, successor))
     return min(scored)[2] if scored else None
+
+
+def _prolong(roads: RoadNetwork, leg: list[int], length: float) -> bool:
+    """Add the successors that turn least; tell whether the road ends."""
+    current: int | None = leg[-1]
+    for _ in range(MAX_LANELETS):
+        current = _onward(roads, leg[-1])
+        if current is None or length <= 0.0:
+            break
+        leg.append(current)
+        length -= roads.line(current).length
+    return current is None
 
 
 def _middle(orientation: object) -> float | None:
