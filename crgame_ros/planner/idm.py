@@ -29,8 +29,11 @@ LINE_GAP = 0.5
 STANDING = 0.1
 # A standing vehicle starts when the model wants at least this share of a; it stops below it.
 START_SHARE = 0.2
-# Who may still come into the way is answered less hard than who is in the way [m/s^2].
+# Who may still come into the way is answered less hard than who is in the way [m/s^2], unless more
+# is needed to stop before them: by this share more, and with that much to spare [m].
 ANTICIPATION_LIMIT = 3.0
+NEED_SHARE = 1.15
+NEED_RESERVE = 1.0
 # Share of the desired speed with which it lets others by while it waits for a gap beside it.
 YIELDING = 0.8
 PASSING_MARGIN_S = 0.5
@@ -209,7 +212,8 @@ class IdmPlanner(PathPlanner):
                 if leader.blocking[i]:
                     wanted = min(wanted, free + interaction(speed, gap, leader.speed[i], model))
                 elif leader.coming[i]:
-                    wanted = min(wanted, max(-ANTICIPATION_LIMIT, free + interaction(
+                    limit = max(ANTICIPATION_LIMIT, _needed(speed, gap, leader.speed[i]))
+                    wanted = min(wanted, max(-limit, free + interaction(
                         speed, gap, leader.speed[i], model)))
             bound = (self._at(self._admissible, s + speed * dt_s) - speed) / dt_s
             wanted = min(wanted, max(bound, -2.0 * model.b))
@@ -222,6 +226,17 @@ class IdmPlanner(PathPlanner):
     def _at(self, row: list[float], s: float) -> float:
         index = min(max(int(s / self._driving.path.step), 0), len(row) - 1)
         return row[index]
+
+
+def _needed(speed: float, gap: float, other: float) -> float:
+    """
+    Give the deceleration that takes the speed down to another one's within a gap [m/s^2].
+
+    Towards one that comes nearer (v' < 0) it is that to a stop, v^2 / 2 a - v' v / a = s.
+    """
+    closing = max(speed - max(other, 0.0), 0.0)
+    way = closing * (0.5 * closing + max(-other, 0.0))
+    return NEED_SHARE * way / max(gap - NEED_RESERVE, 0.1)
 
 
 def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,

@@ -26,6 +26,9 @@ FloatArray = NDArray[np.float64]
 
 # Beyond this angle to its lane an obstacle crosses the lane, or drives the wrong way.
 _MAX_LANE_ANGLE = math.radians(45.0)
+# A cyclist need not follow a lane: one who crosses at a shallow angle would be seen to turn along.
+_MAX_CYCLIST_ANGLE = math.radians(12.0)
+_CYCLISTS = ('bicycle',)
 _FREE_MOVERS = ('pedestrian', 'unknown')
 _SPACING = 0.5
 _BEHIND = 30.0
@@ -89,8 +92,8 @@ class LanePrediction:
 
     An obstacle keeps its offset to the centre line and its speed along the lane, over the
     straightest successors and straight on where the map ends. Pedestrians, and whatever is on
-    no lane or at more than 45 degrees to it, go straight on at constant velocity, static
-    obstacles stay, and absent ones are NaN.
+    no lane or at more than 45 degrees to it, cyclists at more than 12 degrees, go straight on at
+    constant velocity, static obstacles stay, and absent ones are NaN.
 
     All lanes are found at construction. Each lane line is tabulated at equal distances, so that
     a prediction of all obstacles is a few array look-ups.
@@ -105,6 +108,9 @@ class LanePrediction:
         self._follows_lanes = np.array([
             d.role is not Role.STATIC and d.type not in _FREE_MOVERS
             for d in obstacles.descriptions], dtype=bool)
+        self._max_angles = np.array([
+            _MAX_CYCLIST_ANGLE if d.type in _CYCLISTS else _MAX_LANE_ANGLE
+            for d in obstacles.descriptions])
         shape = obstacles.poses.shape[:2]
         self._lane: NDArray[np.int64] = np.full(shape, _NO_LANE, dtype=np.int64)
         self._s: FloatArray = np.zeros(shape)
@@ -202,15 +208,17 @@ class LanePrediction:
         rows, columns = np.nonzero(np.isfinite(poses[..., 0]) & self._follows_lanes)
         self._used: list[int] = []
         self._lane[rows, columns], self._s[rows, columns], self._d[rows, columns] = self._place(
-            poses[rows, columns])
+            poses[rows, columns], self._max_angles[columns])
         # The lanes that a held obstacle will use, so that nothing is tabulated in the run.
         for column in self._obstacles.held:
             if self._follows_lanes[column]:
                 self._place(self._obstacles.track(column)[0])
 
-    def _place(self, poses: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    def _place(self, poses: FloatArray, max_angles: FloatArray | float = _MAX_LANE_ANGLE,
+               ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Give the number among the used lanes, or -1, and s and d of poses (N, 3)."""
         found = self._network.lanelets_at(poses)
+        limits = np.broadcast_to(max_angles, len(poses))
         lanes = np.full(len(poses), _NO_LANE, dtype=np.int64)
         along_line, aside = np.zeros(len(poses)), np.zeros(len(poses))
         for lane in [int(lane) for lane in np.unique(found[found >= 0])]:
@@ -218,7 +226,7 @@ class LanePrediction:
             line = self._network.line(self._network.lanelet_ids[lane])
             s, d = line.project(poses[where, :2])
             yaw = np.interp(s, line.s, line.headings)
-            along = np.abs(wrap_pi_array(poses[where, 2] - yaw)) <= _MAX_LANE_ANGLE
+            along = np.abs(wrap_pi_array(poses[where, 2] - yaw)) <= limits[where]
             where = where[along]
             lanes[where] = self._number(lane)
             along_line[where], aside[where] = s[along], d[along]
