@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reactive planner on several lanes: it leaves its lane where that is better and free."""
 
+from commonroad_dc import pycrcc
 import numpy as np
 import planner_support as support
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from crgame_ros.drivability.road_boundary import RoadBoundary
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.planner.interface import Plan
+from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.planner.registry import create_planner
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -53,11 +55,10 @@ def check_free(plans: list[Plan], road: support.Scenario, cars: tuple[Car, ...],
         center = (x + vehicle.rear_to_center * np.cos(yaw), y + vehicle.rear_to_center
                   * np.sin(yaw))
         assert boundary.contains(*center, yaw, shape), k
+        ego = pycrcc.RectOBB(0.5 * vehicle.length, 0.5 * vehicle.width, yaw, *center)
         for car_x, car_y, heading, speed in cars:
             now = car_x + 0.1 * k * speed * np.cos(heading)
-            beside = abs(center[1] - car_y) > 0.5 * (vehicle.width + 1.8)
-            apart = abs(center[0] - now) > 0.5 * vehicle.length + HALF_CAR
-            assert beside or apart, k
+            assert not ego.collide(pycrcc.RectOBB(HALF_CAR, 0.9, heading, now, car_y)), k
 
 
 @pytest.mark.parametrize('speed', [0.0, 5.0])
@@ -118,3 +119,27 @@ def test_stands_by_the_package_where_nothing_else_is_free(vehicle: VehicleParame
     for plan in drive(lanes(1), start, cars, 5):
         assert np.abs(plan.states[:, :2]).max() < 0.01
         assert plan.states[-1, 3] == 0.0
+
+
+def test_package_plans_as_its_authors_ship_it(vehicle: VehicleParameters) -> None:
+    """Its defaults: 60 steps, four sampling levels, and the speed at the start."""
+    planner = create_planner('reactive-package')
+    planner.setup(support.context(lanes(2), support.problem(15.0)))
+    asked = support.request(VehicleState(0.0, 0.0, 0.0, 15.0), 0, ((150.0, 0.0, 0.0, 15.0),))
+    plan = planner.plan(asked)
+    assert plan.states.shape == (61, 8)
+    assert check_plan(plan, asked.ego, asked.stamp_ns, vehicle, support.DT) is None
+    # Of three speeds around the present one, the cheapest.
+    assert plan.states[-1, 3] == pytest.approx(15.0, abs=1.0)
+
+
+def test_package_leaves_its_lane_for_a_standing_car(vehicle: VehicleParameters) -> None:
+    """It swings out as far as it must, at the speed that it had, and knows no lanes."""
+    road, cars = lanes(2), ((60.0, 0.0, 0.0, 0.0),)
+    planner = create_planner('reactive-package', {'horizon': 3.0, 'levels': 3})
+    planner.setup(support.context(road, support.problem(12.0)))
+    plans = support.drive(planner, VehicleState(0.0, 0.0, 0.0, 12.0), 70, lambda k: cars)
+    check_free(plans, road, cars, vehicle)
+    assert plans[-1].states[0, 0] > 70.0
+    assert min(plan.states[0, 3] for plan in plans) > 9.0
+    assert max(plan.states[0, 1] for plan in plans) > 1.6
