@@ -125,8 +125,10 @@ class IdmPlanner(PathPlanner):
         keeping = self._driving is change.kept
         if verdict is Verdict.BLOCKED and not keeping:
             self._take_path(change.kept, request.ego)
+        elif verdict is Verdict.DONE and not keeping and self._driving.changes < 2:
+            self._change = None
         elif verdict is Verdict.DONE or (keeping and verdict is Verdict.FREE):
-            # From here on, into the gap; or on to the next change, if there is one.
+            # From here on, into the gap; or on to the next change.
             self._plan_path(request.ego)
         return self.locate(request)
 

@@ -13,8 +13,10 @@ from crgame_ros.planner.obstacles import ObstacleProjector
 from crgame_ros.planner.reference_path import CHANGE_MIN, DrivingPath, plan_driving_path
 from crgame_ros.vehicle.state import VehicleState
 
-# Beyond this offset from its lane's centre line a change is under way, and is finished [m].
+# Beyond this offset from its lane's centre line a change is under way, and so much nearer to the
+# other lane's it is done [m].
 UNDER_WAY = 0.5
+NEARER = 0.5
 # The gap is looked for from this time before the change begins [s], and at least this way [m].
 NOTICE_S, NOTICE = 1.0, 5.0
 # A lane that ends is kept up to the last place from which the change still fits in [m].
@@ -70,7 +72,7 @@ class LaneChange:
             return Verdict.FAR
         place = path.pose_at(np.array([s]))[:, :2]
         offset = -float(self._target.project(place)[1][0])
-        if abs(offset - d) < abs(d):
+        if abs(offset - d) < abs(d) - NEARER:
             return Verdict.DONE
         if abs(d) > UNDER_WAY and d * offset > 0.0:
             return Verdict.UNDER_WAY

@@ -42,6 +42,7 @@ class DrivingPath:
     :param reaches_goal: True if the route leads to the goal's position.
     :param change_s: arc length at which its first lane change begins; infinite without one [m]
     :param change_to: lanelet into which it changes.
+    :param changes: number of its lane changes.
     """
 
     roads: RoadNetwork
@@ -53,6 +54,7 @@ class DrivingPath:
     reaches_goal: bool
     change_s: float = np.inf
     change_to: int | None = None
+    changes: int = 0
 
 
 def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: VehicleState,
@@ -94,7 +96,7 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: Vehic
     lanelets, spans = _spans(roads, route, path)
     change_s, change_to = _first_change(roads, route, path, spans)
     return DrivingPath(roads, path, start_s, end_s, lanelets, spans, route.goal is not None,
-                       change_s, change_to)
+                       change_s, change_to, len(route.legs) - 1)
 
 
 def _center_line(roads: RoadNetwork, route: Route, start_s: float, change: float) -> Array:
