@@ -118,14 +118,15 @@ class CollisionSlices:
         return None
 
     def _follows(self, ego: VehicleState, pose: Array, name: str) -> bool:
-        """Tell whether an obstacle drives behind the ego's rear in its lane."""
+        """Tell whether an obstacle drives behind the ego's rear in its lane, or into it."""
         dx, dy = float(pose[0]) - ego.x, float(pose[1]) - ego.y
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         rear = self._vehicle.rear_to_center - 0.5 * self._vehicle.length
-        half_length = 0.5 * self._described(name).length
-        return (math.cos(float(pose[2]) - ego.yaw) > 0.5
-                and dx * cos + dy * sin + half_length < rear
-                and abs(dy * cos - dx * sin) < 0.5 * self._vehicle.width + 1.0)
+        shape = self._described(name)
+        along, aside = dx * cos + dy * sin, abs(dy * cos - dx * sin)
+        behind = (along + 0.5 * shape.length < rear and aside < 0.5 * self._vehicle.width + 1.0)
+        pushing = along < rear and aside < 0.5 * (self._vehicle.width + shape.width)
+        return math.cos(float(pose[2]) - ego.yaw) > 0.5 and (behind or pushing)
 
     def _footprint(self, ego: VehicleState) -> pycrcc.RectOBB:
         x, y = ego.center(self._vehicle.rear_to_center)

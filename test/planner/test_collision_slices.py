@@ -44,6 +44,9 @@ def test_standing_obstacle_ahead_is_in_every_slice(gap: float,
 def test_follower_is_left_out_and_who_is_beside_is_not(vehicle: VehicleParameters) -> None:
     follower = slices(vehicle, (-9.0, 0.3, 0.0, 15.0))
     assert not any(hits(follower, vehicle, k, 0.5 * k) for k in range(31))
+    # Who has run into the rear by 0.2 m is predicted to drive through the ego: no plan avoids it.
+    pushing = slices(vehicle, (-0.83 - HALF_CAR + 0.2, 0.3, 0.0, 10.0))
+    assert not any(hits(pushing, vehicle, k, 0.5 * k) for k in range(31))
     # Its centre is behind the ego's rear axle, its front is not: it is beside.
     beside = slices(vehicle, (-1.0, 1.75, 0.0, 5.0))
     turned = pycrcc.RectOBB(0.5 * vehicle.length, 0.5 * vehicle.width, 0.2,
