@@ -46,7 +46,7 @@ from traffic_others import timed  # noqa: E402
 from crgame_ros.geometry.shape import Shape  # noqa: E402
 from crgame_ros.scenario.objects import ObjectDescription, Role  # noqa: E402
 from crgame_ros.scenario.road_network import RoadNetwork  # noqa: E402
-from crgame_ros.traffic.spawning import Adopted  # noqa: E402
+from crgame_ros.traffic.adoption import Adopted  # noqa: E402
 from crgame_ros.traffic.spec import TrafficSpec  # noqa: E402
 from crgame_ros.traffic.traffic import Traffic  # noqa: E402
 from crgame_ros.traffic.world import WorldView  # noqa: E402

@@ -15,7 +15,7 @@ from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.traffic_setup import adopted_columns, MOTION_RATE
-from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world import WorldView

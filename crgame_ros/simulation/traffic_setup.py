@@ -12,7 +12,7 @@ from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.world_reader import joints_of, WorldReader
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
-from crgame_ros.traffic.spawning import adoptable, Adopted
+from crgame_ros.traffic.adoption import adoptable, Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world import WorldView

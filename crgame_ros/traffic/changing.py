@@ -29,6 +29,8 @@ BoolArray = NDArray[np.bool_]
 
 # After a change, time without another one; and with which the next for speed is thought of [s].
 CALM = 4.0
+# Where a lane ends, changes take no less than this: 2.5 m/s^2 to the side [s].
+SWERVE_TIME = 2.8
 # After any change, time without one for speed; and how often agents think of those, spread over
 # the ticks where there are more than so many agents [s].
 CONTENT = 12.0
@@ -181,7 +183,10 @@ class LaneChanges:
         junction = has[wide, lane] | ((onto >= 0) & has[wide, np.maximum(onto, 0)] & (
             graph.length[lane] - agents.s[slots] <= self.no_change(agents.speed[slots])))
         # Where a lane ends there is no other place.
-        free &= (~junction & ~halts) | routes.drops[lane]
+        ends = routes.drops[lane]
+        rest = np.where(ends, graph.length[lane] - agents.s[slots], np.inf)
+        # Nor is the road left: what is too fast for the rest brakes instead.
+        free &= np.where(ends, rest > SWERVE_TIME * agents.speed[slots], ~junction & ~halts)
         content = agents.content_until[slots] <= k
         content &= (slots * (len(slots) > AT_ONCE) + k) % self._thoughts == 0
         for side, table in ((1, graph.left), (-1, graph.right)):
@@ -248,6 +253,9 @@ class LaneChanges:
         shift, slope = beside.d[i:i + 1], np.tan(beside.turn[i:i + 1])
         span = look_ahead(speed, np.abs(shift), shortest=max(
             SHORTEST_CHANGE, LENGTHS * float(agents.length[slot])))
+        if self._routes.drops[agents.lane[slot]]:
+            rest = self._graph.length[agents.lane[slot]] - agents.s[slot]
+            span = np.maximum(np.minimum(span, rest), 0.6 * SHORTEST_CHANGE)
         if wish.room[i] < TIGHT and speed[0] < SLOWEST:
             span = np.minimum(span, np.maximum(wish.room[i] + 1.0, 1.5 * TOO_NEAR))
         agents.curve[slot] = quintic(shift, slope, np.zeros(1), np.zeros(1), span)[0]

@@ -14,9 +14,11 @@ import hashlib
 import os
 from pathlib import Path
 import re
-from typing import Any, TypeVar
+from typing import Any, cast, TypeVar
 
 import numba
+import numpy as np
+from numpy.typing import NDArray
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -51,11 +53,11 @@ def digest(module: str) -> str:
     return result.hexdigest()[:12]
 
 
-def vectorized(function: Function) -> Function:
+def vectorized(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:
     """Compile a function of numbers [float64] into one of arrays that broadcast."""
     _choose_cache(function)
     count = function.__code__.co_argcount
-    result: Function = numba.vectorize(
+    result: Callable[..., NDArray[np.float64]] = numba.vectorize(
         [numba.float64(*[numba.float64] * count)], cache=True)(function)
     return result
 
@@ -68,5 +70,4 @@ def _choose_cache(function: Callable[..., Any]) -> None:
 def compiled(function: Function) -> Function:
     """Compile a function of numbers and arrays; divisions by zero give inf and NaN, as numpy's."""
     _choose_cache(function)
-    result: Function = numba.njit(cache=True, error_model='numpy')(function)
-    return result
+    return cast(Function, numba.njit(cache=True, error_model='numpy')(function))

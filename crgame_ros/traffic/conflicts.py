@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where lanes cross or merge, and who has the right of way there."""
 
-from commonroad.common.common_lanelet import LaneletType
 from typing import NamedTuple
 
+from commonroad.common.common_lanelet import LaneletType
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -41,7 +41,7 @@ class ConflictTable(NamedTuple):
     """
     The rows (C) of `Conflicts`, and what they mean for lanes (L) and two widths of vehicle.
 
-    :param first, count: (L) rows of each lane.
+    :param first, rows: (L) first row of each lane, and how many it has.
     :param lane, other: (C) lane of the row; the same conflict seen from the other lane.
     :param start, end: (2, C) arc lengths between which cars, or wide vehicles, touch [m]
     :param distance: (C) between the centre lines where they are nearest [m]
@@ -53,7 +53,7 @@ class ConflictTable(NamedTuple):
     """
 
     first: IntArray
-    count: IntArray
+    rows: IntArray
     lane: IntArray
     other: IntArray
     start: FloatArray
@@ -71,12 +71,6 @@ def touch(conflicts: ConflictTable, row: int, width: float, other_width: float) 
     """Tell whether vehicles of two widths are in each other's way in a conflict."""
     between = 0.5 * (width + other_width) + conflicts.margin[row]
     return bool(conflicts.distance[row] < between)
-
-
-@compiled
-def is_wide(width: float, other_width: float) -> int:
-    """Tell which of the two stretches of a conflict counts: 1 for wide vehicles, else 0."""
-    return 1 if 0.5 * (width + other_width) + CROSSING_MARGIN > WIDTH else 0
 
 
 class Conflicts:

@@ -3,20 +3,17 @@
 """Crossing and merging: who goes first, by right of way and gap acceptance."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import Agents, AgentTable, FREE, NOBODY
 from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.conflicts import Conflicts, ConflictTable, touch
-from crgame_ros.traffic.junctions import Arrivals, Passages, time_to
+from crgame_ros.traffic.conflicts import Conflicts, ConflictTable
+from crgame_ros.traffic.junctions import Arrivals, Passages
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.leaders import Pairs, Ways
+from crgame_ros.traffic.meetings import BoolArray, CrossingRules, meet, Meetings, Situation
 from crgame_ros.traffic.placement import Entries
-
-BoolArray = NDArray[np.bool_]
 
 STANDING = 0.05
 # A leader that is faster drives on [m/s].
@@ -28,85 +25,6 @@ PASSED = 1.0
 # What others are expected to bear at most [m/s^2], and how fast agents get to and out of
 # conflicts when they hurry, go steadily, and take their time [m/s^2].
 HURRY, TIMID = 1.8, 0.7
-
-
-class CrossingRules(NamedTuple):
-    """
-    How agents pass junctions.
-
-    :param gap_after: time between another leaving a conflict and the agent getting there [s];
-        own choice.
-    :param gap_before: time between the agent leaving it and another getting there [s]; the
-        agent's own time included, a crossing of 6 s accepts the 7 s to 8 s that the Highway
-        Capacity Manual 2010 (table 19-11) gives as critical gaps.
-    :param patience: standing time after which whoever stands longest goes first, whatever the
-        right of way among those who stand [s]; own choice.
-    :param acceleration: with which agents expect to cross [m/s^2]
-    :param deceleration: that others are expected to bear at most, to stop for the agent [m/s^2]
-    :param withdrawal: that agents take at most to give up a right that they had [m/s^2]
-    :param zipper: standing time after which those on the road let one merge, if they can slow
-        down gently [s]; own choice.
-    :param mercy: the same for one that crosses [s]; own choice.
-    :param room: behind the junction, besides the agent's own length [m]
-    """
-
-    gap_after: float = 0.7
-    gap_before: float = 1.5
-    patience: float = 3.0
-    acceleration: float = 1.3
-    deceleration: float = 3.0
-    withdrawal: float = 2.2
-    zipper: float = 6.0
-    mercy: float = 20.0
-    room: float = 1.5
-
-
-class Situation(NamedTuple):
-    """
-    What agents (A) find before their next junction.
-
-    :param slots: (A) of the agents.
-    :param desired: (A) desired speeds [m/s]
-    :param rear_stop: (A) distance to where the leader's rear will be if it stops [m]
-    :param light: (A) distance of the front from a line with a red light, or inf [m]
-    :param stop_sign: (A) whether a stop sign stands before the junction.
-    :param queued: (A) gap to the nearest who waits ahead and was not let in, or inf [m]
-    """
-
-    slots: IntArray
-    desired: FloatArray
-    rear_stop: FloatArray
-    light: FloatArray
-    stop_sign: BoolArray
-    queued: FloatArray
-
-
-class Meetings(NamedTuple):
-    """
-    Pairs (M) of an agent and somebody else who comes to the same conflict, in order of agents.
-
-    :param begin: (A + 1) rows of each agent.
-    :param who: (M) row of the other agent, or -1 - n for the n-th of the others.
-    :param step: (M) of the agent's way.
-    :param into: (M) distance of the agent's front from the conflict [m]
-    :param priority: (M) of the agent.
-    :param apart: (M) whether both pass at different times anyway.
-    :param inside: (M) whether the other is in the conflict.
-    :param committed: (M) whether the other can no longer stop before it.
-    :param courteous: (M) whether the other can let the agent go without haste.
-    :param joins: (M) whether both go on behind each other.
-    """
-
-    begin: IntArray
-    who: IntArray
-    step: IntArray
-    into: FloatArray
-    priority: IntArray
-    apart: BoolArray
-    inside: BoolArray
-    committed: BoolArray
-    courteous: BoolArray
-    joins: BoolArray
 
 
 class Crossings:
@@ -181,7 +99,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
         # For who has waited very long others leave the room behind the junction.
         if agents.waits[slot] > ticks[3] and not stopped[i]:
             stays[i] = False
-    meeting = _meet(conflicts, rules, agents, way, passage, arrivals, at, stays)
+    meeting = meet(conflicts, rules, agents, way, passage, arrivals, at, stays)
     for i, slot in enumerate(slots):
         agents.blocker[slot] = FREE
         if agents.grant[slot] >= 0 and _withdraws(rules, ticks, k, agents, passage, meeting, at,
@@ -216,7 +134,7 @@ def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, 
 @compiled
 def _is_near(speed: float, hold: float) -> bool:
     """Tell whether a junction is so near that one asks to be let in."""
-    return hold < 10.0 + 4.2 * speed
+    return hold < 10.0 + 1.5 * speed + speed * speed / (2.0 * MERCY)
 
 
 @compiled
@@ -229,7 +147,7 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
         agents.grant_left[slot] -= agents.speed[slot] * dt_s
         agents.grant_hold[slot] -= agents.speed[slot] * dt_s
         ahead = False
-        for step in range(way.count[i]):
+        for step in range(way.depth[i]):
             ahead |= way.lane[i, step] == agents.until[slot]
         if not ahead or agents.grant_left[slot] < -PASSED:
             agents.grant[slot] = NOBODY
@@ -242,108 +160,6 @@ def _in_turn(k: int, agents: AgentTable, slots: IntArray) -> IntArray:
     for i, slot in enumerate(slots):
         key[i] = -agents.waits[slot] - (1e9 if agents.insists_until[slot] > k else 0.0)
     return np.argsort(key, kind='mergesort')
-
-
-@compiled
-def _meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way: Ways,
-          passage: Passages, arrivals: Arrivals, at: Situation, stays: BoolArray) -> Meetings:
-    """Pair agents with everybody whose conflicts are theirs, and compare their times."""
-    room = 64
-    found = _empty(len(at.slots), room)
-    used = 0
-    rows = _rows_of(arrivals, len(at.slots))
-    for i, slot in enumerate(at.slots):
-        for n in range(rows.begin[i], rows.begin[i + 1]):
-            mine = rows.row[n]
-            if arrivals.step[mine] > max(passage.last[i], passage.granted[i]) \
-                    or arrivals.into[mine] <= 0.0:
-                continue
-            conflict = arrivals.conflict[mine]
-            other = conflicts.other[conflict]
-            for theirs in range(arrivals.begin[other], arrivals.begin[other + 1]):
-                who = arrivals.who[theirs]
-                if who == i or not touch(conflicts, conflict, agents.width[slot],
-                                         arrivals.width[theirs]):
-                    continue
-                # Who waits before a red light or a full junction comes to no conflict.
-                if who >= 0 and stays[who] and agents.grant[at.slots[who]] < 0 \
-                        and arrivals.into[theirs] > 0.0:
-                    continue
-                if used == len(found.who):
-                    found = _grown(found)
-                _compare(conflicts, rules, arrivals, mine, theirs, at.desired, found, used)
-                used += 1
-        found.begin[i + 1] = used
-    return found
-
-
-class _Rows(NamedTuple):
-    begin: IntArray
-    row: IntArray
-
-
-@compiled
-def _rows_of(arrivals: Arrivals, count: int) -> _Rows:
-    """List the rows of arrivals by agent."""
-    begin = np.zeros(count + 1, np.int64)
-    for who in arrivals.who:
-        if who >= 0:
-            begin[who + 1] += 1
-    for i in range(count):
-        begin[i + 1] += begin[i]
-    fill, row = begin.copy(), np.empty(begin[count], np.int64)
-    for n, who in enumerate(arrivals.who):
-        if who >= 0:
-            row[fill[who]] = n
-            fill[who] += 1
-    return _Rows(begin, row)
-
-
-@compiled
-def _empty(agents: int, room: int) -> Meetings:
-    return Meetings(
-        np.zeros(agents + 1, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
-        np.empty(room), np.empty(room, np.int64), np.empty(room, np.bool_),
-        np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_),
-        np.empty(room, np.bool_))
-
-
-@compiled
-def _grown(found: Meetings) -> Meetings:
-    more, size = _empty(len(found.begin) - 1, 2 * len(found.who)), len(found.who)
-    more.begin[:] = found.begin
-    more.who[:size], more.into[:size] = found.who, found.into
-    more.step[:size] = found.step
-    more.priority[:size], more.apart[:size] = found.priority, found.apart
-    more.inside[:size], more.committed[:size] = found.inside, found.committed
-    more.courteous[:size], more.joins[:size] = found.courteous, found.joins
-    return more
-
-
-@compiled
-def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
-             theirs: int, desired: FloatArray, found: Meetings, n: int) -> None:
-    """Write the meeting of two arrivals into row n."""
-    who, conflict = arrivals.who[theirs], arrivals.conflict[mine]
-    into, out, speed = arrivals.into[theirs], arrivals.out[theirs], arrivals.speed[theirs]
-    if who < 0:
-        early = math.inf if speed < 0.3 and into > 0.0 else time_to(
-            into, speed, rules.acceleration, speed)
-        late = max(out, 0.0) / max(speed, 0.1)
-    else:
-        early = time_to(into, speed, rules.acceleration, desired[who])
-        late = time_to(out, speed, TIMID, max(0.8 * desired[who], 2.0))
-    i = arrivals.who[mine]
-    there = time_to(arrivals.into[mine], arrivals.speed[mine], HURRY, desired[i])
-    gone = time_to(arrivals.out[mine], arrivals.speed[mine], rules.acceleration, desired[i])
-    found.who[n], found.into[n] = who, arrivals.into[mine]
-    found.step[n] = arrivals.step[mine]
-    found.priority[n] = conflicts.priority[conflict]
-    found.apart[n] = there > late + rules.gap_after or gone + rules.gap_before < early
-    found.inside[n] = into <= 0.0 and out > 0.0
-    found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
-    found.courteous[n] = who >= 0 and into > 2.0 * speed + speed**2 / 3.0
-    found.joins[n] = conflicts.merges[conflict]
 
 
 @compiled

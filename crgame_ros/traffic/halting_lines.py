@@ -136,7 +136,7 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
     result = np.full(len(speed), np.inf)
     for i in range(len(speed)):
         gentle = STILL_BRAKING if acceleration[i] < BRAKES else YELLOW_BRAKING
-        for step in range(way.count[i]):
+        for step in range(way.depth[i]):
             lane = way.lane[i, step]
             if lights.number[lane] < 0:
                 continue
@@ -156,7 +156,7 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
 def movement_of(lights: LightTable, way: Ways, i: int, step: int) -> int:
     """Give the movement of a way at the lights of its lane: what is decided first counts."""
     row = lights.number[way.lane[i, step]]
-    for onward in range(step, way.count[i]):
+    for onward in range(step, way.depth[i]):
         movement = lights.movement[row, way.lane[i, onward]]
         if movement != UNDECIDED:
             return int(movement)

@@ -82,11 +82,11 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
         wide = 1 if agents.width[slot] > NARROW else 0
         entry, leave, half = conflicts.entry[wide], conflicts.leave[wide], 0.5 * agents.length[slot]
         if agents.grant[slot] >= 0:
-            for step in range(way.count[i]):
+            for step in range(way.depth[i]):
                 if way.lane[i, step] == agents.until[slot]:
                     result.granted[i] = step
                     break
-        for step in range(result.granted[i] + 1, way.count[i]):
+        for step in range(result.granted[i] + 1, way.depth[i]):
             lane = way.lane[i, step]
             if not math.isfinite(entry[lane]):
                 continue
@@ -132,7 +132,7 @@ def arrivals(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: Agen
     used = 0
     for i, slot in enumerate(slots):
         half = 0.5 * agents.length[slot]
-        for step in range(-1, way.count[i]):
+        for step in range(-1, way.depth[i]):
             if step < 0:
                 lane = agents.previous[slot]
                 offset = way.offset[i, 0] - lanes.length[lane] if lane >= 0 else 0.0
@@ -140,7 +140,7 @@ def arrivals(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: Agen
                 lane, offset = way.lane[i, step], way.offset[i, step]
             if lane >= 0:
                 for row in range(conflicts.first[lane], conflicts.first[lane]
-                                 + conflicts.count[lane]):
+                                 + conflicts.rows[lane]):
                     if offset + conflicts.end[1, row] + half > 0.0:
                         _note(found, used, i, row, offset + conflicts.start[1, row] - half,
                               offset + conflicts.end[1, row] + half, agents.speed[slot],
@@ -158,9 +158,9 @@ def _room(conflicts: ConflictTable, way: Ways, agents: AgentTable, slots: IntArr
     room = 0
     for i, slot in enumerate(slots):
         if agents.previous[slot] >= 0:
-            room += conflicts.count[agents.previous[slot]]
-        for step in range(way.count[i]):
-            room += conflicts.count[way.lane[i, step]]
+            room += conflicts.rows[agents.previous[slot]]
+        for step in range(way.depth[i]):
+            room += conflicts.rows[way.lane[i, step]]
     return int(room)
 
 
@@ -193,7 +193,7 @@ def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int
         current, offset = lane[done], front[done]
         done += 1
         for row in range(conflicts.first[current],
-                         conflicts.first[current] + conflicts.count[current]):
+                         conflicts.first[current] + conflicts.rows[current]):
             out = offset + size + conflicts.end[1, row]
             if out > 0.0:
                 if used == len(found.who):

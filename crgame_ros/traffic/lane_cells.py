@@ -90,9 +90,9 @@ class LaneCells:
             guesses.append(nearest[near] * graph.step[lane])
         key, lane_of, guess = (np.concatenate(x) for x in (keys, lanes, guesses))
         order = np.lexsort((lane_of, key))
-        keys, starts = np.unique(key[order], return_index=True)
+        filled, starts = np.unique(key[order], return_index=True)
         self.table = CellTable(
-            float(self._origin[0]), float(self._origin[1]), self._columns, self._rows, keys,
+            float(self._origin[0]), float(self._origin[1]), self._columns, self._rows, filled,
             np.append(starts, len(key)), lane_of[order].astype(np.int64), guess[order])
 
     def near(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:

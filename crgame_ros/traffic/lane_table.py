@@ -18,9 +18,9 @@ class LaneTable(NamedTuple):
     """
     What `LaneGraph` knows, as arrays over lanes (L) and over the points of their centre lines.
 
-    The points of a lane are `first[lane]:first[lane] + count[lane]`, `step[lane]` apart.
+    The points of a lane are `first[lane]:first[lane] + points[lane]`, `step[lane]` apart.
 
-    :param first, count: (L) rows of the points.
+    :param first, points: (L) first row of its points, and how many there are.
     :param length, step: (L) [m]
     :param limit: (L) speed limit [m/s]
     :param left, right: (L) neighbours of the same direction, or -1.
@@ -29,7 +29,7 @@ class LaneTable(NamedTuple):
     """
 
     first: IntArray
-    count: IntArray
+    points: IntArray
     length: FloatArray
     step: FloatArray
     limit: FloatArray
@@ -48,14 +48,14 @@ class LaneTable(NamedTuple):
 def nearest_row(lanes: LaneTable, lane: int, s: float) -> int:
     """Give the row of the point nearest to arc length s."""
     row = int(np.rint(s / lanes.step[lane]))
-    return int(lanes.first[lane] + min(max(row, 0), lanes.count[lane] - 1))
+    return int(lanes.first[lane] + min(max(row, 0), lanes.points[lane] - 1))
 
 
 @compiled
 def point_on(lanes: LaneTable, lane: int, s: float) -> tuple[float, float, float]:
     """Give x, y and heading of a centre line at arc length s; straight on beyond its ends."""
     share = s / lanes.step[lane]
-    row = int(min(max(math.floor(share), 0.0), lanes.count[lane] - 2.0))
+    row = int(min(max(math.floor(share), 0.0), lanes.points[lane] - 2.0))
     share -= row
     row += lanes.first[lane]
     inside = min(max(share, 0.0), 1.0)

@@ -29,13 +29,13 @@ class Ways(NamedTuple):
     :param lane: (A, J) -1 behind the end of the way.
     :param offset: (A, J) from the agent's centre to the lane's beginning [m]; negative for the
         lane that it is in.
-    :param count: (A) steps of each way.
+    :param depth: (A) steps of each way.
     :param horizon: (A) how far ahead it looks [m]
     """
 
     lane: IntArray
     offset: FloatArray
-    count: IntArray
+    depth: IntArray
     horizon: FloatArray
 
 
@@ -97,7 +97,7 @@ def ways(lanes: LaneTable, following: IntArray, lane: IntArray, s: FloatArray,
             if current < 0 or offset >= horizon[i]:
                 break
             way.lane[i, step], way.offset[i, step] = current, offset
-            way.count[i] = step + 1
+            way.depth[i] = step + 1
     return way
 
 
@@ -133,14 +133,14 @@ def ahead(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
 
     :param reference: offset of the reference at each point of the lanes [m]; empty: none.
     """
-    count = len(way.count)
+    count = len(way.depth)
     agent, entry = np.empty(count * MAX_AHEAD, np.int64), np.empty(count * MAX_AHEAD, np.int64)
     distance = np.empty(count * MAX_AHEAD)
     used = 0
     for i in range(count):
         end = used + MAX_AHEAD
         leaders = 0
-        for step in range(way.count[i]):
+        for step in range(way.depth[i]):
             lane, offset = way.lane[i, step], way.offset[i, step]
             n = first_from(entries, lane, -offset - LONGEST)
             while n < entries.begin[lane + 1] and used < end and leaders < MAX_LEADERS and (

@@ -38,7 +38,7 @@ def _envelope(lanes: LaneTable, speed: FloatArray) -> FloatArray:
     result = speed.copy()
     for lane in range(len(lanes.first)):
         first, gain = lanes.first[lane], 2.0 * COASTING * lanes.step[lane]
-        for row in range(first + lanes.count[lane] - 2, first - 1, -1):
+        for row in range(first + lanes.points[lane] - 2, first - 1, -1):
             result[row] = min(result[row], math.sqrt(result[row + 1]**2 + gain))
     return result
 
@@ -48,13 +48,13 @@ def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: 
              ahead: float) -> float:
     """Give the speed that limits and curves allow an agent a distance ahead of its centre."""
     result = math.inf
-    for step in range(way.count[i]):
+    for step in range(way.depth[i]):
         lane, begins = way.lane[i, step], way.offset[i, step] - ahead
         wanted = min(lanes.limit[lane] * factor, top)
         if begins > 0.0:
             there = min(wanted, envelope[lanes.first[lane]])
             result = min(result, math.sqrt(there * there + 2.0 * COASTING * begins))
-        elif begins + lanes.length[lane] > 0.0 or step == way.count[i] - 1:
+        elif begins + lanes.length[lane] > 0.0 or step == way.depth[i] - 1:
             result = min(wanted, envelope[nearest_row(lanes, lane, -begins)])
     return result
 

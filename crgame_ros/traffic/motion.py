@@ -96,7 +96,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     along = rear + pursuit_distance(speed, bend)
     lane, there = _onward(lanes, following, agents.destination[i], agents.lane[i], along)
     share = there / lanes.step[lane]
-    row = int(min(max(math.floor(share), 0.0), lanes.count[lane] - 2.0))
+    row = int(min(max(math.floor(share), 0.0), lanes.points[lane] - 2.0))
     share = min(max(share - row, 0.0), 1.0)
     row += lanes.first[lane]
     d = reference[row] + share * (reference[row + 1] - reference[row])

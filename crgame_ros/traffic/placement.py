@@ -3,7 +3,7 @@
 """Which part of which lane is taken by whom."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_cells import cell_of, CellTable
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.lane_table import angle_between, LaneTable, point_on, project_on
+from crgame_ros.traffic.lane_table import angle_between, LaneTable, project_on
 
 # How far ahead a body's way to the side counts as taken, by what it is [s].
 WALKER_TIME = 2.0
@@ -93,7 +93,8 @@ class Entries(NamedTuple):
 
     def take(self, rows: IntArray) -> 'Entries':
         """Pick some of them; where those of each lane begin is not told."""
-        return Entries(np.empty(0, np.int64), *(column[rows] for column in self[1:]))
+        columns: list[Any] = [column[rows] for column in self[1:]]
+        return Entries(np.empty(0, np.int64), *columns)
 
 
 @compiled
@@ -161,7 +162,7 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, foun
     if claims:
         low, high = min(low, -half_width), max(high, half_width)
     row = int(np.rint(s / lanes.step[lane]))
-    half = lanes.half_width[lanes.first[lane] + min(max(row, 0), lanes.count[lane] - 1)] + BESIDE
+    half = lanes.half_width[lanes.first[lane] + min(max(row, 0), lanes.points[lane] - 1)] + BESIDE
     if not (low < half and high > -half and front > 0.0 and rear < lanes.length[lane]):
         return 0
     turn = math.cos(angle_between(heading, yaw))

@@ -3,7 +3,6 @@
 """How agents come onto the road: placed at random, arriving at its edges, or from a recording."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -11,88 +10,35 @@ from numpy.typing import NDArray
 
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.agents import Agents, NOBODY, REAR_TO_CENTER
+from crgame_ros.traffic.adoption import Adopted, fits
+from crgame_ros.traffic.agents import Agents, REAR_TO_CENTER
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.lane_cells import LaneCells
-from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
-from crgame_ros.traffic.longitudinal import Longitudinal
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import ahead, Corridors, look_distance, ways
+from crgame_ros.traffic.longitudinal import Longitudinal
 from crgame_ros.traffic.placement import Bodies, place
+from crgame_ros.traffic.room import (
+    EASY,
+    FIRM,
+    is_free,
+    safe_speed,
+    START_GAP,
+    START_TIME,
+    STOP_GAP,
+)
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.world import agent_bodies
 
-ADOPTED_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'taxi',
-                           'priorityVehicle'})
-# Whoever covers less than this in the whole recording is parked [m].
-PARKED = 2.0
-# Who points elsewhere than its lane by more than this does not drive on it [rad].
-ASTRAY = 0.8
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
 TRIES = 40
 # Longer vehicles take wide ways, which they leave by so much at most [m].
 LONG, SPARE = 6.5, 0.15
-# Between agents at the start, besides s0 [m] and at their speeds [s].
-START_GAP = 3.0
-START_TIME = 1.2
-SIDE_GAP = 0.6
-LANE = 3.5
-# With which a newcomer could stop before what lies ahead [m/s^2].
-EASY = 1.5
-# With which those who were recorded get behind who is ahead [m/s^2], and the gap that they leave [m].
-FIRM, STOP_GAP = 2.0, 2.0
-# Nor nearer than so long at their speeds [s].
-CLOSE_TIME = 0.25
 # Rounds in which those who are placed together get used to each other's speeds.
 CALMING = 3
 # What a newcomer may have to stop for is looked for as far as this [m].
 FARTHEST = 150.0
-
-
-@dataclass(frozen=True)
-class Adopted:
-    """
-    A recorded obstacle that is to become an agent.
-
-    :param description: of the obstacle.
-    :param first_k: scenario time step of its first pose.
-    :param poses: (n, 3) of its centre at each time step from there on [m, rad]
-    :param velocities: (n, 3) [m/s, rad/s]
-    """
-
-    description: ObjectDescription
-    first_k: int
-    poses: FloatArray
-    velocities: FloatArray
-
-
-def adoptable(description: ObjectDescription, poses: FloatArray, network: RoadNetwork) -> bool:
-    """
-    Tell whether a recorded obstacle can become an agent.
-
-    Vehicles and cyclists that move and at some time drive along a lane for cars can;
-    pedestrians, parked and static ones cannot.
-
-    :param poses: (n, 3) of its centre over the recording; NaN where absent [m, rad]
-    """
-    poses = poses[np.isfinite(poses).all(axis=1)]
-    if description.role is not Role.RECORDED or description.type not in ADOPTED_TYPES:
-        return False
-    if len(poses) < 2 or np.hypot(*np.ptp(poses[:, :2], axis=0)) < PARKED:
-        return False
-    lanes = network.lanelets_at(poses)
-    return any(_fits(network, int(lane), pose) for lane, pose in
-               zip(lanes, poses, strict=True) if lane >= 0)
-
-
-def _fits(network: RoadNetwork, lane: int, pose: FloatArray) -> bool:
-    lanelet = network.lanelet_ids[lane]
-    if not network.is_for_cars(lanelet):
-        return False
-    s, _ = network.locate(lanelet, float(pose[0]), float(pose[1]))
-    yaw = network.pose_on(lanelet, s)[2]
-    return bool(abs(heading_difference(pose[2:3], np.array([yaw]))[0]) < ASTRAY)
 
 
 def is_long(length: float) -> bool:
@@ -256,8 +202,8 @@ class Spawner:
         s, d = graph.nearest(lane, pose[:1], pose[1:2])
         velocity = found.velocities[row]
         speed = float(np.hypot(velocity[0], velocity[1]))
-        safe = _safe_speed(pose, agents.length[slot], agents.width[slot], agents, others)
-        if not _is_free(pose, min(speed, safe), agents.length[slot], agents.width[slot], agents,
+        safe = safe_speed(pose, agents.length[slot], agents.width[slot], agents, others)
+        if not is_free(pose, min(speed, safe), agents.length[slot], agents.width[slot], agents,
                         others, close=True):
             return False
         speed = min(speed, safe)
@@ -277,7 +223,7 @@ class Spawner:
 
     def _lane_at(self, pose: FloatArray) -> int | None:
         found = int(self._graph.network.lanelets_at(pose[None, :])[0])
-        if found < 0 or not _fits(self._graph.network, found, pose):
+        if found < 0 or not fits(self._graph.network, found, pose):
             return None
         return self._graph.index.get(self._graph.network.lanelet_ids[found])
 
@@ -322,7 +268,7 @@ class Spawner:
     def _try(self, agents: Agents, slot: int, lane: int, s: float, speed: float,
              others: Bodies) -> bool:
         x, y, yaw = self._graph.poses(np.array([lane]), np.array([s]), np.zeros(1))[0]
-        if not _is_free(np.array((x, y, yaw)), speed, agents.length[slot], agents.width[slot],
+        if not is_free(np.array((x, y, yaw)), speed, agents.length[slot], agents.width[slot],
                         agents, others):
             return False
         agents.put(slot, lane, s, 0.0, (float(x), float(y), float(yaw)), speed)
@@ -343,61 +289,3 @@ class Spawner:
         """Tell whether a vehicle of an agent's size gets on from a lane."""
         long = is_long(float(agents.length[slot]))
         return not long or len(self._routes.reachable(lane, long)) > 0
-
-
-def _safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
-                others: Bodies) -> float:
-    """Give the speed from which a newcomer gets behind everybody ahead with firm braking."""
-    here = np.flatnonzero(agents.active)
-    poses = np.concatenate((agents.centers()[here], others.poses))
-    lengths = np.concatenate((agents.length[here], others.length))
-    widths = np.concatenate((agents.width[here], others.width))
-    velocities = np.concatenate((agents.velocities()[here], others.velocities))
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    east, north = poses[:, 0] - pose[0], poses[:, 1] - pose[1]
-    ahead, aside = east * cos + north * sin, np.abs(north * cos - east * sin)
-    turn = poses[:, 2] - pose[2]
-    wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
-    gap = ahead - 0.5 * (length + lengths) - STOP_GAP
-    along = np.maximum(velocities[:, 0] * cos + velocities[:, 1] * sin, 0.0)
-    before = (ahead > 0.0) & (aside < wide + SIDE_GAP)
-    safe = np.sqrt(along[before]**2 + 2.0 * FIRM * np.maximum(gap[before], 0.0))
-    return float(safe.min(initial=np.inf))
-
-
-def _is_free(pose: FloatArray, speed: float, length: float, width: float, agents: Agents,
-             others: Bodies, close: bool = False) -> bool:
-    """
-    Tell whether a place is free, with a gap to the front and the rear.
-
-    :param close: whether touching nobody is enough.
-    """
-    here = np.flatnonzero(agents.active)
-    poses = np.concatenate((agents.centers()[here], others.poses))
-    if not len(poses):
-        return True
-    lengths = np.concatenate((agents.length[here], others.length))
-    widths = np.concatenate((agents.width[here], others.width))
-    speeds = np.concatenate((agents.speed[here], np.hypot(*others.velocities[:, :2].T)))
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    east, north = poses[:, 0] - pose[0], poses[:, 1] - pose[1]
-    ahead = east * cos + north * sin
-    along, aside = np.abs(ahead), np.abs(north * cos - east * sin)
-    turn = poses[:, 2] - pose[2]
-    long = 0.5 * (length + lengths * np.abs(np.cos(turn)) + widths * np.abs(np.sin(turn)))
-    wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
-    # Who is changing lanes takes both.
-    wide += np.concatenate((np.where(agents.source[here] != NOBODY, LANE, 0.0),
-                            np.zeros(len(others.length))))
-    gap = 0.5 if close else START_GAP + START_TIME * np.maximum(speeds, speed)
-    if not close:
-        # Whoever is faster and behind has to slow down.
-        faster = np.where(ahead > 0.0, speed**2 - speeds**2, speeds**2 - speed**2)
-        gap = gap + np.maximum(faster, 0.0) / (2.0 * EASY)
-    else:
-        # Nor must anybody behind brake hard for whoever was recorded.
-        closing = np.where(ahead < 0.0, np.maximum(speeds**2 - speed**2, 0.0), 0.0)
-        gap = gap + closing / (2.0 * FIRM) + CLOSE_TIME * np.where(
-            ahead < 0.0, speeds, np.minimum(speeds, speed))
-    side = 0.2 if close else SIDE_GAP
-    return bool(((along > long + gap) | (aside > wide + side)).all())

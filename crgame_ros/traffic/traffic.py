@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.agents import Agents, FREE, NOBODY
 from crgame_ros.traffic.car_following import CAR_FOLLOWING, CarFollowing
-from crgame_ros.traffic.changing import LaneChanges
+from crgame_ros.traffic.changing import LaneChanges, SHORTEST_CHANGE
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fade_relief, relief_at_change
-from crgame_ros.traffic.crossings import CrossingRules, Crossings, queues, Situation
+from crgame_ros.traffic.crossings import Crossings, queues
 from crgame_ros.traffic.driving_side import driving_side
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
@@ -41,12 +42,12 @@ from crgame_ros.traffic.longitudinal import (
     Longitudinal,
     smoothed,
 )
+from crgame_ros.traffic.meetings import CrossingRules, Situation
 from crgame_ros.traffic.motion import Motion
 from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.spawning import (
-    Adopted,
     is_long,
     slot_descriptions,
     Spawner,
@@ -68,6 +69,8 @@ SWING_OUT = 10.0
 CLOSE = 1.3
 # Whoever stands behind somebody who stands, with less than this between them, queues [m].
 QUEUE = 12.0
+# Of a short lane that ends this share is left to change lanes in.
+REST_SHARE = 0.2
 NO_REFERENCE = np.empty(0)
 
 
@@ -118,9 +121,10 @@ class Traffic:
         # Agents taken off the road because they stood in a circle that nobody could open.
         self.taken_off = 0
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
-        self._spawner = Spawner(self._graph, self._cells, self._routes, self._conflicts, self._longitudinal,
-                                self._lines, adopted, spec.flow, spec.speed_factor, spec.speed_spread,
-                                time_step_s, self._random)
+        self._spawner = Spawner(
+            self._graph, self._cells, self._routes, self._conflicts, self._longitudinal,
+            self._lines, adopted, spec.flow, spec.speed_factor, spec.speed_spread, time_step_s,
+            self._random)
         self.descriptions: tuple[ObjectDescription, ...] = (
             *(replace(x.description, role=Role.TRAFFIC) for x in adopted),
             *slot_descriptions(self._capacity(), spec.truck_share, self._random))
@@ -310,10 +314,12 @@ class Traffic:
     def _lane_ends(self, way: Ways, length: FloatArray) -> FloatArray:
         """Give the distances (A) of the fronts from the end of lanes that end on the road."""
         row = np.arange(len(length))
-        last = way.count - 1
+        last = way.depth - 1
         lane = way.lane[row, last]
         reach = way.offset[row, last] + self._graph.length[lane]
-        return np.where(self._routes.drops[lane], reach - 0.5 * length - 1.0, np.inf)
+        # Whoever halts there still has the room that a change of lanes takes.
+        rest = np.minimum(SHORTEST_CHANGE, REST_SHARE * self._graph.length[lane])
+        return np.where(self._routes.drops[lane], reach - 0.5 * length - rest, np.inf)
 
     def _leave(self, k: int, slots: IntArray) -> None:
         """Take away who has left the map, and give new destinations to who needs one."""

@@ -16,7 +16,7 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world import WorldView

@@ -9,7 +9,7 @@ import numpy as np
 import traffic_support as support
 
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 
 NARROW = Shape.rectangle(1.0, 1.0)

@@ -19,7 +19,7 @@ import traffic_support as support
 
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 
 NAME = 'ZAM_Intersection-1_1_T-1.xml'

@@ -143,8 +143,8 @@ def halt(graph: LaneGraph, scenario: Scenario, shown: dict[int, str], ids: list[
     lines.show(shown)
     lanes = np.array([[graph.index[i] for i in ids]])
     offset = np.cumsum(np.concatenate(([[-50.0]], graph.length[lanes[:, :-1]]), axis=1), axis=1)
-    found = lines.halts(Ways(lanes, offset, (lanes >= 0).sum(axis=1), np.array([200.0])), np.array([speed]),
-                        np.array([4.0]), np.array([acceleration]))
+    way = Ways(lanes, offset, (lanes >= 0).sum(axis=1), np.array([200.0]))
+    found = lines.halts(way, np.array([speed]), np.array([4.0]), np.array([acceleration]))
     return round(float(found[0]), 2)
 
 

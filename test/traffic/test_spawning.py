@@ -13,7 +13,7 @@ from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.spawning import adoptable, Adopted
+from crgame_ros.traffic.adoption import adoptable, Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 
 LANE = 300.0

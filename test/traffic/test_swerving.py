@@ -12,7 +12,6 @@ from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.swerving import CUT, cutting_speed, Swerving
-from crgame_ros.traffic.tracking import move, pursuit_distance, steer
 
 LIMIT = 2.0
 

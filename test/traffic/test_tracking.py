@@ -10,7 +10,6 @@ import pytest
 
 from crgame_ros.traffic.elastic_band import ElasticBand
 from crgame_ros.traffic.passage import Obstacles
-from crgame_ros.traffic.tracking import centers, move, pursuit_distance, steer
 from crgame_ros.vehicle.kinematic_single_track import integrate
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ import traffic_support as support
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.speed_limits import set_speed_limit
+from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.car_following import CarFollowing
-from crgame_ros.traffic.spawning import Adopted
 from crgame_ros.traffic.spec import TrafficSpec
 
 MERGE, CROSSING = 'ZAM_Merge-1_1_T-1.xml', 'ZAM_Intersection-1_1_T-1.xml'
