@@ -86,6 +86,7 @@ setup(
         'matplotlib>=3.9,<4',
         'mcap>=1.6,<2',
         'mcap-ros2-support>=0.6,<1',
+        'numba>=0.68.1,<0.69',
         'numpy>=2.4,<2.5',
         'plotly>=7.1,<8',
         'pyyaml>=6.0.3,<7',

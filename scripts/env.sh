@@ -176,6 +176,8 @@ _crgame_make() {
         _crgame_say 'polygon3 did not compile: no planners reactive, reactive-package, idm-package;' \
             'apt install gcc python3-dev, remove .venv and start again'
     fi
+    (export PYTHONPATH=$root MPLBACKEND=Agg; "$venv/bin/python" -m crgame_ros.traffic.warm_up) ||
+        _crgame_say 'traffic could not be compiled now: that happens when a game has it'
     _crgame_stamp
 }
 

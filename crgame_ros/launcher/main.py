@@ -13,6 +13,7 @@ from crgame_ros.launcher.graph import Graph
 from crgame_ros.launcher.node_specs import node_specs, Roster
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
 from crgame_ros.ros.environment import free_domain_id, network_is_open, prepare_environment
+from crgame_ros.traffic.cache import compile_now
 
 
 def say(text: str) -> None:
@@ -33,6 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
                                 say=say)
         plan = plan_run(request)
+        compile_now()
         announce(plan)
         finisher = Finisher(plan.folder, say)
         code = Graph(node_specs(plan), say, Roster(plan.roster), finisher).run()

@@ -41,8 +41,8 @@ class AgentTable(Protocol):
     :param calm_until: tick before which it does not think of changing lanes again;
         `content_until` the same for changes for speed alone.
     :param waits: ticks for which it has been standing.
-    :param grant: tick at which it was let into a junction, or -1; until: the lane with which that one
-        ends; grant_left: how far away that is; grant_hold: where one waits before it [m].
+    :param grant: tick at which it was let into a junction, or -1; until: the lane with which that
+        one ends; grant_left: how far away that is; grant_hold: where one waits before it [m].
     :param previous: lane before its present one, or -1.
     :param side: 1 while it changes to the left, -1 to the right.
     :param relief: how much of its desired gap it forgoes for now [m].

@@ -36,7 +36,7 @@ SWERVE_TIME = 2.8
 CONTENT = 12.0
 THOUGHT, AT_ONCE = 1.0, 50
 # Changes for speed are left alone where the route wants the lane within this distance [m].
-COMMITTED = 250.0
+COMMITTED = 400.0
 SLOWEST = 3.0
 # The route's change begins this far before the last point where it is possible [m].
 PREPARE = 400.0
@@ -131,7 +131,7 @@ class LaneChanges:
             agents.calm_until[stuck] = k + self._give_up
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
-               acceleration: FloatArray, gap: FloatArray, blocked: FloatArray,
+               limit: FloatArray, acceleration: FloatArray, gap: FloatArray, blocked: FloatArray,
                standing: BoolArray, entries: Entries, way: Ways,
                halts: BoolArray) -> FloatArray:
         """
@@ -139,6 +139,7 @@ class LaneChanges:
 
         :param slots: (A) of the agents.
         :param desired: (A) desired speeds [m/s]
+        :param limit: (A) acceleration with which nobody gets too fast, in any lane [m/s^2]
         :param acceleration: (A) that they want in their own lanes [m/s^2]
         :param gap: (A) to whatever is ahead in the own lane, or inf [m]
         :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
@@ -152,9 +153,9 @@ class LaneChanges:
         if wish is None:
             return yielding[slots]
         wish = wish.take(~_blocked(wish, standing))
-        want, now = np.zeros(agents.count), np.zeros(agents.count)
-        want[slots], now[slots] = desired, acceleration
-        ok, gain = self._judge(agents, wish, want, now)
+        want, now, most = (np.zeros(agents.count) for _ in range(3))
+        want[slots], now[slots], most[slots] = desired, acceleration, limit
+        ok, gain = self._judge(agents, wish, want, now, most)
         must = wish.urgency >= 0.0
         gain = np.where(must, 100.0 + wish.urgency, gain)
         chosen = ok & (must | (gain > CHANGE_THRESHOLD))
@@ -210,7 +211,7 @@ class LaneChanges:
         return Wish(who, sides, hurries, room, beside)
 
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
-               acceleration: FloatArray) -> tuple[BoolArray, FloatArray]:
+               acceleration: FloatArray, limit: FloatArray) -> tuple[BoolArray, FloatArray]:
         """Tell whose gap is safe, and what each gains by changing (MOBIL) [m/s^2]."""
         model, beside = self._model, wish.beside
         speed = agents.speed[wish.slots]
@@ -226,7 +227,8 @@ class LaneChanges:
                                 beside.follow_speed, there, follow, hurry)
         loss = np.where(known, follow - acceleration[follower], np.minimum(follow, 0.0))
         loss = np.where(np.isinf(beside.follow_gap), 0.0, loss)
-        gain = incentive(acceleration[wish.slots], there, loss, self._politeness)
+        gain = incentive(acceleration[wish.slots], np.minimum(there, limit[wish.slots]), loss,
+                         self._politeness)
         return np.asarray(ok & (np.abs(beside.turn) < 0.3)), np.asarray(gain)
 
     def _begin(self, k: int, agents: Agents, wish: Wish, chosen: BoolArray,

@@ -80,7 +80,8 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
         np.full(count, math.inf), np.full(count, -math.inf))
     for i, slot in enumerate(slots):
         wide = 1 if agents.width[slot] > NARROW else 0
-        entry, leave, half = conflicts.entry[wide], conflicts.leave[wide], 0.5 * agents.length[slot]
+        entry, leave = conflicts.entry[wide], conflicts.leave[wide]
+        half = 0.5 * agents.length[slot]
         if agents.grant[slot] >= 0:
             for step in range(way.depth[i]):
                 if way.lane[i, step] == agents.until[slot]:

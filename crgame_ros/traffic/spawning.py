@@ -78,8 +78,8 @@ class Spawner:
     """
 
     def __init__(self, graph: LaneGraph, cells: LaneCells, routes: Routes, conflicts: Conflicts,
-                 speeds: Longitudinal, lines: HaltingLines, adopted: Sequence[Adopted], flow: float,
-                 speed_factor: float, speed_spread: float, time_step_s: float,
+                 speeds: Longitudinal, lines: HaltingLines, adopted: Sequence[Adopted],
+                 flow: float, speed_factor: float, speed_spread: float, time_step_s: float,
                  generator: np.random.Generator) -> None:
         self._graph, self._routes, self._conflicts = graph, routes, conflicts
         self._cells = cells

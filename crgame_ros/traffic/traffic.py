@@ -221,8 +221,8 @@ class Traffic:
             speed, self._lane_ends(way, agents.length[slots]), AT_END))
         if self._spec.lane_changes:
             acceleration = np.minimum(acceleration, self._changes.decide(
-                k, agents, slots, desired, acceleration, gap, blocked, standing, entries, way,
-                halt < self._changes.no_change(speed)))
+                k, agents, slots, desired, limit, acceleration, gap, blocked, standing, entries,
+                way, halt < self._changes.no_change(speed)))
         acceleration = smoothed(agents.acceleration[slots], acceleration, speed,
                                 self._time_step_s)
         acceleration = np.maximum(acceleration, -model.max_deceleration)

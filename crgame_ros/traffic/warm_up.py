@@ -3,7 +3,6 @@
 """Compile everything that traffic runs, before it is needed: `python -m …traffic.warm_up`."""
 
 from collections.abc import Callable
-from pathlib import Path
 import sys
 import time
 
@@ -21,18 +20,13 @@ import numpy as np
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.compiled import cache_root, digest
+from crgame_ros.traffic.cache import marker
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world import WorldView
 
 TICKS = 200
 LIGHT = 9001
-
-
-def marker() -> Path:
-    """Tell where it is noted that all is compiled."""
-    return cache_root() / f'compiled-{digest("traffic")}.done'
 
 
 def ensure_compiled(say: Callable[[str], None]) -> None:

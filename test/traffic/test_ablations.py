@@ -241,4 +241,5 @@ def test_m3_without_lane_changes_a_ramp_is_a_dead_end() -> None:
     assert {stuck.lanelets(k)[0] for k in range(0, 401, 5)} == {51, 52}
     assert stuck.speeds[-1, 0] < 0.1
     end = stuck.network.line(52).length - stuck.network.locate(52, *stuck.poses[-1, 0, :2])[0]
-    assert 2.25 < end < 2.25 + 6.0
+    # Whoever stands there has 12 m left to change lanes in.
+    assert 2.25 + 12.0 < end < 2.25 + 14.0

@@ -65,7 +65,10 @@ def crossings(scenario: Scenario, run: support.Run) -> list[Crossing]:
                                        & np.isfinite(front[:-1, :, 0])), strict=True):
             if not shapely.LineString(front[k:k + 2, slot]).intersects(segment):
                 continue
-            later = shapely.LineString(front[k + 1:k + 41, slot])
+            later = front[k + 1:k + 41, slot]
+            if np.isfinite(later[:, 0]).sum() < 2:
+                continue
+            later = shapely.LineString(later[np.isfinite(later[:, 0])])
             movement = max(areas, key=lambda x: x[1].intersection(later).length)[0]
             governing = [x for x in lights if x.direction is TrafficLightDirection.ALL
                          or movement in x.direction.value.lower()]

@@ -30,7 +30,7 @@ def test_a_model_of_the_users_own_is_relative_to_the_game_file() -> None:
 
 @pytest.mark.parametrize(('values', 'message'), [
     ({'agnets': 3}, '"agnets" is unknown'),
-    ({'agents': -1}, 'give a number from 0 to 5000'),
+    ({'agents': -1}, 'give a number from 0 to 20000'),
     ({'agents': 2.5}, '"agents" is 2.5'),
     ({'flow': float('inf')}, '"flow" is inf'),
     ({'speed_spread': 2.0}, 'from 0 to 0.5'),

@@ -12,6 +12,7 @@ from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.swerving import CUT, cutting_speed, Swerving
+from crgame_ros.traffic.tracking import move, pursuit_distance, steer
 
 LIMIT = 2.0
 
@@ -20,7 +21,7 @@ def standing(*rows: tuple[int, float, float, float, float]) -> Entries:
     """Collect (lane, rear, front, low, high) of things that stand."""
     columns = np.array(rows, dtype=float).reshape(-1, 5).T
     count = len(rows)
-    values = {name: np.zeros(count) for name in Entries.__dataclass_fields__}
+    values = {name: np.zeros(count) for name in Entries._fields}
     values |= dict(zip(('rear', 'front', 'low', 'high'), columns[1:], strict=True))
     values['lane'] = columns[0].astype(np.int64)
     return Entries(**values)
@@ -37,14 +38,14 @@ def planned(*rows: tuple[int, float, float, float, float], width: float = 6.0,
 
 def driven(d: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Let a bicycle of 4.8 m wheelbase steer along offsets; rear axles (N, 2) and headings."""
-    x, y, yaw, steering = (np.zeros(1) for _ in range(4))
-    v, wheelbase, found = np.array([speed]), np.array([4.8]), []
-    while x[0] < 280.0:
-        ahead = x + pursuit_distance(v)
-        steering = steer(x, y, yaw, ahead, np.interp(ahead, np.arange(len(d)), d), wheelbase,
+    x = y = yaw = steering = 0.0
+    found = []
+    while x < 280.0:
+        ahead = x + pursuit_distance(speed, 0.0)
+        steering = steer(x, y, yaw, ahead, float(np.interp(ahead, np.arange(len(d)), d)), 4.8,
                          steering, 0.7, 1.0, 0.01)
-        x, y, yaw, v = move(x, y, yaw, v, steering, np.zeros(1), wheelbase, 0.01)
-        found.append((x[0], y[0], yaw[0]))
+        x, y, yaw, _ = move(x, y, yaw, speed, steering, 0.0, 4.8, 0.01)
+        found.append((x, y, yaw))
     poses = np.array(found)
     return poses[:, :2], poses[:, 2]
 

@@ -1,0 +1,59 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where compiled code is kept; nothing here is compiled, or loads what compiles.
+
+It lies in a folder named by the contents of the function's module and of all that it imports from
+here: numba itself looks at the function's own file only, not at those of what it calls, and would
+run old code after a change.
+"""
+
+from functools import cache
+import hashlib
+from importlib.metadata import version
+import os
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+_HERE = Path(__file__).resolve().parent
+_IMPORT = re.compile(r'^from crgame_ros\.traffic\.(\w+) import', re.MULTILINE)
+
+
+@cache
+def cache_root() -> Path:
+    """Choose the folder of all compiled code: beside the sources, or else the user's cache."""
+    chosen = os.environ.get('NUMBA_CACHE_DIR')
+    if chosen:
+        return Path(chosen)
+    beside = _HERE / '__pycache__'
+    if os.access(beside if beside.exists() else _HERE, os.W_OK):
+        return beside
+    return Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'crgame_ros'
+
+
+@cache
+def digest(module: str) -> str:
+    """Give a short digest of a module here and of all modules that it builds upon."""
+    pending, seen = [module], set[str]()
+    while pending:
+        name = pending.pop()
+        if name not in seen:
+            seen.add(name)
+            pending += _IMPORT.findall((_HERE / f'{name}.py').read_text(encoding='utf-8'))
+    result = hashlib.sha256(version('numba').encode())
+    for name in sorted(seen):
+        result.update((_HERE / f'{name}.py').read_bytes())
+    return result.hexdigest()[:12]
+
+
+def marker() -> Path:
+    """Tell which file says that everything is compiled."""
+    return cache_root() / f'compiled-{digest("warm_up")}.done'
+
+
+def compile_now() -> None:
+    """Compile what is not compiled yet, in a process of its own, which says so."""
+    if not marker().exists():
+        subprocess.run([sys.executable, '-m', 'crgame_ros.traffic.warm_up'], check=False)
