@@ -56,8 +56,8 @@ class LaneGraph:
         self._slow_at_kinks(lateral_acceleration)
         self.table = LaneTable(
             self.first, self.count, self.length, self.step, self.limit, self.left, self.right,
-            self.successors, self.predecessors, self.x, self.y, self.yaw, self.curvature,
-            self.half_width)
+            self.successors, self.predecessors, self.x, self.y, self.yaw, np.cos(self.yaw),
+            np.sin(self.yaw), self.curvature, self.half_width)
 
     def __len__(self) -> int:
         return len(self.ids)

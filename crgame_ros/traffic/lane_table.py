@@ -25,7 +25,8 @@ class LaneTable(NamedTuple):
     :param limit: (L) speed limit [m/s]
     :param left, right: (L) neighbours of the same direction, or -1.
     :param successors, predecessors: (L, S) filled up with -1.
-    :param x, y, yaw, curvature, half_width: of the points [m, rad, 1/m, m]
+    :param x, y, yaw, cos, sin, curvature, half_width: of the points; cosine and sine are those of
+        the yaw [m, rad, 1/m, m]
     """
 
     first: IntArray
@@ -40,6 +41,8 @@ class LaneTable(NamedTuple):
     x: FloatArray
     y: FloatArray
     yaw: FloatArray
+    cos: FloatArray
+    sin: FloatArray
     curvature: FloatArray
     half_width: FloatArray
 
@@ -65,21 +68,35 @@ def point_on(lanes: LaneTable, lane: int, s: float) -> tuple[float, float, float
 
 
 @compiled
+def segment(lanes: LaneTable, lane: int, s: float) -> tuple[int, float]:
+    """Give the row at or before arc length s, and the share of the step beyond it."""
+    share = s / lanes.step[lane]
+    row = int(min(max(math.floor(share), 0.0), lanes.points[lane] - 2.0))
+    return row + lanes.first[lane], share - row
+
+
+@compiled
 def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
                rounds: int) -> tuple[float, float, float]:
     """
     Find a position in the coordinates of a lane, near an arc length that is guessed.
+
+    Cosine and sine are interpolated, not computed: headings of neighbouring points are alike.
 
     :param rounds: of correction; one is enough for a guess that is off by centimetres.
     :return: s [m], d [m] and the lane's heading there [rad]
     """
     s, d, yaw = guess, 0.0, 0.0
     for _ in range(rounds):
-        lane_x, lane_y, yaw = point_on(lanes, lane, s)
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        east, north = x - lane_x, y - lane_y
+        row, share = segment(lanes, lane, s)
+        east = x - lanes.x[row] - share * (lanes.x[row + 1] - lanes.x[row])
+        north = y - lanes.y[row] - share * (lanes.y[row + 1] - lanes.y[row])
+        inside = min(max(share, 0.0), 1.0)
+        cos = lanes.cos[row] + inside * (lanes.cos[row + 1] - lanes.cos[row])
+        sin = lanes.sin[row] + inside * (lanes.sin[row + 1] - lanes.sin[row])
         s += east * cos + north * sin
         d = north * cos - east * sin
+        yaw = lanes.yaw[row] + inside * (lanes.yaw[row + 1] - lanes.yaw[row])
     return s, d, yaw
 
 

@@ -7,9 +7,9 @@ import math
 from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.lane_table import LaneTable, nearest_row, point_on, project_on
+from crgame_ros.traffic.lane_table import LaneTable, nearest_row, project_on, segment
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.tracking import move, pursuit_distance, steer
+from crgame_ros.traffic.tracking import drive, pursuit_distance, steer_towards
 
 MAX_STEERING = 0.7
 MAX_STEERING_RATE = 1.0
@@ -51,29 +51,53 @@ class Motion:
 def _move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
           reference: FloatArray, substeps: int, dt_s: float) -> None:
     for slot in slots:
-        for _ in range(substeps):
-            _step(lanes, following, agents, slot, reference, dt_s)
+        # The sharpest bend as far as one looks where it is straight.
+        speed, bend = agents.speed[slot], 0.0
+        rear = agents.s[slot] - agents.rear_to_center[slot]
+        for n in range(3):
+            lane, there = _onward(lanes, following, agents.destination[slot], agents.lane[slot],
+                                  rear + 0.5 * n * pursuit_distance(speed, 0.0))
+            bend = max(bend, abs(lanes.curvature[nearest_row(lanes, lane, there)]))
+        distance = pursuit_distance(speed, bend)
+        _drive(lanes, following, agents, slot, reference, distance, substeps, dt_s)
 
 
 @compiled
-def _step(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
-          reference: FloatArray, dt_s: float) -> None:
-    """Move one agent by one step of the motion."""
-    target_x, target_y = _target(lanes, following, agents, i, reference)
-    steering = steer(agents.x[i], agents.y[i], agents.yaw[i], target_x, target_y,
-                     agents.wheelbase[i], agents.steering[i], MAX_STEERING, MAX_STEERING_RATE,
-                     dt_s)
-    x, y, yaw, speed = move(agents.x[i], agents.y[i], agents.yaw[i], agents.speed[i], steering,
-                            agents.acceleration[i], agents.wheelbase[i], dt_s)
-    agents.yaw_rate[i] = (yaw - agents.yaw[i]) / dt_s
+def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
+           reference: FloatArray, distance: float, substeps: int, dt_s: float) -> None:
+    """Move one agent by some steps, each towards a point a distance ahead on its reference."""
+    x, y, yaw = agents.x[i], agents.y[i], agents.yaw[i]
+    speed, steering = agents.speed[i], agents.steering[i]
+    wheelbase, middle = agents.wheelbase[i], agents.rear_to_center[i]
+    acceleration = agents.acceleration[i]
+    cos, sin, half_turn = math.cos(yaw), math.sin(yaw), 0.0
+    for _ in range(substeps):
+        target_x, target_y = _target(lanes, following, agents, i, reference,
+                                     agents.s[i] - middle + distance)
+        dx, dy = target_x - x, target_y - y
+        steering = steer_towards(dx * cos + dy * sin, dy * cos - dx * sin, wheelbase, steering,
+                                 MAX_STEERING, MAX_STEERING_RATE, dt_s)
+        chord, half_turn, speed = drive(speed, steering, acceleration, wheelbase, dt_s)
+        # Half the turn on, drive, the other half: sine and cosine of such small angles.
+        turn_cos = 1.0 - 0.5 * half_turn**2 * (1.0 - half_turn**2 / 12.0)
+        turn_sin = half_turn * (1.0 - half_turn**2 / 6.0 * (1.0 - half_turn**2 / 20.0))
+        cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
+        x, y = x + chord * cos, y + chord * sin
+        cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
+        yaw += 2.0 * half_turn
+        _follow(lanes, following, agents, i, x + middle * cos, y + middle * sin, speed * dt_s)
     agents.x[i], agents.y[i], agents.yaw[i] = x, y, yaw
     agents.speed[i], agents.steering[i] = speed, steering
-    x += agents.rear_to_center[i] * math.cos(yaw)
-    y += agents.rear_to_center[i] * math.sin(yaw)
+    agents.yaw_rate[i] = 2.0 * half_turn / dt_s
+
+
+@compiled
+def _follow(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, x: float,
+            y: float, way: float) -> None:
+    """Find where an agent's centre is in its lane now, or in the next one."""
     lane = agents.lane[i]
-    s, d, _ = project_on(lanes, lane, x, y, agents.s[i] + speed * dt_s, 1)
-    agents.s[i], agents.d[i] = s, d
-    if s > lanes.length[lane]:
+    agents.s[i], agents.d[i], _ = project_on(lanes, lane, x, y, agents.s[i] + way, 1)
+    if agents.s[i] > lanes.length[lane]:
         onward = following[agents.destination[i], lane]
         if onward >= 0:
             _go_over(lanes, agents, i, onward, x, y)
@@ -81,24 +105,13 @@ def _step(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
 
 @compiled
 def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
-            reference: FloatArray) -> tuple[float, float]:
-    """Find the point of the reference to steer for."""
-    lane, speed = agents.lane[i], agents.speed[i]
-    rear = agents.s[i] - agents.rear_to_center[i]
-    # The sharpest bend as far as one looks where it is straight.
-    bend, there = 0.0, rear
-    for n in range(3):
-        lane, there = _onward(lanes, following, agents.destination[i], agents.lane[i],
-                              rear + 0.5 * n * pursuit_distance(speed, 0.0))
-        curvature = lanes.curvature[nearest_row(lanes, lane, there)]
-        if abs(curvature) > abs(bend):
-            bend = curvature
-    along = rear + pursuit_distance(speed, bend)
-    lane, there = _onward(lanes, following, agents.destination[i], agents.lane[i], along)
-    share = there / lanes.step[lane]
-    row = int(min(max(math.floor(share), 0.0), lanes.points[lane] - 2.0))
-    share = min(max(share - row, 0.0), 1.0)
-    row += lanes.first[lane]
+            reference: FloatArray, along: float) -> tuple[float, float]:
+    """Find the point of the reference to steer for, at an arc length of the agent's lane."""
+    lane, there = agents.lane[i], along
+    if there > lanes.length[lane]:
+        lane, there = _onward(lanes, following, agents.destination[i], lane, along)
+    row, beyond = segment(lanes, lane, there)
+    share = min(max(beyond, 0.0), 1.0)
     d = reference[row] + share * (reference[row + 1] - reference[row])
     # The corners of a vehicle whose front is f ahead of its rear axle stay equally far from
     # the middle of a curve if that axle runs f^2 / (4 R) inside.
@@ -107,8 +120,10 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     d += min(max(0.25 * curvature * front * front, -MAX_CURVE_SHIFT), MAX_CURVE_SHIFT)
     if agents.source[i] != NOBODY:
         d += change_offset(agents.curve[i], along - agents.from_s[i], agents.span[i])
-    x, y, yaw = point_on(lanes, lane, there)
-    return x - d * math.sin(yaw), y + d * math.cos(yaw)
+    cos = lanes.cos[row] + share * (lanes.cos[row + 1] - lanes.cos[row])
+    sin = lanes.sin[row] + share * (lanes.sin[row + 1] - lanes.sin[row])
+    return (lanes.x[row] + beyond * (lanes.x[row + 1] - lanes.x[row]) - d * sin,
+            lanes.y[row] + beyond * (lanes.y[row + 1] - lanes.y[row]) + d * cos)
 
 
 @compiled

@@ -21,6 +21,8 @@ MAX_SHIFT = 3.0
 CROSSING = 0.7
 # Bodies beside a lane by less than this count as in it: who drives there may be wider [m].
 BESIDE = 0.4
+# From the middle of a lane to its edge, at most, and what a first guess is off by [m].
+FARTHEST = 5.0
 # Lanes with more bodies are sorted by a general algorithm.
 FEW = 32
 
@@ -137,7 +139,10 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, foun
     x, y, heading = bodies.poses[i, 0], bodies.poses[i, 1], bodies.poses[i, 2]
     half_length, half_width = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
     reach = half_length + half_width
-    s, d, yaw = project_on(lanes, lane, x, y, guess, 3)
+    s, d, yaw = project_on(lanes, lane, x, y, guess, 1)
+    if abs(d) > reach + FARTHEST:
+        return 0
+    s, d, yaw = project_on(lanes, lane, x, y, s, 2)
     if s < -reach or s > lanes.length[lane] + reach or abs(d) > 20.0:
         return 0
     cos, sin = math.cos(yaw), math.sin(yaw)

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from test_tracking import move, steer
 import traffic_support as support
 
 from crgame_ros.scenario.road_network import RoadNetwork
@@ -12,7 +13,7 @@ from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.swerving import CUT, cutting_speed, Swerving
-from crgame_ros.traffic.tracking import move, pursuit_distance, steer
+from crgame_ros.traffic.tracking import pursuit_distance
 
 LIMIT = 2.0
 
@@ -45,7 +46,7 @@ def driven(d: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
         steering = steer(x, y, yaw, ahead, float(np.interp(ahead, np.arange(len(d)), d)), 4.8,
                          steering, 0.7, 1.0, 0.01)
         x, y, yaw, _ = move(x, y, yaw, speed, steering, 0.0, 4.8, 0.01)
-        found.append((x, y, yaw))
+        found.append((float(x), float(y), float(yaw)))
     poses = np.array(found)
     return poses[:, :2], poses[:, 2]
 

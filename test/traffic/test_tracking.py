@@ -16,12 +16,25 @@ from crgame_ros.vehicle.kinematic_single_track import integrate
 Array = NDArray[np.float64]
 
 # The functions of one vehicle, for fleets.
-move, steer = np.vectorize(tracking.move), np.vectorize(tracking.steer)
+drive, steer_towards = np.vectorize(tracking.drive), np.vectorize(tracking.steer_towards)
 distance_at = np.vectorize(tracking.pursuit_distance)
 
 
 def pursuit_distance(speed: Array, curvature: float = 0.0) -> Array:
     return distance_at(speed, curvature)
+
+
+def move(x: Array, y: Array, yaw: Array, speed: Array, steering: Array, acceleration: Array,
+         wheelbase: Array, dt_s: float) -> tuple[Array, Array, Array, Array]:
+    chord, half, speed = drive(speed, steering, acceleration, wheelbase, dt_s)
+    return (x + chord * np.cos(yaw + half), y + chord * np.sin(yaw + half), yaw + 2.0 * half,
+            speed)
+
+
+def steer(x: Array, y: Array, yaw: Array, target_x: Array, target_y: Array, wheelbase: Array,
+          steering: Array, *limits: float) -> Array:
+    dx, dy, cos, sin = target_x - x, target_y - y, np.cos(yaw), np.sin(yaw)
+    return steer_towards(dx * cos + dy * sin, dy * cos - dx * sin, wheelbase, steering, *limits)
 
 
 def test_motion_is_that_of_the_single_track_model() -> None:
