@@ -130,15 +130,19 @@ class LaneGraph:
         Who steers for a point a time T ahead turns by the angle within T.
         """
         for lane in range(len(self)):
-            start = int(self.first[lane])
-            before = self.predecessors[lane][self.predecessors[lane] >= 0]
-            ends = self.yaw[self.first[before] + self.count[before] - 1]
-            kink = float(np.abs(heading_difference(self.yaw[start], ends)).max(initial=0.0))
+            start, kink = int(self.first[lane]), self._kink(lane)
             if kink > LEAST_KINK:
                 rows = slice(start, start + min(int(self.count[lane]), round(
                     KINK_REACH / float(self.step[lane])) + 1))
                 self.curve_speed[rows] = np.minimum(self.curve_speed[rows], max(
                     lateral_acceleration * PURSUIT_TIME / kink, 2.0))
+
+    def _kink(self, lane: int) -> float:
+        """Give the greatest angle between a lane's beginning and an end before it [rad]."""
+        before = self.predecessors[lane][self.predecessors[lane] >= 0]
+        ends = self.yaw[self.first[before] + self.count[before] - 1]
+        start = self.yaw[self.first[lane]]
+        return float(np.abs(heading_difference(start, ends)).max(initial=0.0))
 
     def rows(self, lane: IntArray, s: FloatArray) -> IntArray:
         """Give the table row nearest to arc length s (N) of lanes (N)."""
@@ -169,7 +173,9 @@ class LaneGraph:
         for lane in range(len(self)):
             rows = slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))
             bend = smooth(self.curvature[rows], SMOOTHING / float(self.step[lane]))
-            takes = 0.5 * width + 0.25 * np.abs(bend) * front**2
+            # An angle to the lane before is a bend as well.
+            bend = np.maximum(np.abs(bend), self._kink(lane) / SMOOTHING)
+            takes = 0.5 * width + 0.25 * bend * front**2
             result[lane] = (takes > self.half_width[rows] + room).any()
         return result
 
