@@ -119,6 +119,27 @@ def test_ros2_run_finds_executables(prefix: Path) -> None:
     assert (done.returncode, done.stdout) == (3, 'a b|--ros-args|')
 
 
+def test_only_traffic_waits_for_the_compiler() -> None:
+    """Other nodes, and a run without agents, don't load numba: 0.4 s and 60 MB each."""
+    others = [name for name in NODES if name != 'traffic_node']
+    script = f"""
+import sys
+from importlib import import_module
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.game_file import load_game
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+for name in {others}:
+    import_module('crgame_ros.nodes.' + name)
+game = load_game(scenarios_directory() / 'occluded_pedestrian.yaml')
+assert game.objects and game.traffic is None
+run_offline(build_setup(game), duration_s=1.0)
+print('numba' in sys.modules)
+"""
+    done = subprocess.run([sys.executable, '-c', script], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, 'False\n'), done.stderr
+
+
 def test_every_entry_point_resolves(wheel: Path) -> None:
     """Each console script and each built-in planner names something that exists."""
     with ZipFile(wheel) as archive:

@@ -3,6 +3,7 @@
 """Agents of traffic that traffic_node moves, as sim_node uses them."""
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from crgame_ros.scenario.events import SpeedLimit
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.traffic_setup import TrafficSetup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
-from crgame_ros.traffic.world import WorldView
+
+if TYPE_CHECKING:
+    from crgame_ros.traffic.world import WorldView
 
 # Agents whose states are late go on for so long, and then brake to a stop [s], [m/s^2].
 ROLLS_ON_S = 0.5
@@ -55,7 +58,7 @@ class RemoteTraffic:
             self._keep(series, self._k)
         return self._k + 1 in self._waiting
 
-    def tell(self, view: WorldView) -> None:
+    def tell(self, view: 'WorldView') -> None:
         """Tell nothing: traffic_node reads the published world."""
 
     def limit_speed(self, action: SpeedLimit) -> None:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.scenario.object_motion import ABSENT, Integrated
 from crgame_ros.scenario.object_path import ObjectPath, SpeedProfile
 from crgame_ros.scenario.object_spec import MoverType, ObjectSpec
 from crgame_ros.scenario.object_surroundings import Surroundings
-from crgame_ros.traffic.car_following import IntelligentDriver
 
 FloatArray = NDArray[np.float64]
 
@@ -23,6 +23,35 @@ SIDE_MARGIN = 0.3
 # A reactive object looks as far as it takes to stop comfortably, and this much farther [m].
 _LOOK = 30.0
 _ARRIVED = 0.01
+# What `idm` of traffic adds to the model (traffic.car_following, which is compiled: too much to
+# load into every node): the guard begins at this share of the hardest deceleration and leaves this
+# share of the gap at standstill; who stands stays until the model wants START.
+_GUARD_SHARE, _GUARD_GAP, _LEAST_ROOM = 0.8, 0.5, 0.01
+_STANDING, _START = 0.1, 0.2
+
+
+def follow(model: IdmParameters, speed: float, desired: float, gap: float,
+           leader_speed: float) -> float:
+    """
+    Give the acceleration behind a leader that may brake its hardest at any moment [m/s^2].
+
+    The same as `idm` of traffic has, to the last bit.
+
+    :param desired: speed on a free road, 0.1 or above [m/s]
+    :param gap: bumper to bumper [m]
+    """
+    # Arrays, and products for squares: powers of Python's own numbers are rounded otherwise.
+    v, v0, s, v_l = np.array([[speed], [desired], [gap], [leader_speed]])
+    wanted = float((free_acceleration(v, v0, model, np.maximum)
+                    + interaction(v, s, v_l, model, np.maximum))[0])
+    leader_speed = max(leader_speed, 0.0)
+    stopping = gap - _GUARD_GAP * model.s0 + leader_speed * leader_speed / (2.0 * model.b_max)
+    share = speed * speed / (2.0 * model.b_max * max(stopping, _LEAST_ROOM))
+    if share > _GUARD_SHARE:
+        wanted = min(wanted, -model.b_max * ((share - _GUARD_SHARE) / (1.0 - _GUARD_SHARE)))
+    if speed < _STANDING and wanted < _START:
+        wanted = min(wanted, -_START)
+    return min(max(wanted, -model.b_max), model.a)
 
 
 class BicycleMotion(Integrated):
@@ -54,7 +83,7 @@ class BicycleMotion(Integrated):
         if spec.end == 'stay':
             limit[-1] = 0.0
         self._profile = SpeedProfile(path.s, limit, self._type.deceleration)
-        self._driver = IntelligentDriver(
+        self._model = IdmParameters(
             self._type.headway, self._type.distance, self._type.acceleration,
             self._type.deceleration, self._type.hardest)
         self._speed = self._profile.at(start) if spec.start == 0.0 else 0.0
@@ -70,8 +99,7 @@ class BicycleMotion(Integrated):
             self._following = math.inf
             return
         wanted = max(self._profile.at(self._s), 0.1)
-        self._following = float(self._driver.acceleration(
-            np.array([self._speed]), np.array([wanted]), np.array([gap]), np.array([speed]))[0])
+        self._following = follow(self._model, self._speed, wanted, gap, speed)
 
     def _leader(self, others: Surroundings) -> tuple[float, float]:
         """Give gap and speed along the path of the nearest one ahead; infinite without one."""

@@ -3,6 +3,7 @@
 """What living objects react to in a run."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from crgame_ros.simulation.world_reader import (
     joints_of,
     WorldReader,
 )
-from crgame_ros.traffic.world import WorldView
 from crgame_ros.vehicle.state import VehicleState
+
+if TYPE_CHECKING:
+    from crgame_ros.traffic.world import WorldView
 
 
 class Surroundings:
@@ -47,7 +50,7 @@ class Surroundings:
         self._joints = joints_of(states)
         self._objects = objects
 
-    def of_agents(self, k: int) -> WorldView:
+    def of_agents(self, k: int) -> 'WorldView':
         """Give what agents react to at tick k."""
         return self._reader.view(k, *self._joints, self._objects)
 

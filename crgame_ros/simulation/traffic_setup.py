@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates
@@ -12,11 +13,13 @@ from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.world_reader import joints_of, WorldReader
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
-from crgame_ros.traffic.adoption import adoptable, Adopted
 from crgame_ros.traffic.spec import TrafficSpec
-from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
 from crgame_ros.vehicle.state import VehicleState
+
+if TYPE_CHECKING:
+    # Both import numba: only runs with agents should wait for that.
+    from crgame_ros.traffic.traffic import Traffic
+    from crgame_ros.traffic.world import WorldView
 
 # Agents move at this rate, whatever the simulation's [Hz] (FS III).
 MOTION_RATE = 100.0
@@ -32,7 +35,7 @@ class TrafficSetup:
     """
 
     descriptions: tuple[ObjectDescription, ...]
-    make: Callable[[], Traffic]
+    make: Callable[[], 'Traffic']
 
 
 def adopted_columns(spec: TrafficSpec | None, obstacles: ScenarioObstacles, network: RoadNetwork,
@@ -45,6 +48,7 @@ def adopted_columns(spec: TrafficSpec | None, obstacles: ScenarioObstacles, netw
     """
     if spec is None or spec.recorded != 'reactive':
         return ()
+    from crgame_ros.traffic.adoption import adoptable
     return tuple(column for column, item in enumerate(obstacles.descriptions)
                  if item.id not in kept
                  and adoptable(item, obstacles.track(column)[0], network))
@@ -52,8 +56,8 @@ def adopted_columns(spec: TrafficSpec | None, obstacles: ScenarioObstacles, netw
 
 def make_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwork,
                  others: Sequence[ObjectDescription], obstacles: ScenarioObstacles,
-                 adopted: Sequence[int], world: WorldView, scheduler: ScenarioScheduler,
-                 seed: int) -> Traffic:
+                 adopted: Sequence[int], world: 'WorldView', scheduler: ScenarioScheduler,
+                 seed: int) -> 'Traffic':
     """
     Make the agents of a run.
 
@@ -63,6 +67,8 @@ def make_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwork
     :param world: everything that is no agent at the first tick.
     :param seed: of the game; the traffic's own goes before it.
     """
+    from crgame_ros.traffic.adoption import Adopted
+    from crgame_ros.traffic.traffic import Traffic
     tracks = [Adopted(obstacles.descriptions[column], obstacles.first_step(column),
                       *obstacles.track(column)) for column in adopted]
     return Traffic(spec, network, loaded.scenario, others, tracks, scheduler.time_step_s,
@@ -86,7 +92,7 @@ def place_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwor
     reader = WorldReader(descriptions, TrafficLights(loaded.scenario))
     world = reader.view(scheduler.k0, *joints_of(vehicles), objects)
 
-    def make() -> Traffic:
+    def make() -> 'Traffic':
         return make_traffic(spec, loaded, network, reader.others, obstacles, adopted, world,
                             scheduler, seed)
     return TrafficSetup(make().descriptions, make)

@@ -3,7 +3,7 @@
 """Everything in a run that is no driven vehicle, tick by tick."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, TYPE_CHECKING
 
 from crgame_ros.scenario.events import SpeedLimit
 from crgame_ros.scenario.objects import ObjectStates
@@ -11,9 +11,12 @@ from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.simulation.surroundings import Surroundings
 from crgame_ros.simulation.traffic_limits import TrafficLimits
-from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
 from crgame_ros.vehicle.state import VehicleState
+
+if TYPE_CHECKING:
+    # Both import numba: only runs with agents should wait for that.
+    from crgame_ros.traffic.traffic import Traffic
+    from crgame_ros.traffic.world import WorldView
 
 
 class TrafficFeed(Protocol):
@@ -26,7 +29,7 @@ class TrafficFeed(Protocol):
     def states_for(self, k: int) -> tuple[ObjectStates, int]:
         """Give the agents at tick k, and the tick whose states could be used for that."""
 
-    def tell(self, view: WorldView) -> None:
+    def tell(self, view: 'WorldView') -> None:
         """Tell what the agents react to."""
 
     def limit_speed(self, action: SpeedLimit) -> None:
@@ -42,7 +45,7 @@ class LocalTraffic:
     :param limits: the roads as the agents know them.
     """
 
-    def __init__(self, traffic: Traffic, k: int, limits: TrafficLimits) -> None:
+    def __init__(self, traffic: 'Traffic', k: int, limits: TrafficLimits) -> None:
         self._traffic = traffic
         self._limits = limits
         self._k = k
@@ -55,7 +58,7 @@ class LocalTraffic:
             self._k += 1
         return self._traffic.states, self._k
 
-    def tell(self, view: WorldView) -> None:
+    def tell(self, view: 'WorldView') -> None:
         """Keep what the agents will react to."""
         self._view = view
 

@@ -8,6 +8,7 @@ Driven vehicles are read as the joints that `/vehicles/state` carries.
 
 from collections.abc import Sequence
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 from crgame_ros.planner.joints import vehicle_to_joints
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.signals import TrafficLights
-from crgame_ros.traffic.world import WorldView
 from crgame_ros.vehicle.state import VehicleState
+
+if TYPE_CHECKING:
+    from crgame_ros.traffic.world import WorldView
 
 FloatArray = NDArray[np.float64]
 Joints = Sequence[Sequence[float]] | FloatArray
@@ -60,7 +63,7 @@ class WorldReader:
             *driven, *(objects[column] for column in self._columns))
 
     def view(self, k: int, positions: Joints, velocities: Joints,
-             objects: ObjectStates) -> WorldView:
+             objects: ObjectStates) -> 'WorldView':
         """
         Give what agents react to at tick k.
 
@@ -68,6 +71,8 @@ class WorldReader:
         :param velocities: (V, 4)
         :param objects: all objects.
         """
+        # Imports numba: only runs with agents should wait for that.
+        from crgame_ros.traffic.world import WorldView
         poses, rates = driven_centers(positions, velocities, self._ahead)
         return WorldView(k, np.concatenate((poses, objects.poses[self._columns])),
                          np.concatenate((rates, objects.velocities[self._columns])),

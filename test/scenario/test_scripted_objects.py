@@ -15,12 +15,15 @@ from shapely import affinity
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.planner.idm_model import IdmParameters
 from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.object_bicycle import follow
 from crgame_ros.scenario.object_file import parse_objects
 from crgame_ros.scenario.object_spec import MOVER_TYPES
 from crgame_ros.scenario.objects import Role
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.scripted_objects import ScriptedObjects
+from crgame_ros.traffic.car_following import IntelligentDriver
 
 Array = NDArray[np.float64]
 DT = 0.1
@@ -330,6 +333,24 @@ def test_follower_takes_the_gap_of_the_idm() -> None:
     assert velocities[-1, 0, 0] == pytest.approx(8.0, abs=0.01)
     all_gaps = 40.0 + 8.0 * np.arange(1201) * DT - 2.25 - (poses[:, 0, 0] + 2.254)
     assert all_gaps.min() > 2.0
+
+
+def test_follower_brakes_as_idm_of_traffic_to_the_last_bit() -> None:
+    """The law and its emergency guard are traffic's own, close behind and far, slow and fast."""
+    random = np.random.default_rng(0)
+    speeds, desired = random.uniform(0.0, 20.0, 20_000), random.uniform(0.1, 20.0, 20_000)
+    speeds[::10] *= 0.01
+    gaps, leaders = random.uniform(0.0, 60.0, 20_000), random.uniform(-2.0, 20.0, 20_000)
+    gaps[::3] *= 0.05
+    for mover in MOVER_TYPES.values():
+        law = (mover.headway, mover.distance, mover.acceleration, mover.deceleration,
+               mover.hardest)
+        expected = IntelligentDriver(*law).acceleration(speeds, desired, gaps, leaders)
+        assert (expected == -mover.hardest).mean() > 0.1 < (expected > 0.0).mean()
+        model = IdmParameters(*law)
+        given = [follow(model, *row) for row in np.stack(
+            (speeds, desired, gaps, leaders), axis=1).tolist()]
+        assert np.array_equal(given, expected)
 
 
 def test_lane_follower_keeps_to_lane_and_limit() -> None:
