@@ -13,16 +13,22 @@ import yaml
 from crgame_ros.cli import main
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
+from crgame_ros.scenario.game import PoseSpawn
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+
+# Well ahead of the AV, where nobody runs into the human: x, y, yaw and speed.
+STARTS = {'USA_US101-4_1_T-1': (43.57, -38.65, -0.7094, 5.331),
+          'ZAM_Tutorial-1_2_T-1': (76.59, 0.0, 0.0, 22.0)}
 
 
 def run(path: Path, stop: bool, rate: float = 100.0, **options: bool) -> OfflineResult:
     """Run a published scenario with a human who lets the car roll straight on."""
     game = effective_game(RunRequest(scenario=path, driver='idle'))
     game = replace(game, drivability=replace(game.drivability, stop=stop),
-                   timing=replace(game.timing, rate=rate))
+                   timing=replace(game.timing, rate=rate),
+                   humans=(replace(game.humans[0], spawn=PoseSpawn(*STARTS[path.stem])),))
     return run_offline(build_setup(game), duration_s=7.0, **options)
 
 
@@ -68,7 +74,9 @@ def test_the_command_tells_both_steps_and_writes_what_was(
     game = tmp_path / 'game.yaml'
     game.write_text(yaml.safe_dump({
         'scenario': str(shared_scenarios / 'USA_US101-4_1_T-1.xml'),
-        'humans': [{'id': 'hv0', 'driver': 'idle'}], 'drivability': {'stop': True}}))
+        'humans': [{'id': 'hv0', 'driver': 'idle', 'spawn': dict(zip(
+            ('x', 'y', 'yaw', 'speed'), STARTS['USA_US101-4_1_T-1'], strict=True))}],
+        'drivability': {'stop': True}}))
     assert main(['offline', str(game), '--out', str(tmp_path)]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report['stop'] == {'vehicle': 'hv0', 'violation_n': 55, 'stop_n': 55}
