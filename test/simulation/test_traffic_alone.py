@@ -6,7 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.scenario.export import write_scenario
 from crgame_ros.scenario.game import Game, TrafficSpec
+from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 
@@ -20,8 +23,12 @@ def alone(scenario: Path, seed: int = 0) -> OfflineResult:
     return run_offline(build_setup(game), duration_s=DURATION_S)
 
 
-def test_traffic_runs_alone(shared_scenarios: Path) -> None:
-    """Agents drive over a real junction by themselves; the hash tells one run from another."""
+def test_traffic_runs_alone(shared_scenarios: Path, tmp_path: Path) -> None:
+    """
+    Agents drive over a real junction by themselves; the hash tells one run from another.
+
+    The run is written, with the scenario's own problem, for the schema asks for one.
+    """
     scenario = shared_scenarios / 'USA_Lanker-1_3_T-1.xml'
     result = alone(scenario)
     agents = result.setup.agent_columns
@@ -29,5 +36,10 @@ def test_traffic_runs_alone(shared_scenarios: Path) -> None:
     way = np.diff(result.object_poses[:, agents, :2], axis=0)
     # On green some go at least 20 of the 80 m that 6 s at 13 m/s are.
     assert np.nanmax(np.nansum(np.hypot(way[..., 0], way[..., 1]), axis=0)) > 20.0
+    exported = write_scenario(run_log_of(result), tmp_path)
+    written = load_scenario(tmp_path / f'{exported.benchmark_id}.xml')
+    there = np.isfinite(result.object_poses[:, agents, 0]).any(axis=0).sum()
+    assert len(written.scenario.dynamic_obstacles) >= there > 20
+    assert len(written.planning_problems) == 1
     assert alone(scenario).state_hash == result.state_hash
     assert alone(scenario, seed=1).state_hash != result.state_hash
