@@ -100,7 +100,7 @@ class LiveRun:
             self._settle()
         outcome = self._wait_for_companions(result)
         if outcome is not None:
-            self._reason = self._reason_for(outcome)
+            self._reason = self._reason or self._reason_for(outcome)
             self._state.tell('ended', self._reason)
             return outcome
         gc.collect()
