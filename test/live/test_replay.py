@@ -17,6 +17,7 @@ import pytest
 
 from crgame_ros.planner.joints import vehicle_to_joints
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.recording.run_log import read_cycles
 from crgame_ros.ros.messages import from_time
 from crgame_ros.scenario.game_file import load_game
@@ -110,7 +111,7 @@ def test_recorded_human_drives_live_against_another_planner(recorded: Path,
     Commands and intervals belong to their cycles: that these come late changes nothing, nor does a
     pause in between or a reset. The recording alone is enough: its own game is run.
     """
-    bag, again = recorded / 'bag', tmp_path / 'run' / 'bag_1'
+    bag, again = recorded / 'bag', run_folder(tmp_path / 'run', 1) / 'bag'
     with _busy_machine(), Launcher(
             ['--driver', f'replay:{bag}', '--planner', 'constant-velocity', '--duration', 60],
             tmp_path / 'run') as launcher, \
