@@ -100,5 +100,6 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
         gc.enable()
         if node is not None:
             vars(node).clear()
+        gc.collect()
     sys.stdout.flush()
     sys.exit(code)
