@@ -196,6 +196,8 @@ def test_agents_go_on_with_another_traffic_node(run: tuple[Launcher, Peer]) -> N
     launcher.kill('traffic_node')
     launcher.wait_for_restart('traffic_node')
     launcher.wait_for('going on at k = ')
+    # What came while it was away has to be heard before it is counted.
+    peer.listen_for(0.5)
     late = len(peer.statuses('sim_node: traffic'))
 
     def driving() -> bool:
