@@ -87,6 +87,8 @@ def listener(graph: Graph) -> Iterator[Peer]:
 def page(graph: Graph, listener: Peer, module_browser: Browser) -> LivePage:
     """Open the page, follow the AV, and hold the run before the van."""
     opened = LivePage(graph, module_browser)
+    # The run waits for somebody in the seat.
+    opened.claim('hv0')
     opened.run("crgame.world.follow('av0', true);"
                "crgame.perception.set('rays', true); crgame.perception.set('estimate', true);")
     go_until(opened, f'crgame.world.shown.t > {HELD_S}')
