@@ -1,0 +1,60 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Dense traffic on published maps, judged from outside (benchmarks/judge).
+
+The long form is benchmarks/traffic_judge.py: every map, three seeds, five minutes.
+"""
+
+from pathlib import Path
+
+from judge.roads import JudgedRoads
+from judge.verdict import judge, LATERAL_P99, Verdict
+import pytest
+from traffic_drive import drive
+
+from crgame_ros.traffic.spec import TrafficSpec
+
+SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
+# Lights with arrows, and without an intersection; narrow bends; vehicles that are recorded close
+# together; time steps of 0.04 and 0.2 s; lanelet id 0.
+MAPS = ('USA_Lanker-1_3_T-1', 'DEU_Flensburg-10_1_T-1', 'OSC_PedestrianCollision-1_1_T-1',
+        'more/DEU_Starnberg-1_1_T-1', 'more/GRL_Nuuk-6', 'more/DEU_Moabit-4_1_T-1',
+        'more/DEU_AAH1-2_76900_T-7049', 'more/C-DEU_MONAMerge-2_1_T-299', 'more/DEU_Gar-1_1_T-1')
+SECONDS = 25.0
+
+
+def verdict(name: str, spec: TrafficSpec, seconds: float, seed: int = 0,
+            recorded: bool = True) -> Verdict:
+    """Drive a published map; skip where it is absent."""
+    path = SHARED / f'{name}.xml'
+    if not path.exists():
+        pytest.skip(f'no {path.name} beside the project')
+    driven = drive(path, spec, seconds, seed, recorded)
+    return judge(driven.history, JudgedRoads(driven.scenario.scenario.lanelet_network),
+                 driven.recording)
+
+
+def never(found: Verdict) -> list[str]:
+    """List what must not happen: overlaps (not there at placing), red lines, off the road."""
+    return [f'{x.at_s:.1f} s {x.what}: {" and ".join(x.ids)} {x.note}' for x in found.events
+            if x.what in ('overlap', 'red', 'off road', 'unexplained')]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', MAPS)
+def test_nobody_collides_runs_a_light_or_leaves_the_road(name: str) -> None:
+    found = verdict(name, TrafficSpec(recorded='reactive', agents=40, flow=400.0), SECONDS)
+    # It is dense, and it drives.
+    assert found.mean_agents > 6.0 and found.mean_speed > 0.5
+    assert never(found) == []
+    # Comfortable is 2.0 m/s^2; the rest is for what drives a bend a little to the inside.
+    assert found.lateral_p99 <= LATERAL_P99
+
+
+@pytest.mark.slow
+def test_nobody_stands_for_good_where_a_ramp_ends() -> None:
+    # Whoever waits at the end of the ramp for somebody who stands behind it in the queue does so
+    # from 15 s on: for more than 90 s in this time.
+    found = verdict('ZAM-Ramp-1_1-T-1', TrafficSpec(agents=30, flow=900.0), 110.0, 1, False)
+    assert never(found) == []
