@@ -28,6 +28,16 @@ def _choose_cache(function: Callable[..., Any]) -> None:
     vars(numba.config)['CACHE_DIR'] = str(cache_root() / f'compiled-{digest(module)}')
 
 
+def inlined(function: Function) -> Function:
+    """
+    Compile a function into those that call it.
+
+    For small ones in inner loops: tables are passed by value, some hundred words of them.
+    """
+    _choose_cache(function)
+    return cast(Function, numba.njit(error_model='numpy', inline='always')(function))
+
+
 def compiled(function: Function) -> Function:
     """Compile a function of numbers and arrays; divisions by zero give inf and NaN, as numpy's."""
     _choose_cache(function)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.compiled import compiled, inlined
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,7 +47,7 @@ class LaneTable(NamedTuple):
     half_width: FloatArray
 
 
-@compiled
+@inlined
 def nearest_row(lanes: LaneTable, lane: int, s: float) -> int:
     """Give the row of the point nearest to arc length s."""
     row = int(np.rint(s / lanes.step[lane]))
@@ -67,7 +67,7 @@ def point_on(lanes: LaneTable, lane: int, s: float) -> tuple[float, float, float
             yaw + inside * (lanes.yaw[row + 1] - yaw))
 
 
-@compiled
+@inlined
 def segment(lanes: LaneTable, lane: int, s: float) -> tuple[int, float]:
     """Give the row at or before arc length s, and the share of the step beyond it."""
     share = s / lanes.step[lane]
@@ -75,7 +75,7 @@ def segment(lanes: LaneTable, lane: int, s: float) -> tuple[int, float]:
     return row + lanes.first[lane], share - row
 
 
-@compiled
+@inlined
 def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
                rounds: int) -> tuple[float, float, float]:
     """
@@ -100,7 +100,7 @@ def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
     return s, d, yaw
 
 
-@compiled
+@inlined
 def angle_between(a: float, b: float) -> float:
     """Give the angle from b to a in [-pi, pi] [rad]."""
     turn = a - b

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crgame_ros.traffic.agents import FREE
-from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.compiled import compiled, inlined
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row
 from crgame_ros.traffic.placement import Entries, rear_within
@@ -101,7 +101,7 @@ def ways(lanes: LaneTable, following: IntArray, lane: IntArray, s: FloatArray,
     return way
 
 
-@compiled
+@inlined
 def first_from(entries: Entries, lane: int, rear: float) -> int:
     """Give the first row of a lane whose entry begins at an arc length or behind it."""
     low, high = entries.begin[lane], entries.begin[lane + 1]
@@ -114,7 +114,7 @@ def first_from(entries: Entries, lane: int, rear: float) -> int:
     return int(low)
 
 
-@compiled
+@inlined
 def swing(curvature: float, front: float) -> float:
     """
     Give by how much more than half its width a vehicle takes on either side in a curve [m].

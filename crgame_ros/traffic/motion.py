@@ -5,7 +5,7 @@
 import math
 
 from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
-from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.compiled import compiled, inlined
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row, project_on, segment
 from crgame_ros.traffic.routes import Routes
@@ -91,7 +91,7 @@ def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     agents.yaw_rate[i] = 2.0 * half_turn / dt_s
 
 
-@compiled
+@inlined
 def _follow(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, x: float,
             y: float, way: float) -> None:
     """Find where an agent's centre is in its lane now, or in the next one."""
@@ -103,7 +103,7 @@ def _follow(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, x
             _go_over(lanes, agents, i, onward, x, y)
 
 
-@compiled
+@inlined
 def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
             reference: FloatArray, along: float) -> tuple[float, float]:
     """Find the point of the reference to steer for, at an arc length of the agent's lane."""
@@ -126,7 +126,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
             lanes.y[row] + beyond * (lanes.y[row + 1] - lanes.y[row]) + d * cos)
 
 
-@compiled
+@inlined
 def _onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
             s: float) -> tuple[int, float]:
     """Give the lane on a route, and the arc length there, for an arc length of an earlier one."""

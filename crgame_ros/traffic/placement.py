@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.compiled import compiled, inlined
 from crgame_ros.traffic.lane_cells import cell_of, CellTable
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import angle_between, LaneTable, project_on
@@ -132,7 +132,7 @@ def _empty(lanes: int, room: int) -> Entries:
         np.empty(room, np.int64), np.empty(room, np.int64))
 
 
-@compiled
+@inlined
 def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, found: Entries,
          n: int) -> int:
     """Write the entry of a body in a lane into row n, if it is in it; return how many."""

@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.compiled import compiled, inlined
 
 # Time by which the target point is ahead; Snider (2009) tunes it per course, 1 s is steady on
 # straights [s]; and the bounds of its distance [m].
@@ -28,7 +28,7 @@ def pursuit_distance(speed: float, curvature: float) -> float:
     return max(min(straight, math.sqrt(8.0 * CUT / max(abs(curvature), 1e-6))), SHORTEST)
 
 
-@compiled
+@inlined
 def steer_towards(ahead: float, aside: float, wheelbase: float, steering: float,
                   max_steering: float, max_rate: float, dt_s: float) -> float:
     """
@@ -52,7 +52,7 @@ def steer_towards(ahead: float, aside: float, wheelbase: float, steering: float,
     return min(max(changed, -max_steering), max_steering)
 
 
-@compiled
+@inlined
 def drive(speed: float, steering: float, acceleration: float, wheelbase: float,
           dt_s: float) -> tuple[float, float, float]:
     """
