@@ -129,7 +129,7 @@ _crgame_explain() {
         "$log"; then
         reason='the package index cannot be reached: check the network, proxy and pip settings'
     elif grep -q 'No space left' "$log"; then
-        reason="the disk is full: .venv takes 0.7 GB in $root"
+        reason="the disk is full: .venv takes 0.9 GB in $root"
     else
         reason=$(grep -E '^ERROR|^error|Error:' "$log" | tail -n 1)
     fi
@@ -157,7 +157,7 @@ _crgame_make() {
         return
     fi
     _crgame_say "making .venv with Python $version, ROS 2 Jazzy from $ros;" \
-        'this happens once and takes about a minute'
+        'this happens once and takes about two minutes'
     find "$venv" -mindepth 1 -maxdepth 1 ! -name .lock ! -name COLCON_IGNORE -exec rm -rf {} + ||
         return 1
     grep -vE "^(polygon3==|setuptools==|$skip)" "$root/requirements.txt" \

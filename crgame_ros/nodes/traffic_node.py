@@ -117,7 +117,11 @@ class TrafficNode(Node):
         if traffic is None or k != self._k:
             traffic = self._made(view, k, step)
         self._obey_limits(traffic, k)
+        taken_off = traffic.taken_off
         traffic.advance(view)
+        if traffic.taken_off > taken_off:
+            self.get_logger().warning(
+                f'k = {k}: an agent stood in a circle of waiting and was taken off the road')
         self._traffic, self._k = traffic, k + 1
         states, message = traffic.states, self._message
         message.positions[:] = states.poses.ravel()
@@ -126,7 +130,8 @@ class TrafficNode(Node):
         self._agents.publish(message.stamp(stamp_ns))
         if self._report.worked(time.perf_counter() - begin_s):
             count = int(np.isfinite(states.poses[:, 0]).sum())
-            self._report.publish(f'{count} agents', {'agents': count, 'k': k}, stamp_ns)
+            self._report.publish(f'{count} agents', {
+                'agents': count, 'k': k, 'taken_off': traffic.taken_off}, stamp_ns)
         self._ticks += 1
         if self._ticks % COLLECT_EVERY == 0:
             gc.collect()
