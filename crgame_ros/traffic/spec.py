@@ -16,7 +16,8 @@ MAX_AGENTS = 20_000
 BOUNDS: dict[str, tuple[float, float]] = {
     'agents': (0, MAX_AGENTS), 'flow': (0.0, 3600.0), 'capacity': (0, MAX_AGENTS),
     'speed_factor': (0.1, 3.0), 'speed_spread': (0.0, 0.5), 'truck_share': (0.0, 1.0),
-    'lateral_acceleration': (0.5, 6.0), 'politeness': (0.0, 1.0), 'seed': (0, 2**63 - 1)}
+    'lateral_acceleration': (0.5, 6.0), 'politeness': (0.0, 1.0), 'seed': (0, 2**63 - 1),
+    'reaction_time': (0.0, 2.0), 'imperfection': (0.0, 1.0), 'red_runners': (0.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,10 @@ class TrafficSpec:
     :param truck_share: share of trucks among agents that were not recorded.
     :param lateral_acceleration: comfortable in curves [m/s^2]
     :param politeness: weight of others' loss when changing lanes for speed (MOBIL).
+    :param reaction_time: after which a driver does what it has decided [s]
+    :param imperfection: random share of its greatest acceleration by which a driver fails to do so
+        (sigma of Krauss 1998).
+    :param red_runners: share of drivers who ignore traffic lights, for tests of AVs.
     """
 
     recorded: Literal['replayed', 'reactive'] = 'replayed'
@@ -57,6 +62,9 @@ class TrafficSpec:
     truck_share: float = 0.1
     lateral_acceleration: float = 2.0
     politeness: float = 0.2
+    reaction_time: float = 0.0
+    imperfection: float = 0.0
+    red_runners: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse numbers out of bounds."""

@@ -19,6 +19,7 @@ from crgame_ros.traffic.changing import LaneChanges, SHORTEST_CHANGE
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fade_relief, relief_at_change
 from crgame_ros.traffic.crossings import Crossings, queues
+from crgame_ros.traffic.drivers import Drivers
 from crgame_ros.traffic.driving_side import driving_side
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
@@ -56,7 +57,7 @@ from crgame_ros.traffic.spawning import (
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.swerving import Swerving
 from crgame_ros.traffic.waiting import break_circles, hopeless, INSISTS, LAST_RESORT, WAITS
-from crgame_ros.traffic.world import agent_bodies, Others, WorldView
+from crgame_ros.traffic.world import agent_bodies, Others, standing_entries, WorldView
 
 # Slots for arrivals, where the game says nothing: one for so much lane, and at most so many [m].
 LANE_PER_SLOT = 15.0
@@ -129,6 +130,8 @@ class Traffic:
             *(replace(x.description, role=Role.TRAFFIC) for x in adopted),
             *slot_descriptions(self._capacity(), spec.truck_share, self._random))
         self._agents = Agents(self.descriptions)
+        self._drivers = Drivers(spec, len(self.descriptions), self._model.max_acceleration,
+                                time_step_s, self._random)
         self._others = Others(others, time_step_s)
         if world is None:
             nowhere = np.full((len(others), 3), np.nan)
@@ -183,7 +186,7 @@ class Traffic:
             self._lines.show(others.signals)
             entries = place(self._graph.table, self._cells.table, Bodies.join(
                 [bodies, agent_bodies(agents)]))
-            standing = _standing(entries, self._others.standing(others))
+            standing = standing_entries(entries, self._others.standing(others))
             if spec.swerve:
                 self._swerving.update(entries.take(np.flatnonzero(standing)))
                 if self._swerving.version != self._slowed:
@@ -216,9 +219,9 @@ class Traffic:
                         len(slots), np.inf)
         halt = np.minimum(self._junctions(k, slots, way, entries, pairs, desired),
                           self._before_obstacles(slots, blocked))
-        acceleration = np.minimum(acceleration, halts_before(speed, halt, AT_LINE))
-        acceleration = np.minimum(acceleration, halts_before(
-            speed, self._lane_ends(way, agents.length[slots]), AT_END))
+        end = self._lane_ends(way, agents.length[slots])
+        for distance, braking in ((halt, AT_LINE), (end, AT_END)):
+            acceleration = np.minimum(acceleration, halts_before(speed, distance, braking))
         if self._spec.lane_changes:
             acceleration = np.minimum(acceleration, self._changes.decide(
                 k, agents, slots, desired, limit, acceleration, gap, blocked, standing, entries,
@@ -226,8 +229,9 @@ class Traffic:
         acceleration = smoothed(agents.acceleration[slots], acceleration, speed,
                                 self._time_step_s)
         acceleration = np.maximum(acceleration, -model.max_deceleration)
-        waits = (speed < STANDING) & (acceleration < 0.5)
-        agents.waits[slots] = np.where(waits, agents.waits[slots] + 1, 0)
+        acceleration = self._drivers.do(k, agents, slots, acceleration)
+        stands = (speed < STANDING) & (acceleration < 0.5)
+        agents.waits[slots] = np.where(stands, agents.waits[slots] + 1, 0)
         return acceleration
 
     def _corridors(self, slots: IntArray) -> Corridors:
@@ -284,6 +288,7 @@ class Traffic:
         agents, graph, conflicts = self._agents, self._graph, self._conflicts
         light = self._lines.halts(way, agents.speed[slots], agents.length[slots],
                                   agents.acceleration[slots])
+        light[self._drivers.run_lights[slots]] = np.inf
         if not len(conflicts):
             return light - LINE_GAP
         passage = passages(conflicts.table, self._lines.line, way, agents.table, slots)
@@ -336,11 +341,3 @@ class Traffic:
         for slot in slots[lost].tolist():
             agents.destination[slot] = routes.draw(
                 int(agents.lane[slot]), self._random, is_long(float(agents.length[slot])))
-
-
-def _standing(entries: Entries, standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which entries (E) belong to others that stand for good."""
-    result = np.zeros(len(entries.owner), dtype=bool)
-    other = entries.owner < 0
-    result[other] = standing[-1 - entries.owner[other]]
-    return result

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.traffic.agents import Agents, NOBODY
 from crgame_ros.traffic.lane_graph import FloatArray
-from crgame_ros.traffic.placement import Bodies, VEHICLE_TIME, WALKER_TIME
+from crgame_ros.traffic.placement import Bodies, Entries, VEHICLE_TIME, WALKER_TIME
 
 VEHICLES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'priorityVehicle', 'taxi',
                       'train', 'unknown'})
@@ -119,3 +119,12 @@ def agent_bodies(agents: Agents) -> Bodies:
     return Bodies(agents.centers()[slots], agents.velocities()[slots],
                   agents.acceleration[slots], agents.length[slots], agents.width[slots], slots,
                   np.zeros(len(slots)), claim)
+
+
+def standing_entries(entries: Entries,
+                     standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which entries (E) belong to others that stand for good."""
+    result = np.zeros(len(entries.owner), dtype=bool)
+    other = entries.owner < 0
+    result[other] = standing[-1 - entries.owner[other]]
+    return result
