@@ -3,7 +3,7 @@
 """The state of all agents, one array per quantity."""
 
 from collections.abc import Sequence
-from typing import Any, cast, Protocol
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ FREE = -2**62
 TOP_SPEED = {'truck': 80.0 / 3.6, 'bus': 100.0 / 3.6, 'bicycle': 5.5, 'pedestrian': 1.4}
 
 
-class AgentTable(Protocol):
+class AgentTable:
     """
     What is known of agents (A), each in a slot of its own.
 
@@ -101,7 +101,7 @@ def empty_table(count: int) -> AgentTable:
     return cast(AgentTable, table)
 
 
-class Agents:
+class Agents(AgentTable):
     """
     The agents (A): who may be on the road; each has a slot of its own.
 
@@ -124,45 +124,6 @@ class Agents:
         for name in ('source', 'grant', 'until', 'previous'):
             getattr(self, name)[:] = NOBODY
         self.leader[:] = self.blocker[:] = FREE
-
-    # Declared for readers and type checkers; made above.
-    length: FloatArray
-    width: FloatArray
-    wheelbase: FloatArray
-    rear_to_center: FloatArray
-    active: BoolArray
-    x: FloatArray
-    y: FloatArray
-    yaw: FloatArray
-    speed: FloatArray
-    acceleration: FloatArray
-    steering: FloatArray
-    yaw_rate: FloatArray
-    s: FloatArray
-    d: FloatArray
-    factor: FloatArray
-    top: FloatArray
-    from_s: FloatArray
-    span: FloatArray
-    curve: FloatArray
-    relief: FloatArray
-    aggressivity: FloatArray
-    lane: IntArray
-    destination: IntArray
-    calm_until: IntArray
-    content_until: IntArray
-    waits: IntArray
-    free_at: IntArray
-    source: IntArray
-    grant: IntArray
-    until: IntArray
-    grant_left: FloatArray
-    grant_hold: FloatArray
-    previous: IntArray
-    side: IntArray
-    leader: IntArray
-    blocker: IntArray
-    insists_until: IntArray
 
     def centers(self) -> FloatArray:
         """Give the poses (A, 3) of the centres [m, rad]."""

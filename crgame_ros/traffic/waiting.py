@@ -29,16 +29,30 @@ def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int, insis
     seen = np.full(len(agents.x), -1, np.int64)
     circles = 0
     for slot in slots:
-        current = slot
-        while current >= 0 and agents.waits[current] > waits and seen[current] < 0:
-            seen[current] = slot
-            current = agents.blocker[current]
-        if current >= 0 and agents.waits[current] > waits and seen[current] == slot:
+        current = _in_circle(agents, slot, seen, waits)
+        if current >= 0:
             circles += 1
             chosen = _least_insistent(k, agents, current)
             if chosen >= 0:
                 agents.insists_until[chosen] = k + insists
     return circles
+
+
+@compiled
+def _in_circle(agents: AgentTable, slot: int, seen: IntArray, ticks: int) -> int:
+    """
+    Follow who waits for whom from an agent on; give one of a circle that it leads to, or -1.
+
+    :param seen: (A) from which agent each was come to, -1 if from none; a circle is given once.
+    :param ticks: of standing that count as waiting.
+    """
+    current = slot
+    while current >= 0 and agents.waits[current] > ticks and seen[current] < 0:
+        seen[current] = slot
+        current = agents.blocker[current]
+    if current >= 0 and agents.waits[current] > ticks and seen[current] == slot:
+        return int(current)
+    return -1
 
 
 @compiled
@@ -63,11 +77,8 @@ def hopeless(agents: AgentTable, slots: IntArray, ticks: int) -> IntArray:
     count = 0
     seen = np.full(len(agents.x), -1, np.int64)
     for slot in slots:
-        current = slot
-        while current >= 0 and agents.waits[current] > ticks and seen[current] < 0:
-            seen[current] = slot
-            current = agents.blocker[current]
-        if current >= 0 and agents.waits[current] > ticks and seen[current] == slot:
+        current = _in_circle(agents, slot, seen, ticks)
+        if current >= 0:
             found[count] = current
             count += 1
     return found[:count]
