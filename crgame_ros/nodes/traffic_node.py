@@ -29,6 +29,7 @@ from crgame_ros.simulation.traffic_setup import make_traffic
 from crgame_ros.simulation.world_reader import WorldReader
 from crgame_ros.traffic.spec import parse_traffic, TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.warm_up import drive_everything
 from crgame_ros.traffic.world import WorldView
 
 PERIOD_S = 0.005
@@ -56,6 +57,7 @@ class TrafficNode(Node):
         self._ticks = 0
         self._fired: tuple[int, tuple[FiredEvent, ...]] = (-1, ())
         self._obeyed: set[str] = set()
+        self._warm = False
 
     def run(self, stop: StopFlag) -> None:
         """Follow the world until asked to stop."""
@@ -87,6 +89,10 @@ class TrafficNode(Node):
         if entry is None:
             return
         self._spec = parse_traffic(entry, '/scenario/game: traffic', Path())
+        if not self._warm:
+            # Compiled code is loaded when it is first run: a second that no tick has.
+            drive_everything()
+            self._warm = True
         self._limits = TrafficLimits(scenario.loaded, scenario.game.events)
         self._obeyed = set()
         self._network = RoadNetwork(scenario.loaded.scenario.lanelet_network)
