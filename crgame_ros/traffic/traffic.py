@@ -217,7 +217,7 @@ class Traffic:
         self._mind_left_lanes(slots, desired, entries, standing, acceleration)
         blocked = least(pairs.agent, np.where(standing[pairs.entry], pairs.gap, np.inf),
                         len(slots), np.inf)
-        halt = np.minimum(self._junctions(k, slots, way, entries, pairs, desired),
+        halt = np.minimum(self._junctions(k, slots, way, entries, pairs, desired, gap),
                           self._before_obstacles(slots, blocked))
         end = self._lane_ends(way, agents.length[slots])
         for distance, braking in ((halt, AT_LINE), (end, AT_END)):
@@ -283,7 +283,7 @@ class Traffic:
             agents, who, desired[row], pairs, entries, (low, high)))
 
     def _junctions(self, k: int, slots: IntArray, way: Ways, entries: Entries, pairs: Pairs,
-                   desired: FloatArray) -> FloatArray:
+                   desired: FloatArray, gap: FloatArray) -> FloatArray:
         """Give the distances (A) of the fronts from lights and junctions to halt at, or inf."""
         agents, graph, conflicts = self._agents, self._graph, self._conflicts
         light = self._lines.halts(way, agents.speed[slots], agents.length[slots],
@@ -299,8 +299,7 @@ class Traffic:
         rear_stop, queued = queues(agents.table, slots, pairs, entries)
         halt = self._crossings.halts(k, agents, way, passage, coming, Situation(
             slots, desired, rear_stop, light, sign, queued))
-        behind = (agents.blocker[slots] == FREE) & (nearest(
-            pairs, entries.owner, len(slots))[0] < QUEUE)
+        behind = (agents.blocker[slots] == FREE) & (gap < QUEUE)
         agents.blocker[slots[behind]] = agents.leader[slots[behind]]
         agents.blocker[slots[np.isfinite(light)]] = FREE
         if (agents.waits[slots] > self._waiting).any():
