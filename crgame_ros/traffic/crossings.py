@@ -45,19 +45,19 @@ class Crossings:
     def __init__(self, conflicts: Conflicts, rules: CrossingRules, time_step_s: float) -> None:
         self._conflicts = conflicts.table
         self._rules = rules
-        self._time_step_s = time_step_s
         self._ticks = np.array([max(1, round(seconds / time_step_s)) for seconds in (
             rules.patience, rules.zipper, 1.0, rules.mercy)])
 
     def halts(self, k: int, agents: Agents, way: Ways, passage: Passages, arrivals: Arrivals,
-              situation: Situation) -> FloatArray:
+              situation: Situation, elapsed_s: float) -> FloatArray:
         """
         Let agents (A) in, and tell where the others halt.
 
+        :param elapsed_s: time since the last call [s]
         :return: (A) distance of the front from where it has to halt, or inf [m]; for whom is
             noted in `Agents.blocker`.
         """
-        return _halts(self._conflicts, self._rules, self._ticks, self._time_step_s, k,
+        return _halts(self._conflicts, self._rules, self._ticks, elapsed_s, k,
                       agents.table, way, passage, arrivals, situation)
 
 

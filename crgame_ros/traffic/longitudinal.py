@@ -9,19 +9,17 @@ import numpy as np
 from crgame_ros.traffic.agents import Agents, AgentTable
 from crgame_ros.traffic.car_following import CarFollowing
 from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.encounters import moderate
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row
 from crgame_ros.traffic.leaders import least, Pairs, Ways
 from crgame_ros.traffic.placement import Entries
+from crgame_ros.traffic.routes import Routes
 
 # With which agents slow down for a curve or a lower limit ahead [m/s^2].
 COASTING = 1.2
 # They look at the speeds allowed so far ahead, and are at them then [s].
 LOOKS = (0.3, 0.6, 1.0)
-# Who drives across ahead has been waited for or will be gone; this much is no alarm yet [m/s^2].
-ALARM = 2.0
-# Time between the rear of who crosses leaving the own way and being there oneself [s].
-BEHIND_CROSSING = 0.4
 # With which agents halt at a line [m/s^2]; and before the end of a lane that they have not got
 # out of: at full speed as far as can be, for gaps are found there.
 AT_LINE, AT_END = 1.6, 3.0
@@ -105,31 +103,6 @@ def halts_before(speed: FloatArray, distance: FloatArray, braking: float) -> Flo
 
 
 @compiled
-def _crossing(entries: Entries, pairs: Pairs, slots: IntArray, agents: AgentTable,
-              low: FloatArray, high: FloatArray, wanted: FloatArray) -> None:
-    """
-    Replace what is wanted behind those who drive across.
-
-    They have been waited for or will be gone; only the last moment to brake counts, and nothing
-    if they leave the own way before.
-    """
-    for p in range(len(pairs.agent)):
-        n, i = pairs.entry[p], pairs.agent[p]
-        if not entries.crosses[n] or entries.owner[n] < 0:
-            continue
-        speed = agents.speed[slots[i]]
-        aside = entries.aside[n]
-        clear = math.inf
-        if aside > 0.5:
-            clear = (high[i] + 0.3 - entries.low[n]) / aside
-        elif aside < -0.5:
-            clear = (low[i] - 0.3 - entries.high[n]) / aside
-        needed = speed * speed / (2.0 * max(pairs.gap[p] - 0.5, 0.05))
-        late = pairs.gap[p] < speed * (clear + BEHIND_CROSSING)
-        wanted[p] = -needed if late and needed > ALARM else math.inf
-
-
-@compiled
 def smoothed(previous: FloatArray, wanted: FloatArray, speed: FloatArray,
              dt_s: float) -> FloatArray:
     """Limit how fast accelerations (A) change, but for emergencies [m/s^2]."""
@@ -152,11 +125,13 @@ class Longitudinal:
     Speeds and accelerations of all agents.
 
     :param graph: the lanes.
+    :param routes: where agents go.
     :param model: of car following.
     """
 
-    def __init__(self, graph: LaneGraph, model: CarFollowing) -> None:
+    def __init__(self, graph: LaneGraph, routes: Routes, model: CarFollowing) -> None:
         self._graph = graph
+        self._following = routes.next
         self._model = model
         self._envelope = _envelope(graph.table, graph.curve_speed)
 
@@ -194,6 +169,9 @@ class Longitudinal:
         who, entry = pairs.agent, pairs.entry
         wanted = self._model.acceleration(
             speed[who], desired[who], pairs.gap, entries.speed[entry],
-            agents.relief[slots[who]], entries.acceleration[entry])
-        _crossing(entries, pairs, slots, agents.table, *corridor, wanted)
+            agents.relief[slots[who]],
+            # Who changes lanes brakes for what is in the lane that it leaves.
+            np.where(entries.claims[entry], 0.0, entries.acceleration[entry]))
+        moderate(self._graph.table, self._following, agents.table, slots, entries, pairs,
+                 *corridor, wanted)
         return np.asarray(np.minimum(free, least(who, wanted, len(slots), np.inf)))

@@ -55,7 +55,7 @@ def _move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntA
         speed, bend = agents.speed[slot], 0.0
         rear = agents.s[slot] - agents.rear_to_center[slot]
         for n in range(3):
-            lane, there = _onward(lanes, following, agents.destination[slot], agents.lane[slot],
+            lane, there = onward(lanes, following, agents.destination[slot], agents.lane[slot],
                                   rear + 0.5 * n * pursuit_distance(speed, 0.0))
             bend = max(bend, abs(lanes.curvature[nearest_row(lanes, lane, there)]))
         distance = pursuit_distance(speed, bend)
@@ -109,7 +109,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     """Find the point of the reference to steer for, at an arc length of the agent's lane."""
     lane, there = agents.lane[i], along
     if there > lanes.length[lane]:
-        lane, there = _onward(lanes, following, agents.destination[i], lane, along)
+        lane, there = onward(lanes, following, agents.destination[i], lane, along)
     row, beyond = segment(lanes, lane, there)
     share = min(max(beyond, 0.0), 1.0)
     d = reference[row] + share * (reference[row + 1] - reference[row])
@@ -127,7 +127,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
 
 
 @inlined
-def _onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
+def onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
             s: float) -> tuple[int, float]:
     """Give the lane on a route, and the arc length there, for an arc length of an earlier one."""
     for _ in range(LANES_AHEAD):

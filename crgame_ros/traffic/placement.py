@@ -13,10 +13,9 @@ from crgame_ros.traffic.lane_cells import cell_of, CellTable
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import angle_between, LaneTable, project_on
 
-# How far ahead a body's way to the side counts as taken, by what it is [s].
-WALKER_TIME = 2.0
-VEHICLE_TIME = 0.7
-MAX_SHIFT = 3.0
+# How far ahead a body's way to the side counts as taken, by what it is [s], and at most [m].
+WALKER_TIME, WALKER_SHIFT = 4.0, 6.0
+VEHICLE_TIME, VEHICLE_SHIFT = 0.7, 3.0
 # A body that points elsewhere than its lane by more than this crosses it [rad].
 CROSSING = 0.7
 # Bodies beside a lane by less than this count as in it: who drives there may be wider [m].
@@ -148,7 +147,8 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, foun
     cos, sin = math.cos(yaw), math.sin(yaw)
     u, v = bodies.velocities[i, 0], bodies.velocities[i, 1]
     aside = v * cos - u * sin
-    drift = min(max(aside * bodies.time[i], -MAX_SHIFT), MAX_SHIFT)
+    most = WALKER_SHIFT if bodies.time[i] > VEHICLE_TIME else VEHICLE_SHIFT
+    drift = min(max(aside * bodies.time[i], -most), most)
     ahead_x, ahead_y = math.cos(heading), math.sin(heading)
     rear = low = math.inf
     front = high = -math.inf

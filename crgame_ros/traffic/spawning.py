@@ -13,6 +13,7 @@ from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.traffic.adoption import Adopted, fits
 from crgame_ros.traffic.agents import Agents, REAR_TO_CENTER
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
+from crgame_ros.traffic.encounters import is_in_the_way
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
@@ -37,6 +38,8 @@ TRIES = 40
 LONG, SPARE = 6.5, 0.15
 # Rounds in which those who are placed together get used to each other's speeds.
 CALMING = 3
+# Recorded vehicles take bends so much faster than agents do, by the square root of accelerations.
+TOO_FAST = 1.2
 # What a newcomer may have to stop for is looked for as far as this [m].
 FARTHEST = 150.0
 
@@ -167,8 +170,13 @@ class Spawner:
             speed[pairs.agent[row]] = entries.speed[pairs.entry[row]]
         return gap, speed
 
-    def adopt(self, k: int, agents: Agents, others: Bodies) -> None:
-        """Let recorded obstacles appear where they are recorded at k, if the place is free."""
+    def adopt(self, k: int, agents: Agents, others: Bodies) -> list[int]:
+        """
+        Let recorded obstacles appear where they are recorded at k, if the place is free.
+
+        :return: the slots of those who did.
+        """
+        appeared = []
         for slot in list(self._waiting):
             found = self._adopted[slot]
             row = k - found.first_k
@@ -178,6 +186,22 @@ class Spawner:
                 self._waiting.remove(slot)
             elif self._appear(k, agents, slot, found, row, others):
                 self._waiting.remove(slot)
+                appeared.append(slot)
+        return appeared
+
+    def slow_down(self, agents: Agents, slots: IntArray, desired: FloatArray, halt: FloatArray,
+                  newcomers: list[int]) -> None:
+        """
+        Let newcomers be no faster than they can halt and take the bends ahead.
+
+        A recording goes on as it did; here others may have the right of way, and go elsewhere.
+
+        :param desired: speeds (A) allowed where agents are [m/s]
+        :param halt: distances (A) at which they have to halt [m]
+        """
+        safe = np.minimum(np.sqrt(2.0 * FIRM * np.maximum(halt, 0.0)), TOO_FAST * desired)
+        row = np.isin(slots, newcomers)
+        agents.speed[slots[row]] = np.minimum(agents.speed[slots[row]], safe[row])
 
     def resume(self, k: int, agents: Agents, poses: FloatArray, velocities: FloatArray) -> None:
         """Put all agents (A) where they are at k, and take the others off the road."""
@@ -219,7 +243,10 @@ class Spawner:
             towards = self._routes.towards(lane, goal)
         agents.destination[slot] = (self._routes.draw(lane, self._random, long)
                                     if towards is None else towards)
-        return True
+        if is_in_the_way(graph.table, self._routes.next, agents.table,
+                         np.flatnonzero(agents.active), slot):
+            agents.active[slot] = False
+        return bool(agents.active[slot])
 
     def _lane_at(self, pose: FloatArray) -> int | None:
         found = int(self._graph.network.lanelets_at(pose[None, :])[0])

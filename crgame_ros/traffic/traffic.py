@@ -110,7 +110,7 @@ class Traffic:
             tight_lanes(self._graph), side.keeps_left)
         self._lines = HaltingLines(self._graph, scenario.lanelet_network, movements)
         self._model: CarFollowing = CAR_FOLLOWING.create(spec.model, spec.options, 'traffic')
-        self._longitudinal = Longitudinal(self._graph, self._model)
+        self._longitudinal = Longitudinal(self._graph, self._routes, self._model)
         self._changes = LaneChanges(self._graph, self._routes, self._conflicts, self._model,
                                     spec.politeness, spec.cooperative, time_step_s)
         self._crossings = Crossings(self._conflicts, CrossingRules(), time_step_s)
@@ -138,7 +138,7 @@ class Traffic:
             world = WorldView(k0, nowhere, nowhere)
         bodies = self._others.bodies(world)
         self._lines.show(world.signals)
-        self._spawner.adopt(k0, self._agents, bodies)
+        self._adopt(k0, bodies)
         self._spawner.place_at_random(self._agents, spec.agents, bodies)
         self._spawner.calm(self._agents, bodies)
 
@@ -197,28 +197,25 @@ class Traffic:
                               self._substeps)
             self._changes.finish(others.k, agents)
             self._leave(others.k, slots)
-        self._spawner.adopt(others.k + 1, agents, bodies)
+        self._adopt(others.k + 1, bodies)
         self._spawner.arrive(others.k + 1, agents, bodies)
 
     def _decide(self, k: int, slots: IntArray, entries: Entries,
                 standing: NDArray[np.bool_]) -> FloatArray:
         """Give the accelerations (A) of the agents; begin lane changes, enter junctions."""
         agents, model, long = self._agents, self._model, self._longitudinal
-        lanes, following = self._graph.table, self._routes.next
         speed = agents.speed[slots]
-        way = ways(lanes, following, agents.lane[slots], agents.s[slots],
-                   agents.destination[slots], look_distance(speed))
+        way, corridor, pairs = self._look_ahead(slots, entries)
         desired, limit = long.speeds(way, agents, slots)
-        corridor = self._corridors(slots)
-        pairs = ahead(lanes, entries, way, corridor, self._swerving.reference)
         gap = self._follow(slots, pairs, entries)
         acceleration = np.minimum(limit, long.behind(
             agents, slots, desired, pairs, entries, (corridor.low, corridor.high)))
         self._mind_left_lanes(slots, desired, entries, standing, acceleration)
         blocked = least(pairs.agent, np.where(standing[pairs.entry], pairs.gap, np.inf),
                         len(slots), np.inf)
-        halt = np.minimum(self._junctions(k, slots, way, entries, pairs, desired, gap),
-                          self._before_obstacles(slots, blocked))
+        halt = np.minimum(self._junctions(
+            k, slots, way, entries, pairs, desired, gap, self._time_step_s),
+            self._before_obstacles(slots, blocked))
         end = self._lane_ends(way, agents.length[slots])
         for distance, braking in ((halt, AT_LINE), (end, AT_END)):
             acceleration = np.minimum(acceleration, halts_before(speed, distance, braking))
@@ -233,6 +230,30 @@ class Traffic:
         stands = (speed < STANDING) & (acceleration < 0.5)
         agents.waits[slots] = np.where(stands, agents.waits[slots] + 1, 0)
         return acceleration
+
+    def _look_ahead(self, slots: IntArray,
+                    entries: Entries) -> tuple[Ways, Corridors, Pairs]:
+        """Give the ways of agents (A), what they take of them, and who is in the way."""
+        agents, lanes = self._agents, self._graph.table
+        way = ways(lanes, self._routes.next, agents.lane[slots], agents.s[slots],
+                   agents.destination[slots], look_distance(agents.speed[slots]))
+        corridor = self._corridors(slots)
+        return way, corridor, ahead(lanes, entries, way, corridor, self._swerving.reference)
+
+    def _adopt(self, k: int, bodies: Bodies) -> None:
+        """Let recorded obstacles appear, no faster than they can halt where they must."""
+        agents = self._agents
+        newcomers = self._spawner.adopt(k, agents, bodies)
+        if not newcomers:
+            return
+        slots = np.flatnonzero(agents.active)
+        entries = place(self._graph.table, self._cells.table, Bodies.join(
+            [bodies, agent_bodies(agents)]))
+        way, _, pairs = self._look_ahead(slots, entries)
+        desired, _ = self._longitudinal.speeds(way, agents, slots)
+        gap, _ = nearest(pairs, entries.owner, len(slots))
+        halt = self._junctions(k, slots, way, entries, pairs, desired, gap, 0.0)
+        self._spawner.slow_down(agents, slots, desired, halt, newcomers)
 
     def _corridors(self, slots: IntArray) -> Corridors:
         """Give what agents take of their lanes, from the references that they follow."""
@@ -283,7 +304,7 @@ class Traffic:
             agents, who, desired[row], pairs, entries, (low, high)))
 
     def _junctions(self, k: int, slots: IntArray, way: Ways, entries: Entries, pairs: Pairs,
-                   desired: FloatArray, gap: FloatArray) -> FloatArray:
+                   desired: FloatArray, gap: FloatArray, elapsed_s: float) -> FloatArray:
         """Give the distances (A) of the fronts from lights and junctions to halt at, or inf."""
         agents, graph, conflicts = self._agents, self._graph, self._conflicts
         light = self._lines.halts(way, agents.speed[slots], agents.length[slots],
@@ -298,7 +319,7 @@ class Traffic:
                           self._others.drives, self._others.widths)
         rear_stop, queued = queues(agents.table, slots, pairs, entries)
         halt = self._crossings.halts(k, agents, way, passage, coming, Situation(
-            slots, desired, rear_stop, light, sign, queued))
+            slots, desired, rear_stop, light, sign, queued), elapsed_s)
         behind = (agents.blocker[slots] == FREE) & (gap < QUEUE)
         agents.blocker[slots[behind]] = agents.leader[slots[behind]]
         agents.blocker[slots[np.isfinite(light)]] = FREE

@@ -1,0 +1,200 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who is really in the way of whom, and how hard one has to brake for that."""
+
+import math
+
+from crgame_ros.traffic.agents import AgentTable
+from crgame_ros.traffic.compiled import compiled, inlined
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.lane_table import angle_between, LaneTable, nearest_row, point_on, project_on
+from crgame_ros.traffic.leaders import Pairs, swing
+from crgame_ros.traffic.motion import onward
+from crgame_ros.traffic.placement import Entries
+
+# Harder than this is braked only where it takes that to halt behind somebody [m/s^2].
+FIRMEST = 3.9
+# Whoever is ahead is expected to brake with this, if it doesn't brake harder already [m/s^2].
+THEIRS = 4.0
+# Room left when that happens [m].
+LAST_GAP = 0.3
+# Who drives across has been waited for or will be gone; this much is no alarm yet [m/s^2].
+ALARM = 2.0
+# Brakings that are tried, from the gentlest on [m/s^2]; up to `SMOOTH` they take `ONSET` [s].
+TRIED = (2.0, 3.0, 3.9, 6.0, 8.0)
+SMOOTH, ONSET = 3.0, 0.3
+# Hardest braking does no harm when they touch so soon [s].
+LAST_MOMENT = 1.0
+# With more than this nobody brakes for somebody who appears beside its way [m/s^2].
+GENTLY = 2.0
+# So far ahead both are followed, and at such times [s].
+FORESEEN, STEP = 3.0, 0.15
+# Who comes from the side leaves offset and heading that it has now behind in so much way [m].
+STRAIGHTENS = 5.0
+# Room that two keep, each around itself: beside, and before and behind [m].
+BESIDE, BEFORE = 0.1, 0.25
+# Slower along the road than this it is crossed, not driven along [m/s].
+ACROSS = 2.0
+# Between passing and the arrival of who walks into the way [s], and beside it [m].
+SPARE_TIME, SPARE_ROOM = 0.4, 0.4
+
+
+@compiled
+def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+             entries: Entries, pairs: Pairs, low: FloatArray, high: FloatArray,
+             wanted: FloatArray) -> None:
+    """
+    Replace accelerations (P) that a model of car following wants by what the encounter demands.
+
+    Behind who drives the same way nothing above `FIRMEST` unless that is what it takes to halt
+    when the other does. For another agent that drives across only the last moment to brake
+    counts, and nothing if both pass each other as they go; for who walks into the way nothing
+    if one has passed before.
+
+    :param slots: (A) of the agents that `pairs` are of.
+    :param low, high: (A) right and left edge of what each agent takes [m]
+    :param wanted: (P) [m/s^2]
+    """
+    for p in range(len(pairs.agent)):
+        i, n = pairs.agent[p], pairs.entry[p]
+        slot = slots[i]
+        if entries.crosses[n] and entries.owner[n] >= 0:
+            needed = agents.speed[slot]**2 / (2.0 * max(pairs.gap[p] - 0.5, 0.05))
+            wanted[p] = -_braking(lanes, following, agents, slot, entries.owner[n]) \
+                if needed > ALARM else math.inf
+        elif entries.owner[n] < 0 and abs(entries.speed[n]) < ACROSS and _passes_before(
+                agents, slot, entries, n, pairs.gap[p], low[i], high[i]):
+            wanted[p] = math.inf
+        elif entries.speed[n] > -0.5:
+            theirs = max(entries.speed[n], 0.0)
+            room = pairs.gap[p] - LAST_GAP + theirs**2 / (
+                2.0 * max(THEIRS, -entries.acceleration[n]))
+            needed = agents.speed[slot]**2 / (2.0 * max(room, 0.01)) if pairs.gap[p] > 0.0 \
+                else 0.0
+            wanted[p] = max(wanted[p], -max(needed, FIRMEST))
+
+
+@compiled
+def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+                  slot: int) -> bool:
+    """
+    Tell whether somebody cannot help touching an agent that has just appeared on its own way.
+
+    :param slots: (A) of the agents on the road.
+    """
+    reach = FORESEEN * agents.speed[slot] + agents.length[slot]
+    for other in slots:
+        away = math.hypot(agents.x[other] - agents.x[slot], agents.y[other] - agents.y[slot])
+        if other != slot and away < reach + FORESEEN * agents.speed[other] + (
+                agents.length[other]) and agents.lane[other] != agents.lane[slot] and _touch(
+                lanes, following, agents, slot, other, 0.0) < math.inf and _touch(
+                lanes, following, agents, other, slot, GENTLY) < math.inf:
+            return True
+    return False
+
+
+@compiled
+def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap: float,
+                   low: float, high: float) -> bool:
+    """Tell whether an agent has passed when somebody beside its way gets there."""
+    aside, drift = entries.aside[n], entries.drift[n]
+    if aside > 0.1:
+        rest = low - SPARE_ROOM - (entries.high[n] - max(drift, 0.0))
+    elif aside < -0.1:
+        rest = entries.low[n] - min(drift, 0.0) - high - SPARE_ROOM
+    else:
+        return False
+    way = gap + agents.length[slot] + entries.front[n] - entries.rear[n]
+    return bool(rest > 0.0 and way < max(rest / abs(aside) - SPARE_TIME, 0.0)
+                * agents.speed[slot])
+
+
+@compiled
+def _braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+             other: int) -> float:
+    """Give the gentlest braking with which two agents miss each other, -inf if none is needed."""
+    soon = _touch(lanes, following, agents, slot, other, 0.0)
+    if soon == math.inf:
+        return -math.inf
+    for braking in TRIED:
+        if _touch(lanes, following, agents, slot, other, braking) == math.inf:
+            return braking
+    # Nothing that this one does helps now; the other may do something.
+    return TRIED[-1] if soon < LAST_MOMENT else FIRMEST
+
+
+@compiled
+def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, other: int,
+           braking: float) -> float:
+    """Give when two agents touch if one brakes and the other goes on as it does, or inf [s]."""
+    mine, theirs = _start(lanes, agents, slot), _start(lanes, agents, other)
+    onset = ONSET if braking <= SMOOTH else 0.0
+    slows = max(-agents.acceleration[other], 0.0)
+    for step in range(1, int(FORESEEN / STEP) + 1):
+        t = step * STEP
+        speed = agents.speed[slot]
+        way = speed * min(t, onset) + _rolled(speed, braking, max(t - onset, 0.0))
+        x, y, yaw = _pose_after(lanes, following, agents, slot, mine, way)
+        other_x, other_y, other_yaw = _pose_after(
+            lanes, following, agents, other, theirs, _rolled(agents.speed[other], slows, t))
+        if _overlap(other_x - x, other_y - y, yaw, other_yaw,
+                    0.5 * agents.length[slot] + BEFORE, 0.5 * agents.width[slot] + BESIDE,
+                    0.5 * agents.length[other] + BEFORE, 0.5 * agents.width[other] + BESIDE):
+            return t
+    return math.inf
+
+
+@inlined
+def _rolled(speed: float, braking: float, time: float) -> float:
+    """Give the way within a time when braking [m]."""
+    if braking > 0.0:
+        time = min(time, speed / braking)
+    return speed * time - 0.5 * braking * time * time
+
+
+@inlined
+def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, float, float]:
+    """Give where the rear axle is in the lane, besides where it steers for, and how it turns."""
+    lane = agents.lane[slot]
+    s, d, yaw = project_on(lanes, lane, agents.x[slot], agents.y[slot],
+                           agents.s[slot] - agents.rear_to_center[slot], 2)
+    return s, d - _shift(lanes, agents, slot, lane, s), angle_between(agents.yaw[slot], yaw)
+
+
+@inlined
+def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float) -> float:
+    """Give how far to the left of a bend's middle the rear axle runs [m]."""
+    bend = lanes.curvature[nearest_row(lanes, lane, s)]
+    shift = swing(bend, agents.rear_to_center[slot] + 0.5 * agents.length[slot])
+    return shift if bend > 0.0 else -shift
+
+
+@compiled
+def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+                start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
+    """Foresee x, y and heading of an agent's centre after some way along its route [m, rad]."""
+    lane, s = onward(lanes, following, agents.destination[slot], agents.lane[slot],
+                     start[0] + way)
+    x, y, yaw = point_on(lanes, lane, s)
+    left = math.exp(-way / STRAIGHTENS)
+    d = _shift(lanes, agents, slot, lane, s) + start[1] * left
+    heading = yaw + start[2] * left
+    middle = agents.rear_to_center[slot]
+    return (x - d * math.sin(yaw) + middle * math.cos(heading),
+            y + d * math.cos(yaw) + middle * math.sin(heading), heading)
+
+
+@compiled
+def _overlap(east: float, north: float, yaw: float, other_yaw: float, length: float,
+             width: float, other_length: float, other_width: float) -> bool:
+    """Tell whether two rectangles, given by half their sizes, overlap: no axis parts them."""
+    cos, sin = abs(math.cos(other_yaw - yaw)), abs(math.sin(other_yaw - yaw))
+    for turn, along, aside, their_along, their_aside in (
+            (yaw, length, width, other_length, other_width),
+            (other_yaw, other_length, other_width, length, width)):
+        ahead = abs(east * math.cos(turn) + north * math.sin(turn))
+        left = abs(north * math.cos(turn) - east * math.sin(turn))
+        if ahead > along + their_along * cos + their_aside * sin or (
+                left > aside + their_along * sin + their_aside * cos):
+            return False
+    return True
