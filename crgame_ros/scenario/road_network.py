@@ -208,6 +208,11 @@ class RoadNetwork:
         road = shapely.union_all(shapely.buffer(self._polygons[near], 0.01, join_style='mitre'))
         return bool(shapely.covers(road, footprint))
 
+    def area(self, room: float = 0.0) -> shapely.Geometry:
+        """Give all lanelets as one area, and some room around it [m]."""
+        road = shapely.union_all(shapely.buffer(self._polygons, 0.01, join_style='mitre'))
+        return shapely.buffer(road, room)
+
     def _lanelet(self, lanelet_id: int) -> Lanelet:
         index = self._index.get(lanelet_id)
         if index is None:

@@ -4,11 +4,13 @@
 
 import math
 
+import numpy as np
+
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled, inlined
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import angle_between, LaneTable, nearest_row, point_on, project_on
-from crgame_ros.traffic.leaders import Pairs, swing
+from crgame_ros.traffic.leaders import first_from, LONGEST, Pairs, swing, Ways
 from crgame_ros.traffic.motion import onward
 from crgame_ros.traffic.placement import Entries
 
@@ -31,8 +33,13 @@ GENTLY = 2.0
 FORESEEN, STEP = 3.0, 0.15
 # Who comes from the side leaves offset and heading that it has now behind in so much way [m].
 STRAIGHTENS = 5.0
-# Room that two keep, each around itself: beside, and before and behind [m].
-BESIDE, BEFORE = 0.1, 0.25
+# Room that two keep, each around itself: beside, and so many times that before and behind [m];
+# while they brush past each other in lanes of their own it is little.
+BESIDE, BEFORE, BRUSH_BESIDE = 0.1, 2.5, 0.03
+# So far ahead of who brushes past is looked [s], and who stands asks whether it can creep [m/s].
+BRUSH_TIME, CREEP = 1.2, 0.5
+# And in so many lanes of the way.
+BRUSH_LANES = 3
 # Slower along the road than this it is crossed, not driven along [m/s].
 ACROSS = 2.0
 # Between passing and the arrival of who walks into the way [s], and beside it [m].
@@ -75,6 +82,58 @@ def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: I
 
 
 @compiled
+def brush(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+          entries: Entries, way: Ways) -> FloatArray:
+    """
+    Give accelerations (A) with which agents don't touch who pokes into their lanes from another.
+
+    Where ways part, join or turn beside each other somebody may be in none's way and yet touch.
+    Of two the one that is behind brakes; for who stands everybody does.
+    """
+    result = np.full(len(slots), math.inf)
+    for i, slot in enumerate(slots):
+        reach = 0.5 * agents.length[slot] + 3.0 + BRUSH_TIME * agents.speed[slot]
+        if agents.source[slot] >= 0:
+            continue
+        for step in range(min(way.depth[i], BRUSH_LANES)):
+            lane, offset = way.lane[i, step], way.offset[i, step]
+            n = first_from(entries, lane, -offset - LONGEST)
+            while n < entries.begin[lane + 1] and entries.rear[n] + offset < reach:
+                other = entries.owner[n]
+                if other >= 0 and other != slot and agents.lane[other] != lane and (
+                        entries.front[n] + offset > -agents.length[slot]
+                        and agents.source[other] < 0):
+                    result[i] = min(result[i], _brushed(
+                        lanes, following, agents, slot, other))
+                n += 1
+    return result
+
+
+@compiled
+def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+             other: int) -> float:
+    """Give the acceleration with which an agent does not touch another, inf for any [m/s^2]."""
+    east, north = agents.x[other] - agents.x[slot], agents.y[other] - agents.y[slot]
+    mine = east * math.cos(agents.yaw[slot]) + north * math.sin(agents.yaw[slot])
+    theirs = -east * math.cos(agents.yaw[other]) - north * math.sin(agents.yaw[other])
+    speed = max(agents.speed[slot], CREEP)
+    goes_first = mine < theirs or (mine == theirs and slot < other)
+    if (goes_first and agents.speed[other] > CREEP) or mine < 0.0 or _touch(
+            lanes, following, agents, slot, speed, other, 0.0, BRUSH_TIME,
+            BRUSH_BESIDE) == math.inf or _touch(
+            lanes, following, agents, slot, speed, other, 0.0, 0.0, BRUSH_BESIDE) < math.inf:
+        return math.inf
+    agents.blocker[slot] = other
+    if agents.speed[slot] < CREEP:
+        return -1.0
+    for braking in TRIED:
+        if _touch(lanes, following, agents, slot, speed, other, braking, BRUSH_TIME,
+                  BRUSH_BESIDE) == math.inf:
+            return -braking
+    return -TRIED[-1]
+
+
+@compiled
 def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
                   slot: int) -> bool:
     """
@@ -87,8 +146,10 @@ def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slo
         away = math.hypot(agents.x[other] - agents.x[slot], agents.y[other] - agents.y[slot])
         if other != slot and away < reach + FORESEEN * agents.speed[other] + (
                 agents.length[other]) and agents.lane[other] != agents.lane[slot] and _touch(
-                lanes, following, agents, slot, other, 0.0) < math.inf and _touch(
-                lanes, following, agents, other, slot, GENTLY) < math.inf:
+                lanes, following, agents, slot, agents.speed[slot], other, 0.0, FORESEEN,
+                BESIDE) < math.inf and _touch(
+                lanes, following, agents, other, agents.speed[other], slot, GENTLY, FORESEEN,
+                BESIDE) < math.inf:
             return True
     return False
 
@@ -113,33 +174,41 @@ def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap:
 def _braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
              other: int) -> float:
     """Give the gentlest braking with which two agents miss each other, -inf if none is needed."""
-    soon = _touch(lanes, following, agents, slot, other, 0.0)
+    speed = agents.speed[slot]
+    soon = _touch(lanes, following, agents, slot, speed, other, 0.0, FORESEEN, BESIDE)
     if soon == math.inf:
         return -math.inf
     for braking in TRIED:
-        if _touch(lanes, following, agents, slot, other, braking) == math.inf:
+        if _touch(lanes, following, agents, slot, speed, other, braking, FORESEEN,
+                  BESIDE) == math.inf:
             return braking
     # Nothing that this one does helps now; the other may do something.
     return TRIED[-1] if soon < LAST_MOMENT else FIRMEST
 
 
 @compiled
-def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, other: int,
-           braking: float) -> float:
-    """Give when two agents touch if one brakes and the other goes on as it does, or inf [s]."""
+def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, speed: float,
+           other: int, braking: float, foreseen: float, beside: float) -> float:
+    """
+    Give when two agents touch if one brakes and the other goes on as it does, or inf [s].
+
+    :param speed: of the one [m/s]
+    :param foreseen: how far ahead it is looked [s]; 0 tells whether they touch now.
+    :param beside: room around each [m]
+    """
     mine, theirs = _start(lanes, agents, slot), _start(lanes, agents, other)
     onset = ONSET if braking <= SMOOTH else 0.0
     slows = max(-agents.acceleration[other], 0.0)
-    for step in range(1, int(FORESEEN / STEP) + 1):
+    before = BEFORE * beside
+    for step in range(min(1, int(foreseen / STEP)), int(foreseen / STEP) + 1):
         t = step * STEP
-        speed = agents.speed[slot]
         way = speed * min(t, onset) + _rolled(speed, braking, max(t - onset, 0.0))
         x, y, yaw = _pose_after(lanes, following, agents, slot, mine, way)
         other_x, other_y, other_yaw = _pose_after(
             lanes, following, agents, other, theirs, _rolled(agents.speed[other], slows, t))
         if _overlap(other_x - x, other_y - y, yaw, other_yaw,
-                    0.5 * agents.length[slot] + BEFORE, 0.5 * agents.width[slot] + BESIDE,
-                    0.5 * agents.length[other] + BEFORE, 0.5 * agents.width[other] + BESIDE):
+                    0.5 * agents.length[slot] + before, 0.5 * agents.width[slot] + beside,
+                    0.5 * agents.length[other] + before, 0.5 * agents.width[other] + beside):
             return t
     return math.inf
 

@@ -22,10 +22,11 @@ ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
 # Cycles of several lights are compared over so many time steps.
 LONGEST_CYCLE = 20_000
 # Hardest braking for a light that is red, and for one that turns yellow [m/s^2].
-RED_BRAKING = 6.0
+RED_BRAKING = 4.0
 YELLOW_BRAKING = 3.0
-# Who brakes already doesn't drive on because that has become a little harder than wanted [m/s^2].
-BRAKES, STILL_BRAKING = -1.0, 4.0
+# Who brakes already doesn't drive on because that has become harder than wanted: at a yellow, at
+# a red light [m/s^2].
+BRAKES, STILL_BRAKING, STILL_FOR_RED = -1.0, 4.0, 7.0
 # Time until braking has set in [s].
 REACTION = 0.2
 
@@ -136,6 +137,7 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
     result = np.full(len(speed), np.inf)
     for i in range(len(speed)):
         gentle = STILL_BRAKING if acceleration[i] < BRAKES else YELLOW_BRAKING
+        firm = STILL_FOR_RED if acceleration[i] < BRAKES else RED_BRAKING
         for step in range(way.depth[i]):
             lane = way.lane[i, step]
             if lights.number[lane] < 0:
@@ -145,7 +147,7 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
             # Braking takes a moment to set in.
             late = REACTION * speed[i] if shown == YELLOW and acceleration[i] >= BRAKES else 0.0
             needed = speed[i]**2 / (2.0 * max(away - late, 0.1))
-            heeds = (shown == RED and needed < RED_BRAKING) or (
+            heeds = (shown == RED and needed < firm) or (
                 shown == YELLOW and needed < gentle)
             if away > -1.0 and heeds:
                 result[i] = min(result[i], away)

@@ -105,10 +105,15 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
 
 
 @compiled
+def hold_before(entry: float) -> float:
+    """Give the arc length on a lane at which fronts wait before its first conflict [m]."""
+    return entry - 1.0 if entry > WAITING_ROOM else min(0.0, entry - 0.5)
+
+
+@compiled
 def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int) -> float:
     """Give the distance from an agent's centre to where its front waits before a junction [m]."""
-    hold = entry - 1.0 if entry > WAITING_ROOM else min(0.0, entry - 0.5)
-    hold += way.offset[i, step]
+    hold = hold_before(entry) + way.offset[i, step]
     if step > 0:
         line = lines[way.lane[i, step - 1]]
         if math.isfinite(line):

@@ -163,22 +163,6 @@ class LaneGraph:
         """
         return project_all(self.table, lane, x, y, np.asarray(guess, dtype=np.float64), rounds)
 
-    def is_tight(self, width: float, front: float, room: float) -> NDArray[np.bool_]:
-        """
-        Tell which lanes (L) a vehicle leaves by more than some room, swinging out in curves.
-
-        :param front: from its rear axle to its front [m]
-        """
-        result = np.zeros(len(self), dtype=bool)
-        for lane in range(len(self)):
-            rows = slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))
-            bend = smooth(self.curvature[rows], SMOOTHING / float(self.step[lane]))
-            # An angle to the lane before is a bend as well.
-            bend = np.maximum(np.abs(bend), self._kink(lane) / SMOOTHING)
-            takes = 0.5 * width + 0.25 * bend * front**2
-            result[lane] = (takes > self.half_width[rows] + room).any()
-        return result
-
     def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Find points (N) in the coordinates of one lane, wherever on it; s, d [m]."""
         rows = slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))

@@ -9,7 +9,7 @@ import numpy as np
 from crgame_ros.traffic.agents import Agents, AgentTable
 from crgame_ros.traffic.car_following import CarFollowing
 from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.encounters import moderate
+from crgame_ros.traffic.encounters import FIRMEST, moderate
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row
 from crgame_ros.traffic.leaders import least, Pairs, Ways
@@ -99,6 +99,21 @@ def halts_before(speed: FloatArray, distance: FloatArray, braking: float) -> Flo
     result = np.empty(len(speed))
     for i in range(len(speed)):
         result[i] = halt_before(speed[i], max(distance[i], 0.0), braking)
+    return result
+
+
+@compiled
+def before_lines(speed: FloatArray, light: FloatArray) -> FloatArray:
+    """
+    Give the distances (A) at which to halt before lights, some way before the line.
+
+    :param light: (A) distance of the front from the line [m]
+    """
+    result = np.empty(len(speed))
+    for i in range(len(speed)):
+        # Nearer to the line before one brakes hard for that.
+        easily = min(speed[i] * speed[i] / (2.0 * FIRMEST), light[i] - 0.5 * AT_REST)
+        result[i] = max(light[i] - LINE_GAP, easily)
     return result
 
 

@@ -43,13 +43,14 @@ class Motion:
         :param reference: offset of the reference at each row of the lanes' tables [m]
         """
         agents.acceleration[slots] = acceleration
-        _move(self._graph.table, self._routes.next, agents.table, slots, reference, substeps,
+        move(self._graph.table, self._routes.next, agents.table, slots, reference, substeps,
               self._dt_s)
 
 
 @compiled
-def _move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
-          reference: FloatArray, substeps: int, dt_s: float) -> None:
+def move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+         reference: FloatArray, substeps: int, dt_s: float) -> None:
+    """Move agents by some steps; see `Motion.move`."""
     for slot in slots:
         # The sharpest bend as far as one looks where it is straight.
         speed, bend = agents.speed[slot], 0.0

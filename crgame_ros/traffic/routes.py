@@ -116,10 +116,17 @@ class Routes:
             self.remaining = np.minimum(self.remaining, 1000.0)
 
     def reachable(self, lane: int, long: bool = False) -> IntArray:
-        """List the destinations that a lane leads to, for long vehicles those ways that fit."""
+        """
+        List the destinations that a lane leads to.
+
+        For long vehicles those ways that fit, and that they need not change lanes for at once:
+        in a queue nobody gets to.
+        """
         count = len(self.groups)
-        rows = np.arange(count, len(self.cost)) if long else np.arange(count)
-        return rows[np.isfinite(self.cost[rows, lane])]
+        if not long:
+            return np.flatnonzero(np.isfinite(self.cost[:count, lane]))
+        fits = np.isfinite(self.cost[count:, lane]) & (self.change[count:, lane] == 0)
+        return count + np.flatnonzero(fits)
 
     def draw(self, lane: int, generator: np.random.Generator, long: bool = False) -> int:
         """

@@ -6,19 +6,19 @@ from collections.abc import Sequence
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.traffic.adoption import Adopted, fits
-from crgame_ros.traffic.agents import Agents, REAR_TO_CENTER
+from crgame_ros.traffic.agents import Agents
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.encounters import is_in_the_way
 from crgame_ros.traffic.halting_lines import HaltingLines
+from crgame_ros.traffic.junctions import hold_before
 from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import ahead, Corridors, look_distance, ways
-from crgame_ros.traffic.longitudinal import Longitudinal
+from crgame_ros.traffic.longitudinal import COASTING, Longitudinal
 from crgame_ros.traffic.placement import Bodies, place
 from crgame_ros.traffic.room import (
     EASY,
@@ -34,8 +34,8 @@ from crgame_ros.traffic.world import agent_bodies
 
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
 TRIES = 40
-# Longer vehicles take wide ways, which they leave by so much at most [m].
-LONG, SPARE = 6.5, 0.15
+# Longer vehicles take wide ways [m].
+LONG = 6.5
 # Rounds in which those who are placed together get used to each other's speeds.
 CALMING = 3
 # Recorded vehicles take bends so much faster than agents do, by the square root of accelerations.
@@ -47,12 +47,6 @@ FARTHEST = 150.0
 def is_long(length: float) -> bool:
     """Tell whether a vehicle needs ways that are wide enough [m]."""
     return length > LONG
-
-
-def tight_lanes(graph: LaneGraph) -> NDArray[np.bool_]:
-    """Tell which lanes (L) the trucks here cannot drive along."""
-    front = (REAR_TO_CENTER + 0.5) * TRUCK.length
-    return graph.is_tight(TRUCK.width, front, SPARE)
 
 
 def slot_descriptions(count: int, truck_share: float,
@@ -239,8 +233,6 @@ class Spawner:
         goal = self._lane_at(found.poses[-1])
         long = is_long(float(agents.length[slot]))
         towards = None if goal is None else self._routes.towards(lane, goal, long)
-        if towards is None and goal is not None and long:
-            towards = self._routes.towards(lane, goal)
         agents.destination[slot] = (self._routes.draw(lane, self._random, long)
                                     if towards is None else towards)
         if is_in_the_way(graph.table, self._routes.next, agents.table,
@@ -268,18 +260,19 @@ class Spawner:
         """
         Give the speed at which a newcomer drives.
 
-        It could still stop before a junction, the end of the lane or a light that is not green.
+        It could still stop before a junction, the end of the lane or a light that is not green,
+        and slow down for the bends and limits on its way.
         """
         graph, routes = self._graph, self._routes
-        speed = min(self._speeds.allowed(lane, s, float(agents.factor[slot])),
-                    float(agents.top[slot]))
+        factor, center = float(agents.factor[slot]), -s
+        speed = min(self._speeds.allowed(lane, s, factor), float(agents.top[slot]))
         entry = self._conflicts.table.entry[int(agents.width[slot] > NARROW)]
         offset, destination = -s - 0.5 * float(agents.length[slot]) - STOP_GAP, int(
             agents.destination[slot])
         while offset < FARTHEST:
             rest = np.inf
             if entry[lane] < np.inf:
-                rest = offset + float(entry[lane])
+                rest = offset + hold_before(float(entry[lane]))
             if routes.drops[lane]:
                 rest = min(rest, offset + float(graph.length[lane]))
             if self._lines.shown[lane].any():
@@ -287,9 +280,12 @@ class Spawner:
             if rest < np.inf:
                 return min(speed, math.sqrt(2.0 * EASY * max(rest, 0.0)))
             offset += float(graph.length[lane])
+            center += float(graph.length[lane])
             lane = int(routes.next[destination, lane])
             if lane < 0:
                 break
+            speed = min(speed, math.sqrt(self._speeds.allowed(lane, 0.0, factor)**2
+                                         + 2.0 * COASTING * max(center, 0.0)))
         return speed
 
     def _try(self, agents: Agents, slot: int, lane: int, s: float, speed: float,

@@ -21,6 +21,7 @@ from crgame_ros.traffic.courtesy import fade_relief, relief_at_change
 from crgame_ros.traffic.crossings import Crossings, queues
 from crgame_ros.traffic.drivers import Drivers
 from crgame_ros.traffic.driving_side import driving_side
+from crgame_ros.traffic.encounters import brush
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
 from crgame_ros.traffic.lane_cells import LaneCells
@@ -38,8 +39,8 @@ from crgame_ros.traffic.leaders import (
 from crgame_ros.traffic.longitudinal import (
     AT_END,
     AT_LINE,
+    before_lines,
     halts_before,
-    LINE_GAP,
     Longitudinal,
     smoothed,
 )
@@ -48,14 +49,10 @@ from crgame_ros.traffic.motion import Motion
 from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.spawning import (
-    is_long,
-    slot_descriptions,
-    Spawner,
-    tight_lanes,
-)
+from crgame_ros.traffic.spawning import CAR, is_long, slot_descriptions, Spawner, TRUCK
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.swerving import Swerving
+from crgame_ros.traffic.tightness import tight_lanes
 from crgame_ros.traffic.waiting import break_circles, hopeless, INSISTS, LAST_RESORT, WAITS
 from crgame_ros.traffic.world import agent_bodies, Others, standing_entries, WorldView
 
@@ -63,7 +60,7 @@ from crgame_ros.traffic.world import agent_bodies, Others, standing_entries, Wor
 LANE_PER_SLOT = 15.0
 MAX_SLOTS = 300
 STANDING = 0.3
-# What merging at the very end of a lane counts as, against changing lanes before [m].
+# What merging at the very end of a lane, or a bend too tight, counts as [m].
 TAPER_COST = 250.0
 # Room before a standing obstacle from which one gets into the next lane [m].
 SWING_OUT = 10.0
@@ -106,8 +103,9 @@ class Traffic:
         self._conflicts = Conflicts(self._graph, movements, side)
         self._cells = LaneCells(self._graph)
         self._routes = Routes(
-            self._graph, np.where(self._conflicts.tapers(), TAPER_COST, 0.0),
-            tight_lanes(self._graph), side.keeps_left)
+            self._graph, np.where(self._conflicts.tapers() | tight_lanes(
+                self._graph, CAR), TAPER_COST, 0.0),
+            tight_lanes(self._graph, TRUCK), side.keeps_left)
         self._lines = HaltingLines(self._graph, scenario.lanelet_network, movements)
         self._model: CarFollowing = CAR_FOLLOWING.create(spec.model, spec.options, 'traffic')
         self._longitudinal = Longitudinal(self._graph, self._routes, self._model)
@@ -216,6 +214,8 @@ class Traffic:
         halt = np.minimum(self._junctions(
             k, slots, way, entries, pairs, desired, gap, self._time_step_s),
             self._before_obstacles(slots, blocked))
+        acceleration = np.minimum(acceleration, brush(
+            self._graph.table, self._routes.next, agents.table, slots, entries, way))
         end = self._lane_ends(way, agents.length[slots])
         for distance, braking in ((halt, AT_LINE), (end, AT_END)):
             acceleration = np.minimum(acceleration, halts_before(speed, distance, braking))
@@ -311,7 +311,7 @@ class Traffic:
                                   agents.acceleration[slots])
         light[self._drivers.run_lights[slots]] = np.inf
         if not len(conflicts):
-            return light - LINE_GAP
+            return before_lines(agents.speed[slots], light)
         passage = passages(conflicts.table, self._lines.line, way, agents.table, slots)
         before = way.lane[np.arange(len(slots)), np.maximum(passage.first - 1, 0)]
         sign = self._lines.stop_sign[before] & (passage.first > 0)
@@ -325,7 +325,7 @@ class Traffic:
         agents.blocker[slots[np.isfinite(light)]] = FREE
         if (agents.waits[slots] > self._waiting).any():
             break_circles(k, agents.table, slots, self._waiting, self._insisting)
-        return np.minimum(light - LINE_GAP, halt)
+        return np.minimum(before_lines(agents.speed[slots], light), halt)
 
     def _before_obstacles(self, slots: IntArray, blocked: FloatArray) -> FloatArray:
         """Give the distances (A) to halt at so that there is room to change lanes, or inf."""
