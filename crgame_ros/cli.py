@@ -186,10 +186,7 @@ def _summary(result: 'OfflineResult', wall_s: float) -> dict[str, Any]:
         'stop': None if result.stop is None else {
             'vehicle': result.stop.vehicle_id, 'violation_n': result.stop.n,
             'stop_n': len(result.vehicle_states) - 1},
-        'contacts': [{'vehicle': item.vehicle_id, 'with': item.other_id, 'n': item.n,
-                      'side': item.side, 'kind': item.kind, 'speed': round(item.speed, 2),
-                      'other_speed': round(item.other_speed, 2), 'avoidable_by': item.verdict}
-                     for item in contacts_of(result)]}
+        'contacts': [item.as_dict() for item in contacts_of(result)]}
 
 
 def _convert(values: argparse.Namespace) -> int:

@@ -1,7 +1,8 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the files of a run are, and which are there."""
+"""Where the files of a run are, which are there, and what they say of its contacts."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -22,5 +23,18 @@ def files_document(session: Path, epoch: int) -> dict[str, Any]:
     names = [path.name for kind in _KINDS for path in sorted(folder.glob(kind))]
     here = Path.cwd()
     shown = folder.relative_to(here) if folder.is_relative_to(here) else folder
-    return {'epoch': epoch, 'folder': str(shown), 'names': names,
-            'complete': (folder / FINISHED_MARK).exists()}
+    complete = (folder / FINISHED_MARK).exists()
+    return {'epoch': epoch, 'folder': str(shown), 'names': names, 'complete': complete,
+            'contacts': _contacts(folder) if complete else []}
+
+
+def _contacts(folder: Path) -> list[dict[str, Any]]:
+    """Give the contacts as the timing reports of a run name them."""
+    found: list[dict[str, Any]] = []
+    for path in sorted(folder.glob('timing*.json')):
+        try:
+            found.extend(json.loads(path.read_text()).get('contacts') or [])
+        except (OSError, ValueError, AttributeError):
+            # Somebody has moved or changed it: the page then says that they touched, and no more.
+            continue
+    return found

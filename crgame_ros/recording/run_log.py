@@ -102,8 +102,8 @@ def read_run_log(path: Path, epoch: int | None = None) -> RunLog:
             if found is not None and found.type_name != _TRAJECTORY:
                 raise InputError(f'{topic} is a {found.type_name}', str(path),
                                  'give a recording of crgame_ros')
-        points = _read_points(reader, run,
-                              {VEHICLES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects})
+        points = read_points(reader, run,
+                             {VEHICLES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects})
         notices = list(reader.notices)
     ticks = _usable_ticks(points, bool(objects), run, path, notices)
     ns = np.array(sorted(points[VEHICLES_TOPIC]))
@@ -121,9 +121,15 @@ def read_run_log(path: Path, epoch: int | None = None) -> RunLog:
         others[:, 0], others[:, 1], tuple(notices))
 
 
-def _read_points(reader: BagReader, run: Epoch, ids: Mapping[str, list[str]],
-                 ) -> dict[str, dict[int, FloatArray]]:
-    """Read by topic and step n: (3, joints) positions, velocities, accelerations."""
+def read_points(reader: BagReader, run: Epoch, ids: Mapping[str, list[str]],
+                ) -> dict[str, dict[int, FloatArray]]:
+    """
+    Read how vehicles and objects moved.
+
+    :param ids: whose joints are wanted of `VEHICLES_TOPIC` and `OBJECT_STATES_TOPIC`.
+    :return: by topic and step n: (3, joints) positions, velocities, accelerations.
+    :raises InputError: if a message does not hold them.
+    """
     scheduler = run.game.scheduler
     wanted = {
         VEHICLES_TOPIC: [name for item in ids[VEHICLES_TOPIC]

@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`timing.json`: what a recorded run says of its timing, its planners and its violations."""
+"""`timing.json`: what a recorded run says of its timing, planners, violations and contacts."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -10,8 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from crgame_ros.drivability.monitor import VehicleDrivability
+from crgame_ros.errors import InputError
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader, DecodedMessage
+from crgame_ros.recording.run_contacts import recorded_contacts
 from crgame_ros.recording.run_log import read_cycles, stamp_of
 from crgame_ros.scenario.export import write_text
 from crgame_ros.timing.timing_metrics import TimingMetrics
@@ -40,6 +43,7 @@ def timing_report(bag: Path, epoch: int | None = None) -> dict[str, Any]:
         collected = _Collector(run)
         for message in reader.decoded(collected.topics):
             collected.take(message)
+        contacts, unknown = _contacts(reader, run, collected.verdicts)
         return {
             **metrics.summary().as_dict(),
             # The first row is that of the step to n = 1.
@@ -47,9 +51,10 @@ def timing_report(bag: Path, epoch: int | None = None) -> dict[str, Any]:
             'planners': {av: collected.planner(av) for av in collected.avs},
             'drivability': {'violations': len(collected.violations),
                             'list': collected.violations},
+            'contacts': contacts,
             'benchmark_id': str(run.game.content.get('benchmark_id', '')),
             'epoch': run.game.epoch,
-            'notices': list(reader.notices)}
+            'notices': [*reader.notices, *unknown]}
 
 
 def write_timing_report(bag: Path, path: Path, epoch: int | None = None) -> dict[str, Any]:
@@ -64,6 +69,15 @@ def write_timing_report(bag: Path, path: Path, epoch: int | None = None) -> dict
     return report
 
 
+def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability]
+              ) -> tuple[list[dict[str, Any]] | None, tuple[str, ...]]:
+    """Give the entries of the contacts, or None and why they are not known."""
+    try:
+        return [item.as_dict() for item in recorded_contacts(reader, run, verdicts)], ()
+    except InputError as error:
+        return None, (f'contacts are not named: {error}',)
+
+
 class _Collector:
     """Follows one run's requests, plans, diagnostics and verdicts in the order of log time."""
 
@@ -76,6 +90,7 @@ class _Collector:
         self._verdicts = {f'/{vehicle}/drivability': vehicle for vehicle in vehicles}
         self.topics = (_DIAGNOSTICS, *self._requests, *self._plans, *self._verdicts)
         self.violations: list[dict[str, Any]] = []
+        self.verdicts: list[VehicleDrivability] = []
         self._lasting: dict[str, set[str]] = defaultdict(set)
         self._asked_ns: dict[tuple[str, int], int] = {}
         self._latencies_ms: dict[str, list[float]] = defaultdict(list)
@@ -123,11 +138,15 @@ class _Collector:
     def _take_verdict(self, vehicle: str, status: Any) -> None:
         """Note what has begun to be violated; heartbeats repeat what lasts."""
         violated = set(status.message.split('; ')) if status.level else set()
+        values = _values(status)
+        n = _count(values, 'n')
         for what in sorted(violated - self._lasting[vehicle]):
-            number = _values(status).get('n', '')
-            self.violations.append({'n': int(number) if number.isdecimal() else None,
-                                    'vehicle': vehicle, 'what': what})
+            self.violations.append({'n': n, 'vehicle': vehicle, 'what': what})
         self._lasting[vehicle] = violated
+        hit = tuple(name for name in values.get('hit', '').split(',') if name)
+        if n is not None and hit:
+            self.verdicts.append(VehicleDrivability(
+                vehicle, True, values.get('road_compliance') == 'false', hit, n))
 
     def planner(self, av: str) -> dict[str, Any]:
         """Sum up one AV; None stands for what was not recorded."""

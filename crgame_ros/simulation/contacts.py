@@ -1,16 +1,20 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The contacts of AVs in a finished run, each with the AV's part in it."""
+"""The contacts of driven vehicles in a finished run, each with the vehicle's part in it."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crgame_ros.drivability.contact import could_avoid, Course, Kind, kind_of, Side, touched_side
+from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.simulation.offline import OfflineResult
-from crgame_ros.simulation.setup import AvSetup
+from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.state import StateColumn
 
 # What anything but an AV is taken to brake with [m/s^2], and to react in [s].
@@ -22,15 +26,15 @@ _DO_NOT_REACT = (Role.RECORDED, Role.SCRIPTED)
 @dataclass(frozen=True)
 class Contact:
     """
-    An AV's first contact with something.
+    A driven vehicle's first contact with something.
 
-    :param vehicle_id: the AV.
+    :param vehicle_id: the AV, or a human whom no AV touches there.
     :param other_id: what it touched.
     :param other_role: who moves that.
     :param n: simulation step.
-    :param side: of the AV.
-    :param kind: as nuPlan's score has it, the AV being the ego.
-    :param speed: of the AV [m/s]
+    :param side: of the vehicle.
+    :param kind: as nuPlan's score has it, the vehicle being the ego.
+    :param speed: of the vehicle [m/s]
     :param other_speed: of the other [m/s]
     :param avoidable_by: ids of those who would have avoided it by braking.
     """
@@ -55,58 +59,98 @@ class Contact:
             able += f' ({self.other_role.value}: does not react)'
         return able
 
+    def as_dict(self) -> dict[str, Any]:
+        """Give it as JSON has it (`docs/planners.md`)."""
+        return {'vehicle': self.vehicle_id, 'with': self.other_id, 'n': self.n,
+                'side': self.side, 'kind': self.kind, 'speed': round(self.speed, 2),
+                'other_speed': round(self.other_speed, 2), 'avoidable_by': self.verdict}
+
+
+@dataclass(frozen=True)
+class Motions:
+    """
+    How everything in a run moved.
+
+    :param descriptions: V driven vehicles, then M other objects.
+    :param braking: the AVs' greatest deceleration by id [m/s^2]
+    :param scheduler: both time grids.
+    :param vehicle_states: (n + 1, V, 8) rear-axle states at every step.
+    :param object_ns: (K) steps at which the objects' states are known, K >= 1 if M is.
+    :param object_poses: (K, M, 3) centre poses.
+    :param object_velocities: (K, M, 3) their derivatives.
+    """
+
+    descriptions: Sequence[ObjectDescription]
+    braking: Mapping[str, float]
+    scheduler: ScenarioScheduler
+    vehicle_states: NDArray[np.float64]
+    object_ns: NDArray[np.int64]
+    object_poses: NDArray[np.float64]
+    object_velocities: NDArray[np.float64]
+
+    def course(self, column: int) -> Course:
+        """Give how one moved, by its column among the descriptions."""
+        item = self.descriptions[column]
+        dt_s, driven = self.scheduler.dt_s, self.vehicle_states.shape[1]
+        if column < driven:
+            states = self.vehicle_states[:, column]
+            yaw = states[:, StateColumn.YAW]
+            ahead = item.rear_to_center * np.column_stack((np.cos(yaw), np.sin(yaw)))
+            poses = np.column_stack((states[:, [StateColumn.X, StateColumn.Y]] + ahead, yaw))
+            speeds = states[:, StateColumn.SPEED]
+        else:
+            ns = np.arange(len(self.vehicle_states))
+            rows = np.maximum(np.searchsorted(self.object_ns, ns, side='right') - 1, 0)
+            velocities = self.object_velocities[rows, column - driven]
+            since_s = (ns - self.object_ns[rows]) * dt_s
+            poses = self.object_poses[rows, column - driven] + velocities * since_s[:, None]
+            speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        if item.id in self.braking:
+            return Course(item.shape, poses, speeds, self.braking[item.id],
+                          self.scheduler.time_step_s)
+        return Course(item.shape, poses, speeds, 0.0 if item.role in _CANNOT_BRAKE else _BRAKING,
+                      _REACTION_S)
+
 
 def contacts_of(result: OfflineResult) -> tuple[Contact, ...]:
-    """
-    Find the contacts of the AVs, each pair once, in order.
-
-    An AV brakes with its vehicle's greatest deceleration after one time step of the scenario,
-    everybody else with 8 m/s^2 after 1 s, as if it looked; static obstacles cannot. Contacts
-    with permanent obstacles of a map stand among the violations only.
-    """
+    """Find the contacts in an offline run, as `find_contacts` does."""
     setup = result.setup
-    described = {item.id: item for item in setup.descriptions}
-    avs = {av.id for av in setup.avs}
+    ticks = setup.scheduler.steps_per_tick * np.arange(len(result.object_poses))
+    return find_contacts(Motions(
+        setup.descriptions, {av.id: av.vehicle.max_acceleration for av in setup.avs},
+        setup.scheduler, result.vehicle_states, ticks, result.object_poses,
+        result.object_velocities), result.violations)
+
+
+def find_contacts(motions: Motions,
+                  verdicts: Iterable[VehicleDrivability]) -> tuple[Contact, ...]:
+    """
+    Find the first contact of each pair, in order.
+
+    One between a human and an AV is told as the AV's, that of two AVs or humans by each. An AV
+    brakes with its vehicle's greatest deceleration after one time step of the scenario, everybody
+    else with 8 m/s^2 after 1 s, as if it looked; static obstacles cannot. Contacts with permanent
+    obstacles of a map stand among the violations only.
+
+    :param verdicts: in order, of steps whose states are known.
+    """
+    columns = {item.id: column for column, item in enumerate(motions.descriptions)}
     found: dict[tuple[str, str], Contact] = {}
-    for violation in result.violations:
-        for other in violation.hit:
-            pair = violation.vehicle_id, other
-            if pair[0] in avs and pair not in found and other != PERMANENT_OBSTACLE:
-                found[pair] = _contact(result, described[pair[0]], described[other], violation.n)
+    for verdict in verdicts:
+        for other in verdict.hit:
+            pair = verdict.vehicle_id, other
+            if other != PERMANENT_OBSTACLE and pair not in found and (
+                    pair[0] in motions.braking or other not in motions.braking):
+                found[pair] = _contact(motions, columns[pair[0]], columns[other], verdict.n)
     return tuple(found.values())
 
 
-def _contact(result: OfflineResult, mine: ObjectDescription, other: ObjectDescription,
-             n: int) -> Contact:
-    own, theirs = _course(result, mine), _course(result, other)
-    dt_s = result.setup.scheduler.dt_s
+def _contact(motions: Motions, mine: int, other: int, n: int) -> Contact:
+    own, theirs = motions.course(mine), motions.course(other)
+    me, they = motions.descriptions[mine], motions.descriptions[other]
     side = touched_side(own, theirs, n)
     speed, other_speed = float(own.speeds[n]), float(theirs.speeds[n])
-    able = [item.id for item, course, against in ((mine, own, theirs), (other, theirs, own))
-            if n and could_avoid(course, against, n, dt_s)]
-    return Contact(mine.id, other.id, other.role, n, side, kind_of(speed, other_speed, side),
+    able = [item.id for item, course, against in ((me, own, theirs), (they, theirs, own))
+            if n and could_avoid(course, against, n, motions.scheduler.dt_s)]
+    return Contact(me.id, they.id, they.role, n, side, kind_of(speed, other_speed, side),
                    speed, other_speed, tuple(able))
-
-
-def _course(result: OfflineResult, item: ObjectDescription) -> Course:
-    setup = result.setup
-    if item.role.is_ego:
-        states = result.states_of(item.id)
-        yaw = states[:, StateColumn.YAW]
-        ahead = item.rear_to_center * np.column_stack((np.cos(yaw), np.sin(yaw)))
-        poses = np.column_stack((states[:, [StateColumn.X, StateColumn.Y]] + ahead, yaw))
-        speeds = states[:, StateColumn.SPEED]
-    else:
-        column = setup.obstacles.ids.index(item.id)
-        ticks, since = np.divmod(np.arange(len(result.vehicle_states)),
-                                 setup.scheduler.steps_per_tick)
-        velocities = result.object_velocities[ticks, column]
-        poses = result.object_poses[ticks, column] \
-            + velocities * (since * setup.scheduler.dt_s)[:, None]
-        speeds = np.hypot(velocities[:, 0], velocities[:, 1])
-    vehicle = next((vehicle for vehicle in setup.vehicles if vehicle.id == item.id), None)
-    if isinstance(vehicle, AvSetup):
-        return Course(item.shape, poses, speeds, vehicle.vehicle.max_acceleration,
-                      setup.scheduler.time_step_s)
-    return Course(item.shape, poses, speeds, 0.0 if item.role in _CANNOT_BRAKE else _BRAKING,
-                  _REACTION_S)

@@ -3,6 +3,7 @@
 """An afternoon at the page: one run after the other, what it says of each, and their files."""
 
 from collections.abc import Iterator
+import json
 import math
 from pathlib import Path
 import re
@@ -96,6 +97,8 @@ def test_a_run_is_over_at_its_own_duration_and_says_how_it_went(page: LivePage) 
     (told,) = re.findall(r'hv0 with av0 at ([0-9.]+) s|av0 with hv0 at ([0-9.]+) s', text)
     # The page rounds to 0.1 s and learns of it within the next 0.1 s.
     assert float(told[0] or told[1]) == pytest.approx(gap / av.speed, abs=0.3)
+    # The report names each one's part as offline runs do.
+    assert '(front of av0; could have avoided it: av0)' in text
     accepted = int(re.search(r'(\d+) plans accepted', text)[1])
     assert 0.5 * 10 * SHORT_S < accepted <= 10 * SHORT_S
     assert {'Mean step error', 'Largest lag', 'Precision ratio'} <= set(page.run(
@@ -152,7 +155,9 @@ def test_each_run_has_its_own_files(graph: Graph) -> None:
         assert root.getroot().get('benchmarkID').removeprefix('C-') == scenario
         driven = len(game.humans) + len(game.avs or ())
         assert len(root.findall('planningProblem')) == max(1, driven)
-        assert (folder / 'timing.json').is_file()
+        contacts = json.loads((folder / 'timing.json').read_text())['contacts']
+        assert [(item['vehicle'], item['with'], item['kind']) for item in contacts] == [
+            ('av0', 'hv0', 'stopped track')] * (folder in folders[1:3])
         assert not (folder / '.finished').exists()
         with BagReader(folder / 'bag') as reader:
             assert reader.complete

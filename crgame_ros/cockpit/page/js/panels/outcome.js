@@ -85,7 +85,8 @@ class Outcome {
     const files = this.#files?.epoch === status.epoch ? this.#files : null;
     return {
       why: why(status), stays: Boolean(status.stays), t: status.t, driven: scene.vehicles.length > 0,
-      contacts: status.contacts ?? [], departures: status.departures ?? [],
+      contacts: (status.contacts ?? []).map((item) => ({ ...item, part: part(item, files) })),
+      departures: status.departures ?? [],
       planners: scene.vehicles.filter(({ role }) => role === 'autonomous').map(({ id }) => ({
         id, name: status.planners[id]?.planner || scene.planners?.[id] || '',
         accepted: status.planners[id]?.accepted ?? 0, refused: status.planners[id]?.refused ?? 0,
@@ -194,7 +195,8 @@ function driverText({ seat, run, holder, holderName, me }) {
 
 function table(facts) {
   const rows = facts.driven ? [
-    ['Contacts', told(facts.contacts, (item) => `${item.vehicle} with ${item.with}`)],
+    ['Contacts', told(facts.contacts, (item) => `${item.vehicle} with ${item.with}`,
+      (item) => item.part)],
     ['Off the road', told(facts.departures, (item) => item.vehicle)],
   ] : [['Driven', 'by nobody: traffic was alone']];
   for (const { id, name, accepted, refused, fallbacks } of facts.planners) {
@@ -207,11 +209,20 @@ function table(facts) {
       element('td', { text })))));
 }
 
-function told(items, name) {
+/** Which side of whom it was and who could have avoided it, once the timing report says so. */
+function part(contact, files) {
+  const pair = [contact.vehicle, contact.with].sort().join();
+  const named = files?.contacts?.find((item) => [item.vehicle, item.with].sort().join() === pair);
+  return named === undefined ? ''
+    : ` (${oneLine(named.side)} of ${named.vehicle}; could have avoided it: ${oneLine(named.avoidable_by)})`;
+}
+
+function told(items, name, remark = () => '') {
   if (items.length === 0) {
     return 'none';
   }
-  const texts = items.slice(0, MOST_TOLD).map((item) => `${name(item)} at ${clockTime(item.t)}`);
+  const texts = items.slice(0, MOST_TOLD).map(
+    (item) => `${name(item)} at ${clockTime(item.t)}${remark(item)}`);
   const more = items.length - texts.length;
   return [...texts, ...(more > 0 ? [`${more} more`] : [])].join('; ');
 }
