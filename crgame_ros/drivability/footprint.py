@@ -60,6 +60,17 @@ class Footprint:
         cos, sin = math.cos(yaw), math.sin(yaw)
         return shapely.Polygon(self._outline @ np.array(((cos, sin), (-sin, cos))) + (x, y))
 
+    def outlines(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Place the shape's outline many times.
+
+        :param poses: (S, 3) x [m], y [m] and yaw [rad] of its centre
+        :return: (S, C, 2) corners [m]
+        """
+        cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        turn = np.stack((np.stack((cos, sin), axis=-1), np.stack((-sin, cos), axis=-1)), axis=-2)
+        return self._outline @ turn + poses[:, np.newaxis, :2]
+
 
 def triangle_corners(polygons: shapely.Geometry | NDArray[np.object_]) -> NDArray[np.float64]:
     """

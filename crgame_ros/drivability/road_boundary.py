@@ -9,12 +9,12 @@ import math
 from commonroad.scenario.lanelet import LaneletNetwork
 from commonroad_dc import pycrcc
 import numpy as np
+from numpy.typing import NDArray
 import shapely
 
 from crgame_ros.drivability.footprint import Footprint, triangle_corners
 from crgame_ros.drivability.road_surface import (
     lanelet_polygons,
-    PATCH_OVERLAP,
     polygons_of,
     road_surface,
     seam_patches,
@@ -116,25 +116,43 @@ class RoadBoundary:
         x, y = x_center - self._origin[0], y_center - self._origin[1]
         return bool(shapely.contains(self._surface, self._footprint(shape).polygon(x, y, yaw)))
 
+    def are_off_road(self, poses: NDArray[np.float64], shape: Shape) -> NDArray[np.bool_]:
+        """
+        Tell of many footprints whether any part is off the road, 2 microseconds for each.
+
+        :param poses: (S, 3) x [m], y [m] and yaw [rad] of their centres
+        :return: (S)
+        """
+        outlines = self._footprint(shape).outlines(poses - (*self._origin, 0.0))
+        off: NDArray[np.bool_] = ~shapely.contains(self._surface, shapely.polygons(outlines))
+        return off
+
+    def are_beyond(self, poses: NDArray[np.float64], shape: Shape,
+                   distance: float) -> NDArray[np.bool_]:
+        """
+        Tell of many footprints whether they reach further beyond the road than a distance [m].
+
+        Parameters otherwise as in `are_off_road`, what reaches how far as in `overhang`.
+        """
+        corners = self._footprint(shape).outlines(poses - (*self._origin, 0.0))
+        near = shapely.dwithin(self._surface, shapely.points(corners), distance)
+        beyond: NDArray[np.bool_] = ~near.all(axis=1)
+        return beyond
+
     def overhang(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> float:
         """
         Measure how far a footprint reaches beyond the road: 0 on it [m].
 
-        It is the distance from the road to the footprint's farthest point, also of one that is
+        It is the distance from the road to the footprint's farthest corner, also of one that is
         off the road as a whole; infinite where there is no road. Parameters as in `is_off_road`.
         """
-        x, y = x_center - self._origin[0], y_center - self._origin[1]
-        polygon = self._footprint(shape).polygon(x, y, yaw)
-        if shapely.contains(self._surface, polygon):
-            return 0.0
         if not len(self._pieces):
             return math.inf
-        near = self._pieces[shapely.distance(self._pieces, polygon) < PATCH_OVERLAP]
-        outside = polygon.difference(shapely.union_all(near)) if len(near) else polygon
-        corners = shapely.points(shapely.get_coordinates(outside))
-        if not len(corners):
-            return 0.0
-        return float(shapely.distance(self._pieces[:, None], corners).min(axis=0).max())
+        # Between the corners nothing is farther from the road: a gap narrower than the footprint
+        # is crossed, not left.
+        pose = np.array(((x_center - self._origin[0], y_center - self._origin[1], yaw),))
+        corners = shapely.points(self._footprint(shape).outlines(pose))
+        return float(shapely.distance(self._surface, corners).max())
 
     def _footprint(self, shape: Shape) -> Footprint:
         footprint = self._footprints.get(shape)

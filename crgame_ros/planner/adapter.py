@@ -68,7 +68,7 @@ class PlannerAdapter:
         self._setup_failure = None
         self.last_reason = None
         try:
-            self._limit = RoadLimit(context)
+            self._limit = RoadLimit.of(context)
             self.planner.setup(context)
         except Exception as error:
             self._setup_failure = self.last_reason = f'setup failed: {describe(error)}'

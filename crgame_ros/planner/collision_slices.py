@@ -61,7 +61,7 @@ class CollisionSlices:
         self._objects = context.objects
         self._vehicle = context.vehicle
         self._margin = margin
-        self._limit = RoadLimit(context)
+        self._limit = RoadLimit.of(context)
         self._slices: list[_Slice] = []
         self._k = 0
         # By how much samples may leave the road beyond the ego's present place [m].

@@ -155,6 +155,7 @@ class _Collector:
         node = self._statuses.get(name, {})
         report: dict[str, Any] = {key: _count(engine, key) for key in _PLAN_COUNTS}
         # The node reports its counts now and then, but every fallback at once.
+        report['last_refusal'] = engine.get('last_refusal') or None
         report['plans'] = max(self._answers[av], _count(node, 'plans') or 0)
         report['fallback'] = _count(node, 'fallbacks')
         report['plan_time_ms'] = _spread(self._plan_times_ms[name])

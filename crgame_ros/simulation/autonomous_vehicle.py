@@ -18,6 +18,7 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.planner.interface import Plan
 from crgame_ros.planner.joints import JointSeries, plan_from_joints
 from crgame_ros.planner.plan_check import check_plan
+from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.scenario.game import TimingSpec
 from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.setup import AvSetup
@@ -65,11 +66,14 @@ class AutonomousVehicle:
     Follows the latest accepted plan; owns the busy flag of algorithm 2.
 
     :param execution: tracks the plan on a vehicle model (FS II-C); None follows it exactly (CRG).
+    :param road_limit: refuses plans that leave the road; None if their planner's adapter does.
     """
 
     def __init__(self, setup: AvSetup, scheduler: ScenarioScheduler, timing: TimingSpec,
-                 execution: TrackedExecution | None = None) -> None:
+                 execution: TrackedExecution | None = None,
+                 road_limit: RoadLimit | None = None) -> None:
         self.setup = setup
+        self._road_limit = road_limit
         self.state = setup.state
         self.counters = AvCounters()
         self.plan: Plan | None = None
@@ -183,6 +187,8 @@ class AutonomousVehicle:
             return str(error)
         reason = check_plan(plan, asked.told, series.stamp_ns, self.setup.vehicle,
                             self._scheduler.time_step_s)
+        if reason is None and self._road_limit is not None:
+            reason = self._road_limit.refusal(plan.states)
         if reason is not None:
             return reason
         self.plan = plan

@@ -10,6 +10,8 @@ import numpy as np
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.planner.joints import JointSeries
+from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.scenario.events import FiredEvent, PlannerRun, SpeedLimit
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
@@ -23,7 +25,7 @@ from crgame_ros.simulation.av_models import (
 from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.plan_requests import PlanRequests
 from crgame_ros.simulation.route_lane import RouteLane
-from crgame_ros.simulation.setup import Setup
+from crgame_ros.simulation.setup import AvSetup, Setup
 from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
@@ -79,7 +81,8 @@ class Simulation:
             for human in setup.humans]
         self.avs = [
             AutonomousVehicle(av, self.scheduler, setup.game.timing,
-                              make_execution(av.spec, av.vehicle, dt_s)) for av in setup.avs]
+                              make_execution(av.spec, av.vehicle, dt_s), _road_limit(setup, av))
+            for av in setup.avs]
         for av in self.avs:
             if av.execution is not None and setup.network.lanelet_ids:
                 av.route_lane = RouteLane(setup.network, av.setup.planning_problem,
@@ -226,3 +229,13 @@ class Simulation:
     def state_hash(self) -> str:
         """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""
         return self._hash.hexdigest()
+
+
+def _road_limit(setup: Setup, av: AvSetup) -> RoadLimit | None:
+    """Make what holds an external planner to the road; others' adapters do that themselves."""
+    if av.spec.planner != EXTERNAL or not setup.game.drivability.road \
+            or not setup.network.lanelet_ids:
+        return None
+    limit = RoadLimit(setup.road, av.vehicle)
+    limit.rehearse(av.declared)
+    return limit

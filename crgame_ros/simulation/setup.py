@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import math
+from typing import TYPE_CHECKING
 
 from commonroad.planning.planning_problem import PlanningProblem
 import numpy as np
@@ -30,6 +31,9 @@ from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, 
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+
+if TYPE_CHECKING:
+    from crgame_ros.drivability.road_boundary import RoadBoundary
 
 # A vehicle recorded this close to an AV's start is a recording of the AV [m].
 SAME_PLACE = 1.0
@@ -144,6 +148,12 @@ class Setup:
         :raises InputError: if it cannot be used.
         """
         return None if self.game.occupancy is None else TiledOccupancy(self.game.occupancy)
+
+    @cached_property
+    def road(self) -> 'RoadBoundary':
+        """The boundary of the road, made at first use (3 to 50 ms): ask for it before a run."""
+        from crgame_ros.drivability.road_boundary import RoadBoundary
+        return RoadBoundary(self.loaded.scenario.lanelet_network)
 
     @property
     def vehicles(self) -> tuple['HumanSetup | AvSetup', ...]:
