@@ -289,6 +289,8 @@ class LiveRun:
         # A recorded human moves over the recorded intervals, whatever this machine is busy with.
         cycle = self._controller.begin_cycle(start_ns, inputs.seats.interval_s(simulation.n))
         commands = inputs.seats.commands(start_ns, cycle.dt_eff_s, simulation)
+        if inputs.seats.repetition_changed():
+            outputs.publish_seats(inputs.seats.document())
         if simulation.scheduler.is_tick(simulation.n + 1):
             self._take_triggers()
         result = simulation.step(cycle.dt_eff_s, commands)

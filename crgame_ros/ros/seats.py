@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from crgame_ros.simulation.setup import Setup
 
 NS = 1e-9
-# The driver that the game names, and an AV's planner; anything else names a driver of its own.
+# The driver that the game names, an AV's planner, and the recorded take-over of one; anything
+# else names a driver of its own.
 GAME = 'game'
 PLANNER = 'planner'
+REPLAY = 'replay'
 MAX_SOURCE_LENGTH = 40
 # Two drivers may speak in the moment in which a seat changes hands.
 COMMAND_DEPTH = 10
@@ -53,6 +55,8 @@ class Seat:
         self.source = home
         self.commands = commands
         self.recording = recording
+        # Whether an AV is driven as it was while somebody had taken it over.
+        self.taken_over_again = False
         self._where = f'/{vehicle_id}/driver_command'
         self._watchdog = SeatWatchdog()
         self._last = RELEASED
@@ -70,6 +74,11 @@ class Seat:
     def lost(self) -> bool:
         """Whether the driver is silent now."""
         return self._watchdog.lost and self.source != PLANNER
+
+    @property
+    def told_source(self) -> str:
+        """Whose commands the vehicle obeys, as /seats says it."""
+        return REPLAY if self.taken_over_again and self.source == PLANNER else self.source
 
     def obey(self, source: str, now_ns: int) -> None:
         """
@@ -128,7 +137,8 @@ class Seat:
         :return: None for an AV that nobody has taken over.
         """
         recording = self.recording if self.source == self.home else None
-        if self.source == PLANNER and not self.repeats(n):
+        self.taken_over_again = self.source == PLANNER and self.repeats(n)
+        if self.source == PLANNER and not self.taken_over_again:
             return None
         if recording is not None:
             self._last, self._heard_ns = recording.command(n, dt_s), now_ns
@@ -168,6 +178,7 @@ class Seats:
                  endpoints.polled('/<v>/driver_command', av.id, depth=COMMAND_DEPTH),
                  clock_offset_ns, drivers.get(av.id)) for av in setup.avs]
         self.all = [*self.humans, *self.avs]
+        self._taken_over_again: list[bool] = []
         for seat in self.all:
             seat.source = sources.get(seat.id, seat.home)
 
@@ -196,8 +207,14 @@ class Seats:
 
     def document(self) -> str:
         """Write /seats."""
-        return json.dumps({seat.id: {'source': seat.source, 'driver': seat.driver}
+        return json.dumps({seat.id: {'source': seat.told_source, 'driver': seat.driver}
                            for seat in self.all})
+
+    def repetition_changed(self) -> bool:
+        """Tell whether a recorded take-over of an AV has begun or ended since the last call."""
+        before = self._taken_over_again
+        self._taken_over_again = [seat.taken_over_again for seat in self.avs]
+        return self._taken_over_again != before and any((*before, *self._taken_over_again))
 
     def take_orders(self, now_ns: int) -> tuple[bool, list[str]]:
         """

@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 import json
 from pathlib import Path
 import subprocess
@@ -148,6 +149,17 @@ def test_live_it_is_repeated_too(recorded: Recorded, tmp_path: Path) -> None:
     before, after = (_published(folder / 'bag', 'hv0')
                      for folder in (recorded.folder, tmp_path / 'run'))
     assert np.array_equal(before, after)
+    # The seat changes hands when its commands do: the planner's, the recording's, the planner's.
+    assert _sources(recorded.folder / 'bag') == ['planner', 'cockpit', 'planner']
+    assert _sources(tmp_path / 'run' / 'bag') == ['planner', 'replay', 'planner']
+
+
+def _sources(bag: Path) -> list[str]:
+    """Read who has driven av0, one after the other."""
+    with BagReader(bag) as reader:
+        told = [json.loads(item.message.data)['av0']['source']
+                for item in reader.decoded(['/seats'])]
+    return [source for before, source in pairwise(['', *told]) if source != before]
 
 
 def test_the_command_line_does_the_same_twice(recorded: Recorded) -> None:

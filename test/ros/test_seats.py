@@ -213,8 +213,12 @@ def test_a_recording_drives_by_the_step(table: Table) -> None:
     given = [seat.command(n * 1000 * MS, 0.01, 20.0, n) for n in range(0, 40)]
     assert [command.throttle for command in given] == rows[:40, 0].tolist()
     assert [seats.interval_s(n) for n in range(100)] == intervals.tolist()
-    assert [av.command(0, 0.01, 10.0, n) for n in (39, 40, 49, 50)] == [
-        None, DriverCommand(0.0, 1.0), DriverCommand(0.0, 1.0), None]
+    told = []
+    for n, command in ((39, None), (40, DriverCommand(0.0, 1.0)), (49, DriverCommand(0.0, 1.0)),
+                       (50, None)):
+        assert av.command(0, 0.01, 10.0, n) == command
+        told.append((seats.repetition_changed(), json.loads(seats.document())['av0']['source']))
+    assert told == [(False, 'planner'), (True, 'replay'), (False, 'replay'), (True, 'planner')]
     wait_until(lambda: table.orders.get_subscription_count() > 1, 'the second seats')
     table.order('cockpit', 40_000 * MS)
     # What was commanded last holds until the new driver speaks, over measured intervals.

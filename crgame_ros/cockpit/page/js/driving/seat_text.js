@@ -29,6 +29,9 @@ export function describeSeat(seat, role, planner, me) {
     return seat.driver === 'cockpit' ? 'Waits for somebody in a cockpit'
       : 'Left by its driver in a cockpit';
   }
+  if (seat.source === 'replay') {
+    return 'Driven as in the recording';
+  }
   if (seat.source !== 'game' && seat.source !== 'planner') {
     return `Driven by the source ${seat.source}`;
   }
