@@ -170,10 +170,14 @@ class IdmPlanner(PathPlanner):
             self._longitudinal(request, position, leaders, lane.end_s))
         return states[:, StateColumn.SPEED]
 
-    def has_gap(self, request: PlanRequest, lane: SideLane) -> bool:
-        """Tell whether the ego may change into a lane beside the path."""
+    def has_gap(self, request: PlanRequest, lane: SideLane, ahead_too: bool = True) -> bool:
+        """
+        Tell whether the ego may change into a lane beside the path.
+
+        :param ahead_too: False to look at who is beside and behind only.
+        """
         return has_gap(self._projector, self._driving.path, request, self.locate(request).s,
-                       lane.offset, self._context.vehicle)
+                       lane.offset, self._context.vehicle, ahead_too)
 
     def _obstacles(self, request: PlanRequest, position: PathPosition, steps: int,
                    offset: float = 0.0) -> PathObstacles:

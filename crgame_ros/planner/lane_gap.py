@@ -24,7 +24,7 @@ DECELERATION = 2.5
 
 
 def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequest, s: float,
-            offset: float, vehicle: VehicleParameters) -> bool:
+            offset: float, vehicle: VehicleParameters, ahead_too: bool = True) -> bool:
     """
     Tell whether the ego may change into the lane beside it.
 
@@ -34,6 +34,7 @@ def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequ
     :param path: runs along the lane, at a constant distance.
     :param s: arc length of the ego's rear axle [m]
     :param offset: of the lane's centre line to the left of the path [m]
+    :param ahead_too: False where the caller itself sees to who is in front.
     """
     speed = max(request.ego.speed, 0.0)
     rear = vehicle.rear_to_center - 0.5 * vehicle.length
@@ -50,6 +51,8 @@ def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequ
         other = float(others.speed[at, column])
         if behind >= ahead:
             needed = SHORTEST + HEADWAY_BEHIND_S * max(other, 0.0) + _closing(other - speed)
+        elif ahead > 0.0 and not ahead_too:
+            continue
         else:
             needed = SHORTEST + HEADWAY_AHEAD_S * speed + _closing(speed - other)
         if max(behind, ahead) < needed:

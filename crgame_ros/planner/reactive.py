@@ -31,6 +31,8 @@ RIGHT = 0.5
 TURNING = 1.0
 # Nearer than this to a lane's centre line the ego is in that lane [m].
 INSIDE = 1.0
+# Stops are sampled that take up to so many times what the hardest would, were it at once.
+STOP_SHARE = 2.5
 # Lanes are looked for at least so far ahead [m].
 SHORTEST_LOOK = 15.0
 
@@ -119,7 +121,7 @@ class ReactivePlanner(Planner):
             if states is not None:
                 self._heading_for = aim.offset
                 return Plan(request.stamp_ns, states)
-        states = self._evading(aims, position, request.ego.speed)
+        states = self._evading(request, aims, position)
         if states is None:
             raise PlanningError('no sample is feasible and free of collisions')
         return Plan(request.stamp_ns, states)
@@ -127,13 +129,14 @@ class ReactivePlanner(Planner):
     def _prepare(self, driving: DrivingPath) -> None:
         """Take over a new path."""
         self._driving = driving
-        self._lanes = road_bounds(driving, self._context.vehicle, False)
-        self._carriageway = road_bounds(driving, self._context.vehicle, True)
+        vehicle = self._context.vehicle
+        self._lane = road_bounds(driving, vehicle, 'lane')
+        self._lanes = road_bounds(driving, vehicle, 'lanes')
+        self._carriageway = road_bounds(driving, vehicle, 'carriageway')
 
     def _aims(self, request: PlanRequest, position: PathPosition) -> Iterator[_Aim]:
         """Go through the lanes that may be driven in, the best first."""
-        look = position.s + max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
-        sides = side_lanes(self._driving, look, self._context.vehicle)
+        sides = side_lanes(self._driving, self._look(request, position), self._context.vehicle)
         nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
         free = float(self._idm.speeds(request, alone=True)[-1])
         own = self._aim(request, position, OWN_LANE, nearest, free)
@@ -143,6 +146,10 @@ class ReactivePlanner(Planner):
             own = None
         aims = [own, *(self._aim(request, position, lane, nearest, free) for lane in sides)]
         yield from sorted(aim for aim in aims if aim is not None)
+
+    def _look(self, request: PlanRequest, position: PathPosition) -> float:
+        """Give the arc length at which lanes are looked for [m]."""
+        return position.s + max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
 
     def _aim(self, request: PlanRequest, position: PathPosition, lane: SideLane,
              nearest: SideLane, free: float) -> _Aim | None:
@@ -184,19 +191,57 @@ class ReactivePlanner(Planner):
         return self._sample(0, aim, {late} if over else {middle, late},
                             {aim.speed, slower, 0.5 * (aim.speed + speed)}, {aim.offset})
 
-    def _evading(self, aims: list[_Aim], position: PathPosition, speed: float) -> Array | None:
-        """Try wider samples, then emergency braking and evading."""
+    def _evading(self, request: PlanRequest, aims: list[_Aim],
+                 position: PathPosition) -> Array | None:
+        """Try wider samples where nobody comes from behind, a stop, then all of the road."""
+        speed = request.ego.speed
         # In the lane that the ego is in somebody may have left no speed at all.
         aim = aims[0] if aims else _Aim(0.0, position.d, 0.0)
         times = {self._time(0.34), self._time(0.6), self._time(1.0)}
-        low, high = self._within(self._lanes, position.s, speed)
+        own = {aim.offset for aim in aims}
         states = self._sample(1, aim, times, {aim.speed, 0.5 * aim.speed, 0.0, speed},
-                              {low, high, *(aim.offset for aim in aims)})
+                              own | self._open_offsets(request, position))
+        if states is None:
+            states = self._stopping(aim, position, speed)
         if states is not None:
             return states
-        low, high = self._within(self._carriageway, position.s, speed)
         self._core.slices.road_tolerance = TOLERANCE
+        low, high = self._within(self._carriageway, position.s, speed)
         return self._sample(2, aim, times, {0.0, 0.5 * speed, speed}, {low, high})
+
+    def _stopping(self, aim: _Aim, position: PathPosition, speed: float) -> Array | None:
+        """Stop as hard as must be, in the lane."""
+        # The package's profiles brake half as hard again in their middle as on average, less so
+        # once the brake is on. All times are tried, so that a stop that has begun goes on.
+        dt_s, brake = self._context.time_step_s, self._context.vehicle.max_acceleration
+        first = max(2, math.ceil(abs(speed) / brake / dt_s))
+        last = max(first, min(round(self._span_s / dt_s), round(STOP_SHARE * first)))
+        self._core.sample_over_way()
+        states = self._sample(1, aim, {dt_s * count for count in range(first, last + 1)}, {0.0},
+                              {aim.offset, position.d})
+        self._core.sample_over_time()
+        return states
+
+    def _open_offsets(self, request: PlanRequest, position: PathPosition) -> set[float]:
+        """
+        Give the outermost offsets among the lanes of the same direction that may be used.
+
+        Those are the lane that the ego is in, and the ones where nobody is beside it and whoever
+        comes from behind has the room that a lane change leaves him.
+        """
+        sides = side_lanes(self._driving, self._look(request, position), self._context.vehicle)
+        nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
+        free = {lane for lane in (OWN_LANE, *sides)
+                if lane is nearest or self._idm.has_gap(request, lane, ahead_too=False)}
+        speed = request.ego.speed
+        own, lanes = (self._within(bounds, position.s, speed)
+                      for bounds in (self._lane, self._lanes))
+        right, left = (any(lane.offset * side > 0.0 for lane in free) for side in (-1.0, 1.0))
+        offsets = {nearest.offset}
+        offsets |= set(own) if OWN_LANE in free else set()
+        offsets |= {lanes[0]} if right else set()
+        offsets |= {lanes[1]} if left else set()
+        return offsets
 
     def _sample(self, level: int, aim: _Aim, times: set[float], speeds: set[float],
                 offsets: set[float]) -> Array | None:

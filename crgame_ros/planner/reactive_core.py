@@ -132,11 +132,29 @@ class ReactiveCore:
             orientation=ego.yaw + self._turn, velocity=max(ego.speed, 0.0),
             acceleration=ego.acceleration, yaw_rate=ego.yaw_rate,
             steering_angle=min(max(ego.steering_angle, -limit), limit))
+        self._request, self._initial = request, state
+        self._reset(self._low_velocity)
+
+    def sample_over_time(self) -> None:
+        """Sample offsets over time again, but at low speed."""
+        self._reset(self._low_velocity)
+
+    def sample_over_way(self) -> None:
+        """
+        Sample offsets over the way, not over time, as it does at low speed.
+
+        Stops can be sampled then at any speed: over time a vehicle would still move aside when it
+        stands, so that the package drops them all unless it keeps its offset exactly.
+        """
+        self._reset(np.inf)
+
+    def _reset(self, low_velocity: float) -> None:
+        planner = self.planner
+        planner.config.planning.low_vel_mode_threshold = low_velocity
         # It needs this before `reset`, but sets it after.
-        self.planner._low_vel_mode = ego.speed < self._low_velocity
-        self.planner.reset(initial_state_cart=state, collision_checker=self.slices,
-                           coordinate_system=system)
-        self._request = request
+        planner._low_vel_mode = self._request.ego.speed < low_velocity
+        planner.reset(initial_state_cart=self._initial, collision_checker=self.slices,
+                      coordinate_system=self._system)
 
     def plan(self, level: int | None = None) -> Array | None:
         """

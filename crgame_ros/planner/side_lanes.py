@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.vehicle.parameters import VehicleParameters
 
 Array = NDArray[np.float64]
+Reach: TypeAlias = Literal['lane', 'lanes', 'carriageway']
 
 ROAD_MARGIN = 0.2
 # Between the samples at which widths are looked up [m].
@@ -77,11 +78,12 @@ def _end(driving: DrivingPath, first: int, neighbour_of: object) -> float:
     return np.inf
 
 
-def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, oncoming: bool) -> Array:
+def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, reach: Reach) -> Array:
     """
-    Find how far the rear axle may leave the path before the vehicle leaves the carriageway.
+    Find how far the rear axle may leave the path before the vehicle leaves what it may use.
 
-    :param oncoming: count neighbouring lanes of the other direction as carriageway too.
+    :param reach: its lane alone, with the neighbours of the same direction, or with those of the
+        other direction too.
     :return: (N, 2) least and greatest offset at the path's samples [m]
     """
     s = driving.path.s
@@ -94,7 +96,7 @@ def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, oncoming: bool
         at = np.append(np.arange(first, last, SPACING), last)
         points = driving.path.pose_at(at)[:, :2]
         along, aside = driving.roads.line(lanelet).project(points)
-        widths = np.array([list(_widths(driving.roads, lanelet, float(place), oncoming))
+        widths = np.array([list(_widths(driving.roads, lanelet, float(place), reach))
                            for place in along])
         half = 0.5 * widths[:, 0]
         # The path is not in the lane's middle while it changes lanes.
@@ -105,13 +107,13 @@ def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, oncoming: bool
     return bounds
 
 
-def _widths(roads: RoadNetwork, lanelet: int, s: float, oncoming: bool) -> Iterator[float]:
+def _widths(roads: RoadNetwork, lanelet: int, s: float, reach: Reach) -> Iterator[float]:
     """Give the widths of a lanelet and of what may be used on its right and left [m]."""
     own = roads.lanelet_network.find_lanelet_by_id(lanelet)
     yield roads.width_at(lanelet, s)
     for neighbour, same_way in ((own.adj_right, own.adj_right_same_direction),
                                 (own.adj_left, own.adj_left_same_direction)):
         usable = (neighbour in roads.lanelet_ids and roads.is_for_cars(neighbour)
-                  and (same_way or oncoming))
+                  and reach != 'lane' and (same_way or reach == 'carriageway'))
         place = s if same_way or not usable else roads.line(neighbour).length - s
         yield roads.width_at(neighbour, place) if usable else 0.0

@@ -1,0 +1,55 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The reactive planner before a parked car, with somebody in the lane beside who looks at nothing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, PoseSpawn
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
+
+# The lanes' centre lines are at y = 2 and 6 m, the AV starts at x = 15.6 m with 20 m/s, and the
+# parked car's rear is 28.5 m ahead: what 20 m/s need at 7 m/s^2.
+BESIDE = 6.0
+
+
+def drive(shared_scenarios: Path, spawn: PoseSpawn | None, duration_s: float) -> OfflineResult:
+    """Drive the critical scenario with an idle human."""
+    human = HumanSpec('hv0', 'idle', **({} if spawn is None else {'spawn': spawn}))
+    game = Game(shared_scenarios / 'more' / 'DEU_Crit-1_1_T-1.xml', humans=(human,),
+                avs=(AvSpec('av0', 'reactive'),))
+    result = run_offline(build_setup(game), duration_s=duration_s)
+    # The map begins where the human starts furthest behind.
+    assert [item for item in result.violations if item.collision] == []
+    return result
+
+
+@pytest.mark.parametrize('spawn', [None, PoseSpawn(4.0, BESIDE, 0.0, 20.0),
+                                   PoseSpawn(-2.0, BESIDE, 0.0, 24.0)],
+                         ids=['0.9 m behind', '7 m behind', 'faster'])
+def test_stops_where_there_is_no_room_beside(spawn: PoseSpawn | None,
+                                             shared_scenarios: Path) -> None:
+    """
+    Nobody is cut off, and the parked car is not touched.
+
+    0.6 s of headway are 12 and 14.4 m, and 4 m/s more take 0.7 s and 2.5 m/s^2: 6 m. None of the
+    three has that much behind the AV, which reached the lane's edge at y = 4 - 0.8 m before.
+    """
+    result = drive(shared_scenarios, spawn, 4.0)
+    av = result.states_of('av0')
+    beside = result.states_of('hv0')[:, 0] < av[:, 0] + 4.5
+    assert av[beside, 1].max() < 3.2
+    assert result.planners['av0'].accepted_ratio >= 0.8
+
+
+def test_passes_where_there_is_room(shared_scenarios: Path) -> None:
+    """From 19 m behind at the same speed it goes round the parked car in front of the human."""
+    result = drive(shared_scenarios, PoseSpawn(-8.0, BESIDE, 0.0, 20.0), 4.0)
+    av, human = result.states_of('av0'), result.states_of('hv0')
+    assert av[:, 1].max() > 5.0
+    changing = np.flatnonzero(av[:, 1] > 3.2)[0]
+    # Whole headway when it comes into the lane: from rear axle to rear axle a car's length more.
+    assert av[changing, 0] - human[changing, 0] - 4.508 > 0.6 * human[changing, 3]
