@@ -10,8 +10,13 @@ import numpy as np
 import pytest
 
 from crgame_ros.errors import InputError
+from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.scenario.export import write_scenario
+from crgame_ros.scenario.game import AvSpec, Game
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
 
 
 def as_2017a(text: str, step_s: float | None) -> str:
@@ -54,8 +59,57 @@ def test_the_same_scenario_in_both_formats(shared_scenarios: Path, seconds: bool
                     + (', its times as seconds' if seconds else '')]
 
 
-def test_times_that_fit_no_step_are_refused(shared_scenarios: Path) -> None:
-    """Seconds between two time steps are no older format but a mistake."""
-    text = (shared_scenarios / 'ZAM_Over-1_1.xml').read_text(encoding='utf-8')
+def test_times_that_fit_no_step_are_refused(project_root: Path) -> None:
+    """Seconds between two time steps are no older format but a mistake; a goal may have them."""
+    text = (project_root / 'test' / 'scenario' / 'older_2017a.xml').read_text(encoding='utf-8')
+    assert '<intervalStart>5.03</intervalStart>' in text
     with pytest.raises(InputError, match='no usable whole number'):
-        parse_scenario(as_2017a(text, 0.0123), 'older.xml')
+        parse_scenario(text.replace('0.30000000000000004', '0.26'), 'older.xml')
+
+
+def test_structure_of_that_time(project_root: Path) -> None:
+    """
+    What writers of 2017a had and 2018b has not; every number from the file beside this test.
+
+    Static obstacles that are but a shape on the map, one of occupancies alone, seconds with their
+    rounding, goals with exact values, points and fields of their own, `drivingDirection`.
+    """
+    text = (project_root / 'test' / 'scenario' / 'older_2017a.xml').read_text(encoding='utf-8')
+    loaded = parse_scenario(text, 'older.xml')
+    obstacles = ScenarioObstacles(loaded)
+    assert obstacles.ids == ('o10', 'o11', 'o12', 'o13')
+    # The parked car turned by 0.1 rad, the polygon at the mean of its corners.
+    np.testing.assert_allclose(obstacles.states_at(0).poses, [
+        (90.0, 4.5, 0.1), (131.0, 5.3, 0.0), (30.0, 0.0, 0.0), (60.0, 4.0, 0.0)], atol=1e-12)
+    shapes = {item.id: item.shape for item in obstacles.descriptions}
+    assert (shapes['o10'].length, shapes['o10'].width) == (4.6, 1.8)
+    assert (shapes['o13'].length, shapes['o13'].width) == (5.0, 2.0)
+    np.testing.assert_allclose(shapes['o11'].vertices, [(-1.0, -0.3), (2.0, -0.3), (-1.0, 0.6)])
+    # 10 m/s, four states 0.1 s apart.
+    assert [obstacles.states_at(k).poses[2, 0] for k in range(4)] == [30.0, 31.0, 32.0, 33.0]
+    assert np.isnan(obstacles.states_at(4).poses[2, 0])
+    (problem,) = loaded.planning_problems
+    assert (problem.initial_state.velocity, problem.initial_state.time_step) == (12.0, 0)
+    first, second = problem.goal.state_list
+    assert (first.time_step.start, first.time_step.end) == (50, 120)
+    assert (first.velocity.start, first.velocity.end) == (10.0, 10.0)
+    assert (second.time_step.start, second.time_step.end) == (120, 120)
+    assert second.position.radius == 1.0 and tuple(second.position.center) == (140.0, 0.0)
+    right = loaded.scenario.lanelet_network.find_lanelet_by_id(1)
+    assert (right.adj_left, right.adj_left_same_direction) == (2, True)
+    assert [notice.removeprefix('older.xml: ') for notice in loaded.notices[:3]] == [
+        'it is of version 2017a and was read as 2018b, its times as seconds',
+        'planning problem 0: the acceleration of its goal is ignored',
+        'planning problem 0: its goal is a point, which is met within 1 m']
+
+
+def test_it_is_driven_and_exported(project_root: Path, tmp_path: Path) -> None:
+    """The AV follows the car ahead past the parked one, and the run is valid 2020a."""
+    game = Game(project_root / 'test' / 'scenario' / 'older_2017a.xml',
+                avs=(AvSpec('av0', 'idm'),))
+    result = run_offline(build_setup(game), duration_s=2.0)
+    assert result.planners['av0'].accepted_ratio == 1.0
+    assert result.states_of('av0')[-1, 0] > 20.0
+    path = tmp_path / 'driven.xml'
+    write_scenario(run_log_of(result), path)
+    assert 'commonRoadVersion="2020a"' in path.read_text(encoding='utf-8')
