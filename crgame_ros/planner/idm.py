@@ -38,6 +38,10 @@ NEED_RESERVE = 1.0
 YIELDING = 0.8
 PASSING_MARGIN_S = 0.5
 PASSING_MARGIN = 2.0
+# Who is faster and comes into the way from beside is let in so far ahead [m], where that takes no
+# more than this [m/s^2].
+LET_IN_GAP = 1.0
+LET_IN_LIMIT = 3.0
 
 
 class Leader(NamedTuple):
@@ -49,6 +53,7 @@ class Leader(NamedTuple):
     :param speed: along the path [m/s]
     :param blocking: whether it is in the corridor.
     :param coming: whether it gets there later.
+    :param let_in: acceleration that lets it in ahead, infinity where that is no matter [m/s^2]
     """
 
     rear: Sequence[float]
@@ -56,6 +61,7 @@ class Leader(NamedTuple):
     speed: Sequence[float]
     blocking: Sequence[bool]
     coming: Sequence[bool]
+    let_in: Sequence[float]
 
 
 class IdmPlanner(PathPlanner):
@@ -209,6 +215,7 @@ class IdmPlanner(PathPlanner):
             free = free_acceleration(speed, self._at(self._desired, s), model)
             wanted = free + interaction(speed, halt - s - front, 0.0, model)
             for number, leader in enumerate(leaders):
+                wanted = min(wanted, leader.let_in[i])
                 behind = leader.center[i] <= s + middle
                 # A prediction that drives through the ego from behind leads nobody.
                 follower[number] = leader.blocking[i] and (behind or follower[number])
@@ -254,6 +261,7 @@ def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
     ego_front = ego_rear + vehicle.length
     for column in range(len(obstacles.ids)):
         blocking = obstacles.blocking[:, column]
+        let_in = np.full(len(blocking), math.inf)
         coming = np.logical_or.accumulate(blocking[::-1])[::-1]
         rear = obstacles.rear[:, column]
         if not blocking[0]:
@@ -266,7 +274,24 @@ def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
             gone = leaves and arrival_s > request.time_step_s * last + PASSING_MARGIN_S
             if passed or gone:
                 coming = np.zeros_like(coming)
+            if not passed and obstacles.speed[first, column] >= speed:
+                let_in[:first] = _let_in(
+                    entry_s, ego_front + speed * entry_s - float(rear[first]), speed)
         result.append(Leader(rear.tolist(), obstacles.center[:, column].tolist(),
                              obstacles.speed[:, column].tolist(), blocking.tolist(),
-                             coming.tolist()))
+                             coming.tolist(), let_in.tolist()))
     return result
+
+
+def _let_in(entry_s: float, overlap: float, speed: float) -> float:
+    """
+    Give the acceleration with which somebody faster gets in ahead; infinity if none does.
+
+    Whoever is beside already is not helped by hard braking: lane and speed are held then.
+
+    :param entry_s: time until it is in the way [s]
+    :param overlap: by how much its rear would then be behind the ego's front [m]
+    :param speed: of the ego [m/s]
+    """
+    wanted = -2.0 * (overlap + LET_IN_GAP) / entry_s ** 2
+    return wanted if wanted >= -LET_IN_LIMIT and speed + wanted * entry_s > 0.0 else math.inf
