@@ -91,7 +91,7 @@ class RoadLimit:
         beyond = off[self._road.are_beyond(centers[off], self._shape, allowed)]
         if not len(beyond):
             return None
-        far = self._road.overhang(*centers[beyond[0]].tolist(), self._shape)
+        far = self._overhang(*centers[beyond[0]].tolist())
         return f'the plan leaves the road by {far:.2f} m at state {beyond[0]}'
 
     def _overhang(self, x: float, y: float, yaw: float) -> float:

@@ -1,6 +1,6 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The reactive planner before a parked car, with somebody in the lane beside who looks at nothing."""
+"""The reactive planner before a parked car, beside somebody who looks at nothing."""
 
 from pathlib import Path
 
