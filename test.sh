@@ -19,12 +19,12 @@ colcon=("$CRGAME_PYTHON" -m colcon --log-level error --log-base log)
 echo "== colcon build"
 "${colcon[@]}" build --base-paths . --packages-select crgame_ros
 
-# All tests: a worker for each core, four at most (test/conftest.py says who runs what). A selection,
-# and whoever debugs, wants one.
+# All tests: a worker more than cores, four at most, as two that run graphs leave something to those
+# that compute (test/worker_roles.py). A selection, and whoever debugs, wants one.
 workers=()
 if (($# == 0)); then
     cores=$(getconf _NPROCESSORS_ONLN)
-    workers=(" -n $((cores < 4 ? cores : 4))" ' --dist=loadgroup' ' --no-loadscope-reorder')
+    workers=(" -n $((cores < 3 ? cores + 1 : 4))" ' --dist=loadgroup' ' --no-loadscope-reorder')
 fi
 
 # colcon takes an argument that starts with a dash only behind a blank, which it removes.

@@ -7,14 +7,27 @@ import gc
 import os
 from pathlib import Path
 import signal
+import sys
+from typing import Any
 
 import pytest
 
-from crgame_ros.ros.environment import free_domain_id, prepare_environment
+from crgame_ros.ros.environment import prepare_environment
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from worker_roles import (  # noqa: E402 - importable from here on
+    ALONE,
+    beside_graphs,
+    group_of,
+    keeps_to_the_clock,
+    order_of,
+    own_domain_id,
+    RoleScheduling,
+    step_back,
+)
 
 LONGEST_ID = 100
-# Of tests that speak with running graphs.
-REAL_TIME_FOLDERS = ('live', 'browser', 'ros')
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -25,7 +38,8 @@ def pytest_configure() -> None:
     # a process rclpy's own handler now and then fails to wake what waits.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
+    if 'PYTEST_XDIST_WORKER' in os.environ or 'ROS_DOMAIN_ID' not in os.environ:
+        os.environ['ROS_DOMAIN_ID'] = str(own_domain_id())
     paths = os.environ.get('PYTHONPATH', '').split(os.pathsep)
     if str(ROOT) not in paths:
         os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(ROOT), *paths]))
@@ -34,21 +48,17 @@ def pytest_configure() -> None:
 # Before xdist reads the groups.
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """
-    Put tests that keep to the clock last and into one group, the others into one for each file.
-
-    With `--dist loadgroup --no-loadscope-reorder` workers share the tests that compute, and
-    when these are done one worker runs the graphs and browsers, alone on the machine.
-    """
-    items.sort(key=_keeps_to_the_clock)
-    for item in items:
-        folder = item.path.relative_to(ROOT / 'test').with_suffix('')
-        group = 'clock' if _keeps_to_the_clock(item) else str(folder)
+    """Put tests that keep to the clock first, and each file into a group of its own."""
+    groups = {item: group_of(item, ROOT / 'test') for item in items}
+    items.sort(key=lambda item: order_of(groups[item]))
+    for item, group in groups.items():
         item.add_marker(pytest.mark.xdist_group(group))
 
 
-def _keeps_to_the_clock(item: pytest.Item) -> bool:
-    return item.path.relative_to(ROOT / 'test').parts[0] in REAL_TIME_FOLDERS
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> RoleScheduling | None:
+    """With `--dist loadgroup` some workers run graphs and the others compute."""
+    return RoleScheduling(config, log) if config.getvalue('dist') == 'loadgroup' else None
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
@@ -59,19 +69,22 @@ def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
 
 
 @pytest.fixture(scope='module', autouse=True)
-def _no_long_collections(request: pytest.FixtureRequest) -> Iterator[None]:
-    """
-    Keep the collector from walking over all that other tests have left.
-
-    In a heap of a gigabyte it stops this process for half a second: whoever drives a vehicle from
-    here would fall silent, and be braked.
-    """
-    if request.path.relative_to(ROOT / 'test').parts[0] not in REAL_TIME_FOLDERS:
+def _company(request: pytest.FixtureRequest,
+             tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep from each other, and from what computes, those that keep to the clock."""
+    first = next(item for item in request.session.items if item.path == request.path)
+    group = group_of(first, ROOT / 'test')
+    if not keeps_to_the_clock(group):
+        step_back()
         yield
         return
+    # A collection in the heap that all other tests have left stops this process for half a
+    # second: whoever drives a vehicle from here would fall silent, and be braked.
     gc.collect()
     gc.freeze()
-    yield
+    with beside_graphs(tmp_path_factory.getbasetemp().parent / 'graphs.lock',
+                       alone=group == ALONE):
+        yield
     gc.unfreeze()
 
 
@@ -93,6 +106,6 @@ def shared_scenarios() -> Path:
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> int:
     """Give the test, and the processes it starts, a ROS domain that nobody else uses."""
-    domain = free_domain_id()
+    domain = own_domain_id()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
     return domain

@@ -15,7 +15,7 @@ import time
 from types import TracebackType
 from typing import IO, Self
 
-from crgame_ros.ros.environment import free_domain_id
+from worker_roles import own_domain_id
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / 'scenarios'
@@ -55,7 +55,7 @@ class Launcher:
 
     def __init__(self, arguments: Sequence[str | Path], out: Path | None = None,
                  cwd: Path = ROOT, *, headless: bool = True) -> None:
-        self.domain = free_domain_id()
+        self.domain = own_domain_id()
         self.out = out or cwd
         words = [*map(str, arguments), *(['--out', str(out)] if out else []),
                  *(['--headless'] if headless else [])]

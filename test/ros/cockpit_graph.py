@@ -12,13 +12,13 @@ import numpy as np
 import rclpy
 from rclpy.context import Context
 from std_msgs.msg import String
+from worker_roles import own_domain_id
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.messages import parse_message
 from crgame_ros.planner.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.ros.cockpit_backend import LiveBackend
-from crgame_ros.ros.environment import free_domain_id
 from crgame_ros.ros.messages import StateMessage
 from crgame_ros.simulation.documents import game_document, objects_document
 from crgame_ros.simulation.setup import Setup
@@ -127,7 +127,7 @@ Check = Callable[[Graph], Coroutine[Any, Any, None]]
 
 
 async def _run(check: Check) -> None:
-    domain, context = free_domain_id(), Context()
+    domain, context = own_domain_id(), Context()
     rclpy.init(context=context, domain_id=domain)
     node = rclpy.create_node('cockpit_node', context=context)
     hub, backend = Hub('live'), LiveBackend(node)

@@ -13,8 +13,8 @@ from live_support import CUT_IN, PATIENCE_S
 import numpy as np
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from worker_roles import own_domain_id
 
-from crgame_ros.ros.environment import free_domain_id
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.occupancy_raster_spec import RasterSpec
@@ -48,7 +48,7 @@ def test_the_tiles_near_the_vehicles_come_when_they_change(tmp_path: Path) -> No
     path = write_map(Raster(loaded, RasterSpec()), tmp_path / 'map', 'cut-in').path
     occupancy = TiledOccupancy(path)
     left, low, *_ = occupancy.bounds
-    domain = free_domain_id()
+    domain = own_domain_id()
     process = subprocess.Popen([sys.executable, '-m', 'crgame_ros.nodes.map_node'],
                                env=os.environ | {'ROS_DOMAIN_ID': str(domain)})
     try:

@@ -15,11 +15,11 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
+from worker_roles import own_domain_id
 
 from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.driver.replay import ReplayDriver
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.environment import free_domain_id
 from crgame_ros.ros.messages import to_joy
 from crgame_ros.ros.seats import COMMAND_DEPTH, GAME, MAX_ORDERS, Seat, Seats
 from crgame_ros.scenario.game_file import load_game
@@ -67,7 +67,7 @@ class Table(NamedTuple):
 @pytest.fixture
 def table() -> Iterator[Table]:
     """Seats of the cut-in game and a peer, who have met."""
-    domain, context = free_domain_id(), Context()
+    domain, context = own_domain_id(), Context()
     rclpy.init(context=context, domain_id=domain)
     node = rclpy.create_node('seats', context=context)
     sources: dict[str, str] = {}

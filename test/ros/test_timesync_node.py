@@ -9,8 +9,8 @@ import sys
 from live_peer import Peer
 from live_support import CUT_IN, PATIENCE_S
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
+from worker_roles import own_domain_id
 
-from crgame_ros.ros.environment import free_domain_id
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.documents import game_document
 from crgame_ros.simulation.setup import build_setup
@@ -37,7 +37,7 @@ def test_an_order_ends_with_the_run_that_was_late() -> None:
     setup = build_setup(load_game(CUT_IN))
     documents = [String(data=game_document(setup, epoch=epoch, clock_offset_ns=0,
                                            real_time_factor=1.0)) for epoch in range(2)]
-    domain = free_domain_id()
+    domain = own_domain_id()
     process = subprocess.Popen([sys.executable, '-m', 'crgame_ros.nodes.timesync_node'],
                                env=os.environ | {'ROS_DOMAIN_ID': str(domain)})
     try:
