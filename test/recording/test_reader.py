@@ -325,6 +325,8 @@ def make_refused(folder: Path, kind: str, samples: Any) -> Path:
         (folder / name).write_text('' if kind == 'empty file' else 'hello' * 1000)
     elif kind == 'broken metadata':
         (folder / 'metadata.yaml').write_text('rosbag2_bagfile_information: [}')
+    elif kind == 'nested metadata':
+        (folder / 'metadata.yaml').write_text('[' * 5000 + ']' * 5000)
     elif kind == 'other metadata':
         (folder / 'metadata.yaml').write_text('a: b')
     elif kind != 'empty folder':
@@ -344,6 +346,7 @@ def make_refused(folder: Path, kind: str, samples: Any) -> Path:
     ('no mcap', 'no MCAP file'), ('no sqlite', 'cannot be read'),
     ('empty file', 'the file is empty'), ('broken metadata', 'not the metadata of a recording'),
     ('other metadata', 'not the metadata of a recording'),
+    ('nested metadata', 'nested deeper than 20 levels'),
     ('unknown storage', "unknown storage 'tape'"), ('missing file', 'the file is missing')])
 def test_what_is_no_recording_gets_one_clear_line(tmp_path: Path, samples: Any, kind: str,
                                                   message: str) -> None:
