@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from selenium.webdriver.chrome.webdriver import WebDriver
 
 PATIENCE_S = 45.0
+WIDTH, HEIGHT = 1280, 720
 _POLL_S = 0.05
 _BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 _FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
@@ -46,6 +47,24 @@ class Browser:
     def __init__(self, driver: 'WebDriver') -> None:
         self.driver = driver
         self._errors: list[str] = []
+
+    def renew(self) -> None:
+        """Be as if just started: another tab of 1280x720, no key held, nothing remembered."""
+        from selenium.webdriver.common.actions.action_builder import ActionBuilder
+
+        ActionBuilder(self.driver).clear_actions()
+        # A page remembers by its address; where there is none yet, there is nothing to forget.
+        self.run('try { localStorage.clear(); sessionStorage.clear(); } catch {}')
+        before = self.driver.window_handles
+        self.driver.switch_to.new_window('tab')
+        own = self.driver.current_window_handle
+        for handle in before:
+            self.driver.switch_to.window(handle)
+            self.driver.close()
+        self.driver.switch_to.window(own)
+        self.driver.execute_cdp_cmd('Network.clearBrowserCookies', {})
+        self.forget_errors()
+        self.resize(WIDTH, HEIGHT)
 
     def open(self, address: str) -> None:
         """Load a page."""
@@ -118,7 +137,7 @@ OpenBrowser = Callable[..., Browser]
 
 
 @contextmanager
-def open_browser(profile: Path, width: int = 1280, height: int = 720, *,
+def open_browser(profile: Path, width: int = WIDTH, height: int = HEIGHT, *,
                  sound: bool = False) -> Iterator[Browser]:
     """
     Start Chromium, and end it.

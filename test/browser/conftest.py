@@ -13,9 +13,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from browser_support import (  # noqa: E402
     Browser,
+    HEIGHT,
     missing_programs,
     open_browser,
     OpenBrowser,
+    WIDTH,
 )
 
 
@@ -24,7 +26,7 @@ def _opener(factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
     if missing:
         pytest.skip(f'no browser for this test: {", ".join(missing)} is missing')
     with ExitStack() as stack:
-        def make(width: int = 1280, height: int = 720, **more: bool) -> Browser:
+        def make(width: int = WIDTH, height: int = HEIGHT, **more: bool) -> Browser:
             profile = factory.mktemp('profile')
             return stack.enter_context(open_browser(profile, width, height, **more))
         yield make
@@ -36,14 +38,22 @@ def new_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenBrowse
     yield from _opener(tmp_path_factory)
 
 
+@pytest.fixture(scope='session')
+def only_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Open the one browser that tests use one after the other: a start takes two seconds."""
+    for open_another in _opener(tmp_path_factory):
+        yield open_another()
+
+
 @pytest.fixture
-def browser(new_browser: OpenBrowser) -> Browser:
-    """Open one browser of 1280x720."""
-    return new_browser()
+def browser(only_browser: Browser) -> Browser:
+    """Give a browser of 1280x720 as if it had just been opened."""
+    only_browser.renew()
+    return only_browser
 
 
 @pytest.fixture(scope='module')
-def module_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Open one browser of 1280x720 for all tests of a module."""
-    for open_another in _opener(tmp_path_factory):
-        yield open_another()
+def module_browser(only_browser: Browser) -> Browser:
+    """Give such a browser once, for all tests of a module."""
+    only_browser.renew()
+    return only_browser

@@ -23,6 +23,8 @@ from selenium.webdriver.common.keys import Keys
 
 from crgame_ros.recording.run_folder import run_folder
 
+pytestmark = pytest.mark.alone
+
 # The person stands on the lane that leads to -x, so that the heading is at the border of +-pi;
 # the AV, the leader and the pedestrian are 400 m ahead.
 GAME = f"""

@@ -23,6 +23,8 @@ from crgame_ros.recording.run_folder import run_folders
 from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.setup import build_setup
 
+pytestmark = pytest.mark.alone
+
 CUT_IN, TRAFFIC = 'ZAM_CutIn-1_1_T-1', 'ZAM_Intersection-1_1_T-1'
 SCHEMA = Path(commonroad.__file__).parent.joinpath(
     'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')

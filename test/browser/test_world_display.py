@@ -14,6 +14,8 @@ from world_support import RecordedRun, RunBackend, Served, served
 
 from crgame_ros.paths import scenarios_directory
 
+pytestmark = pytest.mark.alone
+
 # Linear interpolation over two missing samples (30 ms) at 9 m/s^2 is wrong by a t^2 / 8 = 1 mm;
 # a display that is one sample (10 ms) off is wrong by 0.2 m at the 20 m/s and more of this game.
 SAME_PLACE_M = 0.002
