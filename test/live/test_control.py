@@ -43,13 +43,18 @@ def _reset(peer: Peer) -> None:
 
 @pytest.fixture
 def peer(graph: tuple[Launcher, Peer]) -> Iterator[Peer]:
-    """Begin the game again, and leave it running at its pace."""
+    """Leave the game running at its pace."""
     peer = graph[1]
-    _reset(peer)
-    peer.wait_until(lambda: peer.n > 30, 'n = 30 of a new epoch')
     yield peer
     assert peer.call('/sim/start').success
     assert peer.set_parameter('real_time_factor', 1.0).successful
+
+
+@pytest.fixture
+def _anew(peer: Peer) -> None:
+    """Begin the game again, for tests that look at an epoch from its first step on."""
+    _reset(peer)
+    peer.wait_until(lambda: peer.n > 30, 'n = 30 of a new epoch')
 
 
 def _counts(peer: Peer) -> dict[str, int]:
@@ -58,6 +63,7 @@ def _counts(peer: Peer) -> dict[str, int]:
             if name != '/diagnostics'}
 
 
+@pytest.mark.usefixtures('_anew')
 def test_pause_freezes_everything_and_step_advances_one_tick(peer: Peer) -> None:
     """
     No time, no requests and no cycle pass in a pause; a step is N = 10 simulation steps.
@@ -92,6 +98,7 @@ def test_pause_freezes_everything_and_step_advances_one_tick(peer: Peer) -> None
     assert peer.statuses('sim_node: hv0 seat')[-1][1]['losses'] == '0'
 
 
+@pytest.mark.usefixtures('_anew')
 def test_reset_begins_a_new_epoch_and_bag(graph: tuple[Launcher, Peer], peer: Peer) -> None:
     """The clock goes on, the documents come again, n and the vehicles begin anew."""
     launcher, _ = graph
@@ -122,6 +129,7 @@ def test_reset_begins_a_new_epoch_and_bag(graph: tuple[Launcher, Peer], peer: Pe
     assert np.array_equal(cycles, peer.cycles(epoch).column('n'))
 
 
+@pytest.mark.usefixtures('_anew')
 def test_messages_of_an_earlier_epoch_are_refused(peer: Peer) -> None:
     """A plan and a command with stamps from before the reset change nothing, and are counted."""
     plan, command = peer.messages['/<av>/plan'][-1], peer.messages['/<v>/driver_command'][-1]
@@ -206,6 +214,7 @@ def test_files_outside_the_directories_are_refused(peer: Peer, name: str) -> Non
     assert name in result.reason
 
 
+@pytest.mark.usefixtures('_anew')
 def test_malformed_scenario_leaves_the_present_game(graph: tuple[Launcher, Peer],
                                                     peer: Peer) -> None:
     """It is named with an error, and the game that ran begins again."""

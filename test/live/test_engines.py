@@ -25,6 +25,8 @@ from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.simulation.world_reader import WorldReader
 from crgame_ros.vehicle.state import VehicleState
 
+pytestmark = pytest.mark.alone
+
 AGENTS = 12
 DURATION_S = 6.0
 STEPS_PER_TICK = 10

@@ -26,6 +26,8 @@ from crgame_ros.simulation.replay import recorded_inputs
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.state import VehicleState
 
+pytestmark = pytest.mark.alone
+
 # Long enough for the throttle (0 to 0.6 s) and the first steering (4.0 to 4.4 s) of the script.
 DURATION_S, STEPS = 4.6, 460
 STEP_NS = 10_000_000

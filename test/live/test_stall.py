@@ -8,9 +8,12 @@ import time
 from commonroad.common.reader.file_reader_xml import XMLFileReader
 from live_support import Launcher
 import numpy as np
+import pytest
 from steady_game import write_steady_game
 
 from crgame_ros.recording.run_log import read_cycles
+
+pytestmark = pytest.mark.alone
 
 # Beyond what machines stall by themselves, below the threshold of a drift reset [s].
 STALL_S = 0.11
