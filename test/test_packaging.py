@@ -67,8 +67,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def prefix(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Install the wheel into a prefix of its own."""
     target = tmp_path_factory.mktemp('prefix')
-    _pip('install', '--no-deps', '--ignore-installed', '--no-warn-script-location', '--prefix',
-         str(target), str(wheel))
+    _pip('install', '--no-deps', '--ignore-installed', '--no-warn-script-location', '--no-compile',
+         '--prefix', str(target), str(wheel))
     return target
 
 

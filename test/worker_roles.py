@@ -14,14 +14,14 @@ from xdist.workermanage import WorkerController
 
 from crgame_ros.ros.environment import free_domain_id
 
-# Of tests that speak with running graphs.
-REAL_TIME_FOLDERS = ('live', 'browser', 'ros')
+# Of tests that keep to the clock: they speak with running graphs and servers.
+REAL_TIME_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
 # The group of those that no other graph may run beside: they assert what clocks show.
 ALONE = 'alone'
 GRAPH_WORKERS = 2
 MAX_WORKERS = 4
-# Under a graph that wants the processor a worker that computes gets a tenth of it.
-COMPUTING_NICENESS = 10
+# Beside a graph that wants the processor a worker that computes gets a thirtieth of it.
+COMPUTING_NICENESS = 15
 _NAME = os.environ.get('PYTEST_XDIST_WORKER', 'gw0')
 
 
@@ -38,16 +38,18 @@ def own_domain_id() -> int:
 
 def group_of(item: pytest.Item, folder: Path) -> str:
     """
-    Name the group of a test: its file, or those that are alone.
+    Name the group of a test: those that are alone, what its file says it shares, or its file.
 
     :param folder: of all tests.
     """
-    alone = item.get_closest_marker(ALONE) is not None
-    return ALONE if alone else str(item.path.relative_to(folder).with_suffix(''))
+    if item.get_closest_marker(ALONE) is not None:
+        return ALONE
+    shared = item.get_closest_marker('xdist_group')
+    return shared.args[0] if shared else str(item.path.relative_to(folder).with_suffix(''))
 
 
 def keeps_to_the_clock(group: str) -> bool:
-    """Tell whether the tests of a group speak with running graphs."""
+    """Tell whether the tests of a group speak with running graphs or servers."""
     return group == ALONE or group.partition('/')[0] in REAL_TIME_FOLDERS
 
 

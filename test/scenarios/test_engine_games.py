@@ -25,6 +25,9 @@ from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 
+# They share the games that are played as they are.
+pytestmark = pytest.mark.xdist_group('scenarios/games')
+
 NAMES = ('occluded_pedestrian', 'dense_merge', 'blocked_lane', 'fog')
 GAMES = [pytest.param(name, id=name) for name in NAMES]
 # Least loss of speed that the human brings about [m/s], and bounds of the distance to him [m].

@@ -22,6 +22,9 @@ import shapely
 
 from crgame_ros.simulation.offline import OfflineResult
 
+# They share the games that are played as they are.
+pytestmark = pytest.mark.xdist_group('scenarios/games')
+
 
 def _perfect(values: dict[str, Any]) -> None:
     del values['avs'][0]['perception']

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every published scenario runs ten seconds with our planner and with the reactive one."""
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.simulation.offline import run_offline
-from crgame_ros.simulation.setup import build_setup
+from crgame_ros.simulation.setup import build_setup, Setup
 
 NAMES = (
     'DEU_Flensburg-10_1_T-1', 'DEU_Guetersloh-36_1_T-1', 'DEU_Test-1_1_T-1', 'FRA_Anglet-1_1_T-1',
@@ -22,11 +23,16 @@ DURATION_S = 10.0
 WANTED = {'idm': 0.95, 'reactive': 0.8}
 
 
+@functools.cache
+def _setup(path: Path) -> Setup:
+    """Load a scenario once for all planners."""
+    return build_setup(effective_game(RunRequest(scenario=path, driver='idle')))
+
+
 @pytest.mark.parametrize('planner', ['idm', 'reactive'])
 @pytest.mark.parametrize('name', NAMES)
 def test_runs_ten_seconds(name: str, planner: str, shared_scenarios: Path) -> None:
-    request = RunRequest(scenario=shared_scenarios / f'{name}.xml', driver='idle')
-    setup = with_planners(build_setup(effective_game(request)), (planner,))
+    setup = with_planners(_setup(shared_scenarios / f'{name}.xml'), (planner,))
     result = run_offline(setup, duration_s=DURATION_S)
     assert np.isfinite(result.vehicle_states).all()
     assert len(result.vehicle_states) == round(DURATION_S / setup.scheduler.dt_s) + 1

@@ -19,10 +19,14 @@ from engine_games_support import (
     without_human,
 )
 import numpy as np
+import pytest
 import shapely
 
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.offline import OfflineResult
+
+# They share the games that are played as they are.
+pytestmark = pytest.mark.xdist_group('scenarios/games')
 
 # When the human, who has merged, brakes in a test [s].
 BRAKES_S = 15.0

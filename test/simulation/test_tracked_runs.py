@@ -45,12 +45,18 @@ def errors_to(truth: OfflineResult, other: OfflineResult) -> NDArray[np.float64]
     return np.array([np.hypot(*(path - point).T).min() for point in points])
 
 
+@pytest.fixture(scope='module')
+def perfect() -> OfflineResult:
+    """Run the winding street with an AV that is where its plans have it."""
+    return run_offline(tracked('parked_cars', execution='perfect'))
+
+
 @pytest.mark.parametrize('tracker', ['lqr', 'pure-pursuit'])
 @pytest.mark.parametrize('dynamics', ['dynamic-bicycle', 'ks'])
-def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str) -> None:
+def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str,
+                                         perfect: OfflineResult) -> None:
     """In a winding street every plan is accepted, and the wheels stay within 0.2 m of the path."""
     result = run_offline(tracked('parked_cars', tracker=tracker, dynamics=dynamics))
-    perfect = run_offline(tracked('parked_cars', execution='perfect'))
     record = result.planners['av0']
     assert record.counters.refused == record.counters.steps_without_plan == 0
     assert record.tracking is not None and perfect.planners['av0'].tracking is None
