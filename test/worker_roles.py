@@ -20,8 +20,8 @@ REAL_TIME_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
 ALONE = 'alone'
 GRAPH_WORKERS = 2
 MAX_WORKERS = 4
-# Beside a graph that wants the processor a worker that computes gets a thirtieth of it.
-COMPUTING_NICENESS = 15
+# Beside a graph that wants the processor a worker that computes gets a tenth of it.
+COMPUTING_NICENESS = 10
 _NAME = os.environ.get('PYTEST_XDIST_WORKER', 'gw0')
 
 
