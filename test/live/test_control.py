@@ -15,6 +15,8 @@ from crgame_ros.recording.run_folder import bags_of, run_folder, run_folders
 from crgame_ros.recording.run_log import read_cycles
 from crgame_ros.ros.messages import from_time, to_time
 
+pytestmark = pytest.mark.alone
+
 STEPS_PER_TICK = 10
 TOPICS = ('/clock', '/scenario/game', '/scenario/xml', '/scenario/objects', '/seats',
           '/timing/cycle', '/vehicles/state', '/diagnostics', ('/<v>/driver_command', 'hv0'),
