@@ -9,7 +9,7 @@ from pathlib import Path
 import signal
 import socket
 import time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 import urllib.request
 
@@ -96,16 +96,17 @@ def test_frames_carry_the_published_poses(graph: Graph, page: PageClient) -> Non
 def test_plan_frames_are_the_plans(graph: Graph, page: PageClient) -> None:
     """Same rear-axle poses as on /av0/plan, with the time after the request."""
     graph.peer.forget()
-    graph.peer.wait_until(lambda: page.newest(PLAN) is not None
-                          and len(graph.peer.messages['/<av>/plan']) > 3, 'plans')
-    frame = page.newest(PLAN)
-    assert frame is not None
     game = graph.peer.games[-1]
-    graph.peer.wait_until(lambda: any(
-        game.scheduler.step_of_stamp(from_time(m.header.stamp)) == frame[2]
-        for m in graph.peer.messages['/<av>/plan']), 'the same plan')
-    plan = next(m for m in graph.peer.messages['/<av>/plan']
-                if game.scheduler.step_of_stamp(from_time(m.header.stamp)) == frame[2])
+
+    def pairs() -> list[tuple[np.ndarray, Any]]:
+        """Join the page's newest frame with the plan of its step: one may come late."""
+        frame = page.newest(PLAN)
+        return [] if frame is None else [
+            (frame, m) for m in graph.peer.messages['/<av>/plan']
+            if game.scheduler.step_of_stamp(from_time(m.header.stamp)) == frame[2]]
+    found: list[tuple[np.ndarray, Any]] = []
+    graph.peer.wait_until(lambda: found.extend(pairs()) or found, 'a plan and its frame')
+    frame, plan = found[0]
     rows = frame[7:].reshape(-1, 5)
     assert np.array_equal(rows[:, :3], [list(point.positions[:3]) for point in plan.points])
     assert rows[:, 4] == pytest.approx(0.1 * np.arange(len(rows)))
