@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.scenario.checked_values import build, named_file, short
+from crgame_ros.scenario.checked_values import BOUNDS, build, named_file, short
 from crgame_ros.scenario.events import (
     Action,
     ACTIONS,
@@ -22,11 +22,14 @@ from crgame_ros.scenario.events import (
     PlannerSwap,
     PutObstacle,
     SpeedLimit,
+    TrafficChange,
 )
+from crgame_ros.traffic.spec import BOUNDS as TRAFFIC_BOUNDS
 
 MAX_EVENTS = 100
 _NAME = re.compile(r'[a-z0-9_-]{1,40}')
 _MAX_LABEL = 80
+_BOUNDS = BOUNDS | TRAFFIC_BOUNDS | {'desired_speed': (0.0, 100.0)}
 
 
 def parse_events(values: Any, where: str, base: Path) -> tuple[EventSpec, ...]:
@@ -81,7 +84,7 @@ def _action(kind: str, values: Any, where: str, base: Path) -> Action:
     table = _with_tuples(values, where)
     if kind == 'planner' and isinstance(table.get('planner'), str):
         table['planner'] = named_file(table['planner'], base)
-    action = build(ACTIONS[kind], table, where)
+    action = build(ACTIONS[kind], table, where, _BOUNDS)
     if isinstance(action, Brake):
         _positive(where, deceleration=action.deceleration)
         if action.speed < 0.0:
@@ -90,9 +93,19 @@ def _action(kind: str, values: Any, where: str, base: Path) -> Action:
         _positive(where, length=action.length, width=action.width)
     elif isinstance(action, SpeedLimit):
         _positive(where, speed=action.speed)
+    elif isinstance(action, TrafficChange):
+        _check_change(action, where)
     elif isinstance(action, PlannerSwap) and not action.planner:
         raise InputError('"planner" is empty', where, 'name a planner')
     return action
+
+
+def _check_change(change: TrafficChange, where: str) -> None:
+    """Refuse to change nothing, and one thing twice."""
+    if change == TrafficChange(change.agent):
+        raise InputError('changes nothing', where, 'give what is to change, such as speed_factor')
+    if change.speed_factor is not None and change.desired_speed is not None:
+        raise InputError('has both "speed_factor" and "desired_speed"', where, 'give one of them')
 
 
 def _condition(values: Any, where: str) -> Condition:
@@ -167,4 +180,4 @@ def parse_document_entries(entries: Any, where: str) -> tuple[EventSpec, ...]:
 
 def _plain(spec: Action | Condition) -> dict[str, Any]:
     return {key: list(value) if isinstance(value, tuple) else value
-            for key, value in asdict(spec).items()}
+            for key, value in asdict(spec).items() if value is not None}

@@ -5,6 +5,8 @@
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+# Names every agent of traffic.
+ALL_AGENTS = 'all'
 PutType = Literal['constructionZone', 'parkedVehicle', 'roadBoundary', 'unknown']
 
 
@@ -80,6 +82,35 @@ class PlannerRun:
 
 
 @dataclass(frozen=True)
+class TrafficChange:
+    """
+    Let one agent of traffic, or all of them, drive otherwise; None leaves things as they are.
+
+    :param agent: id of the agent, or `all`: whoever comes later included.
+    :param speed_factor: desired speed over speed limit; of all, its mean.
+    :param desired_speed: whatever the limit, instead [m/s]
+    :param options: of the car-following model, besides those that it has.
+    :param politeness: weight of others' loss when changing lanes for speed (MOBIL).
+    :param lane_changes: whether it changes lanes.
+    :param reaction_time: after which it does what it has decided [s]
+    :param imperfection: random share of its greatest acceleration by which it fails to do so.
+    :param red_runner: whether it ignores traffic lights.
+    :param late_yielder: whether it sees late that it has to yield.
+    """
+
+    agent: str
+    speed_factor: float | None = None
+    desired_speed: float | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+    politeness: float | None = None
+    lane_changes: bool | None = None
+    reaction_time: float | None = None
+    imperfection: float | None = None
+    red_runner: bool | None = None
+    late_yielder: bool | None = None
+
+
+@dataclass(frozen=True)
 class AtTime:
     """From a time since the start of the run on [s]."""
 
@@ -111,13 +142,16 @@ class Between:
     distance: float
 
 
-Action = Release | Brake | PutObstacle | SpeedLimit | PlanDisplay | PlannerSwap | PlannerRun
+# What agents of traffic do otherwise from then on.
+TrafficOrder = SpeedLimit | TrafficChange
+Action = Release | Brake | PutObstacle | TrafficOrder | PlanDisplay | PlannerSwap | PlannerRun
 Condition = AtTime | AtStep | Near | Between
 
 # The key of each action in a game file, which is its kind everywhere else.
 ACTIONS: dict[str, type[Action]] = {
     'release': Release, 'brake': Brake, 'obstacle': PutObstacle, 'speed_limit': SpeedLimit,
-    'plan_display': PlanDisplay, 'planner': PlannerSwap, 'planner_run': PlannerRun}
+    'traffic': TrafficChange, 'plan_display': PlanDisplay, 'planner': PlannerSwap,
+    'planner_run': PlannerRun}
 # The key by which each condition is known.
 CONDITIONS: dict[str, type[Condition]] = {
     'time': AtTime, 'step': AtStep, 'vehicle': Near, 'between': Between}

@@ -50,6 +50,8 @@ class AgentTable:
     :param leader: who is next ahead, -1 - n for the n-th of the others, or `FREE`.
     :param blocker: the agent that it waits for, -1 - n for the n-th of the others, or `FREE`.
     :param insists_until: tick until which it goes first, having been found in a circle.
+    :param late: whether it sees late that it has to yield; sees: whether it has, at the junction
+        that comes next.
     """
 
     length: FloatArray
@@ -89,6 +91,8 @@ class AgentTable:
     leader: IntArray
     blocker: IntArray
     insists_until: IntArray
+    late: BoolArray
+    sees: BoolArray
 
 
 def empty_table(count: int) -> AgentTable:
@@ -107,7 +111,8 @@ class Agents(AgentTable):
 
     :param descriptions: what each looks like.
 
-    The columns of `table` are attributes.
+    The columns of `table` are attributes, and so are `type_top` (A), the first `top`, and `share`
+    (A), the desired speed over that of an average driver.
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription]) -> None:
@@ -120,6 +125,8 @@ class Agents(AgentTable):
         self.wheelbase[:] = WHEELBASE * self.length
         self.rear_to_center[:] = REAR_TO_CENTER * self.length
         self.top[:] = [TOP_SPEED.get(x.type, np.inf) for x in descriptions]
+        self.type_top: FloatArray = self.top.copy()
+        self.share: FloatArray = np.ones(self.count)
         self.factor[:] = 1.0
         for name in ('source', 'grant', 'until', 'previous'):
             getattr(self, name)[:] = NOBODY
@@ -154,7 +161,7 @@ class Agents(AgentTable):
         self.yaw[slot], self.speed[slot] = pose[2], speed
         self.lane[slot], self.s[slot], self.d[slot] = lane, s, d
         for zero in (self.acceleration, self.steering, self.yaw_rate, self.relief, self.waits,
-                     self.calm_until):
+                     self.calm_until, self.sees):
             zero[slot] = 0
         self.content_until[slot] = self.insists_until[slot] = 0
         self.leader[slot] = self.blocker[slot] = FREE

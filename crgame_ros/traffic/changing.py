@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import Agents, NOBODY
-from crgame_ros.traffic.car_following import CarFollowing
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.courtesy import CourtesyRules, relief_at_change
+from crgame_ros.traffic.drivers import Drivers
+from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.lane_change import (
     CHANGE_THRESHOLD,
     GapAcceptance,
@@ -89,18 +90,17 @@ class LaneChanges:
     :param graph: the lanes.
     :param routes: where agents go.
     :param conflicts: of the lanes.
-    :param model: of car following.
-    :param politeness: weight of others' loss (MOBIL).
+    :param followers: their car-following models.
+    :param drivers: who change lanes, and how politely (MOBIL).
     :param cooperative: whether others make room.
     :param time_step_s: Delta t_c [s]
     """
 
     def __init__(self, graph: LaneGraph, routes: Routes, conflicts: Conflicts,
-                 model: CarFollowing, politeness: float, cooperative: bool,
+                 followers: Followers, drivers: Drivers, cooperative: bool,
                  time_step_s: float) -> None:
         self._graph, self._routes, self._conflicts = graph, routes, conflicts
-        self._model = model
-        self._politeness = politeness
+        self._followers, self._drivers = followers, drivers
         self._cooperative = cooperative
         self._calm = max(1, round(CALM / time_step_s))
         self._content = round(CONTENT / time_step_s)
@@ -175,7 +175,8 @@ class LaneChanges:
         remaining = routes.remaining[destination, lane] - agents.s[slots]
         stuck = blocked < PREPARE
         hurry = urgency(np.minimum(remaining, blocked), agents.speed[slots])
-        free = (agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k) & (
+        free = self._drivers.change_lanes[slots] & (
+            agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k) & (
             blocked > TOO_NEAR) & ((agents.speed[slots] > SLOWEST) | (gap > OUT_OF_QUEUE)
                                    | np.isfinite(blocked))
         wide = (agents.width[slots] > NARROW).astype(np.int64)
@@ -213,22 +214,22 @@ class LaneChanges:
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
                acceleration: FloatArray, limit: FloatArray) -> tuple[BoolArray, FloatArray]:
         """Tell whose gap is safe, and what each gains by changing (MOBIL) [m/s^2]."""
-        model, beside = self._model, wish.beside
+        followers, beside = self._followers, wish.beside
         speed = agents.speed[wish.slots]
-        there = model.acceleration(speed, desired[wish.slots], beside.lead_gap,
-                                   beside.lead_speed)
+        there = followers.of(wish.slots).acceleration(
+            speed, desired[wish.slots], beside.lead_gap, beside.lead_speed)
         known = beside.follower >= 0
         follower = np.maximum(beside.follower, 0)
         wanted = np.where(known, desired[follower], beside.follow_speed)
-        follow = model.acceleration(np.maximum(beside.follow_speed, 0.0), wanted,
-                                    beside.follow_gap, speed)
+        follow = followers.of(beside.follower).acceleration(
+            np.maximum(beside.follow_speed, 0.0), wanted, beside.follow_gap, speed)
         hurry = np.maximum(wish.urgency, 0.0)
         ok = self._gaps.accepts(speed, beside.lead_gap, beside.lead_speed, beside.follow_gap,
                                 beside.follow_speed, there, follow, hurry)
         loss = np.where(known, follow - acceleration[follower], np.minimum(follow, 0.0))
         loss = np.where(np.isinf(beside.follow_gap), 0.0, loss)
         gain = incentive(acceleration[wish.slots], np.minimum(there, limit[wish.slots]), loss,
-                         self._politeness)
+                         self._drivers.politeness[wish.slots])
         return np.asarray(ok & (np.abs(beside.turn) < 0.3)), np.asarray(gain)
 
     def _begin(self, k: int, agents: Agents, wish: Wish, chosen: BoolArray,
@@ -278,7 +279,7 @@ class LaneChanges:
     def _relieve(self, agents: Agents, slot: int, gap: float, speed: float) -> None:
         """Let a driver open a gap that a change has shortened without haste (Hidas 2005)."""
         if self._cooperative and np.isfinite(gap):
-            wanted = self._model.desired_gap(np.array([speed]))
+            wanted = self._followers.of(np.array([slot])).desired_gap(np.array([speed]))
             agents.relief[slot] = max(agents.relief[slot], float(
                 relief_at_change(np.array([gap]), wanted)[0]))
 

@@ -88,6 +88,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
            at: Situation) -> FloatArray:
     slots, count = at.slots, len(at.slots)
     _release(agents, slots, way, dt_s)
+    _look(rules, agents, slots, passage, dt_s)
     stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     halt = np.full(count, math.inf)
     for i in range(count):
@@ -115,7 +116,8 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
     for i, slot in enumerate(slots):
         if agents.grant[slot] >= 0:
             halt[i] = min(halt[i], _inside_halt(k, agents, passage, meeting, at, i))
-        if passage.first[i] >= 0 and _is_near(agents.speed[slot], passage.hold[i]):
+        if passage.first[i] >= 0 and _is_near(agents.speed[slot], passage.hold[i]) and (
+                stopped[i] or full[i] or _heeds(agents, slot)):
             halt[i] = min(halt[i], passage.hold[i])
     return halt
 
@@ -150,7 +152,24 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
         for step in range(way.depth[i]):
             ahead |= way.lane[i, step] == agents.until[slot]
         if not ahead or agents.grant_left[slot] < -PASSED:
-            agents.grant[slot] = NOBODY
+            agents.grant[slot], agents.sees[slot] = NOBODY, False
+
+
+@compiled
+def _look(rules: CrossingRules, agents: AgentTable, slots: IntArray, passage: Passages,
+          dt_s: float) -> None:
+    """Let those who yield late see a junction at the last tick at which hard braking is enough."""
+    for i, slot in enumerate(slots):
+        hold = agents.grant_hold[slot] if agents.grant[slot] >= 0 else passage.hold[i]
+        speed = agents.speed[slot]
+        if agents.late[slot] and speed**2 > 2.0 * rules.late * (hold - speed * dt_s):
+            agents.sees[slot] = True
+
+
+@compiled
+def _heeds(agents: AgentTable, slot: int) -> bool:
+    """Tell whether an agent yields to whom it has to: late ones do not before they see it."""
+    return bool(agents.sees[slot] or not agents.late[slot])
 
 
 @compiled
@@ -165,13 +184,14 @@ def _in_turn(k: int, agents: AgentTable, slots: IntArray) -> IntArray:
 @compiled
 def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
                passage: Passages, meeting: Meetings, at: Situation, i: int) -> bool:
-    """Tell whether an agent gives up its right to enter, while that is easy."""
+    """Tell whether an agent gives up its right to enter, while that is easy, or late."""
     slot = at.slots[i]
     speed, hold = agents.speed[slot], agents.grant_hold[slot]
-    if hold <= 0.0 or speed**2 > 2.0 * rules.withdrawal * hold:
-        return False
-    if min(at.light[i], at.queued[i]) < hold + 2.0:
+    easy = speed**2 <= 2.0 * rules.withdrawal * hold
+    if hold > 0.0 and easy and min(at.light[i], at.queued[i]) < hold + 2.0:
         return True
+    if hold <= 0.0 or not (agents.sees[slot] if agents.late[slot] else easy):
+        return False
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         if meeting.who[n] < 0 and meeting.step[n] <= passage.granted[i] and _yields(
                 ticks, k, agents, meeting, at, i, n):

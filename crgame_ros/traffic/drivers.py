@@ -5,9 +5,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from crgame_ros.scenario.events import TrafficChange
 from crgame_ros.traffic.agents import Agents
+from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.spec import TrafficSpec
+from crgame_ros.traffic.spec import BOUNDS, TrafficSpec
 
 # [m/s]
 WALKING = 2.0
@@ -15,37 +17,67 @@ WALKING = 2.0
 
 class Drivers:
     """
-    The failings of the agents' drivers (A); without any nothing is drawn at random.
+    The habits and failings of the agents' drivers (A); without any nothing is drawn at random.
 
-    :param spec: reaction time, imperfection and share of those who ignore lights.
-    :param count: of the agents.
-    :param max_acceleration: [m/s^2]
+    :param spec: of those that begin.
+    :param agents: whose `late` is set.
+    :param followers: their car-following models.
     :param time_step_s: Delta t_c [s]
     :param generator: of random numbers.
 
-    Attribute `run_lights` (A): who ignores traffic lights.
+    Attributes (A): `run_lights`: who ignores traffic lights; `politeness`; `change_lanes`.
     """
 
-    def __init__(self, spec: TrafficSpec, count: int, max_acceleration: float,
+    def __init__(self, spec: TrafficSpec, agents: Agents, followers: Followers,
                  time_step_s: float, generator: np.random.Generator) -> None:
-        self._failure = spec.imperfection * max_acceleration
-        self._random = generator
-        self.run_lights: NDArray[np.bool_] = (
-            generator.random(count) < spec.red_runners if spec.red_runners > 0.0
-            else np.zeros(count, dtype=bool))
+        count = agents.count
+        self._agents, self._followers = agents, followers
+        self._random, self._time_step_s = generator, time_step_s
+        self.politeness = np.full(count, spec.politeness)
+        self.change_lanes = np.full(count, spec.lane_changes)
+        self.run_lights = self._some(spec.red_runners)
+        agents.late[:] = self._some(spec.late_yielders)
+        self._imperfection = np.full(count, spec.imperfection)
+        self._delay = np.full(count, self._ticks(spec.reaction_time))
         # What was decided at the last ticks; NaN for those who were not there.
-        self._decided = np.full((round(spec.reaction_time / time_step_s), count), np.nan)
+        self._decided = np.full((self._ticks(BOUNDS['reaction_time'][1]) + 1, count), np.nan)
+        self._last_k = -2**62
+
+    def _some(self, share: float) -> NDArray[np.bool_]:
+        """Choose a share of the drivers (A)."""
+        count = self._agents.count
+        return self._random.random(count) < share if share > 0.0 else np.zeros(count, dtype=bool)
+
+    def _ticks(self, seconds: float) -> int:
+        return round(seconds / self._time_step_s)
+
+    def change(self, change: TrafficChange, slots: IntArray) -> None:
+        """Let drivers drive otherwise from their next decision on, but for desired speeds."""
+        for values, value in (
+                (self.politeness, change.politeness), (self.change_lanes, change.lane_changes),
+                (self.run_lights, change.red_runner), (self._agents.late, change.late_yielder),
+                (self._imperfection, change.imperfection)):
+            if value is not None:
+                values[slots] = value
+        if change.reaction_time is not None:
+            self._delay[slots] = self._ticks(change.reaction_time)
+        if change.options:
+            self._followers.change(slots, change.options)
 
     def do(self, k: int, agents: Agents, slots: IntArray, wanted: FloatArray) -> FloatArray:
         """Give the accelerations (A) that come of those that are wanted (A) [m/s^2]."""
-        if self._failure > 0.0:
-            wanted = wanted - self._failure * self._random.random(len(slots)) * (
+        if self._imperfection.any():
+            failure = self._imperfection[slots] * self._followers.max_acceleration[slots]
+            wanted = wanted - failure * self._random.random(len(slots)) * (
                 agents.speed[slots] > 0.0)
-        if len(self._decided):
-            row = self._decided[k % len(self._decided)]
-            before = row[slots]
-            row[:] = np.nan
-            row[slots] = wanted
+        if self._delay.any():
+            if k != self._last_k + 1:
+                self._decided[:] = np.nan
+            self._last_k = k
+            decided, size = self._decided, len(self._decided)
+            decided[k % size] = np.nan
+            decided[k % size, slots] = wanted
+            before = decided[(k - self._delay[slots]) % size, slots]
             # At walking pace the foot is on the brake.
             ready = np.isnan(before) | ((agents.speed[slots] < WALKING) & (wanted < before))
             wanted = np.where(ready, wanted, before)

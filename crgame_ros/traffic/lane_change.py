@@ -153,14 +153,14 @@ class GapAcceptance:
 
 
 def incentive(here: Array, there: Array, others: Array | float = 0.0,
-              politeness: float = 0.2) -> Array:
+              politeness: Array | float = 0.2) -> Array:
     """
     Give the advantage of a free change: MOBIL (Kesting, Treiber and Helbing 2007).
 
     :param here: (A,) acceleration in the present lane, behind its slow leader [m/s^2]
     :param there: (A,) acceleration in the target lane [m/s^2]
     :param others: (A,) sum of the changes of acceleration of the old and the new follower [m/s^2]
-    :param politeness: their weight
+    :param politeness: (A,) their weight
     :return: (A,) [m/s^2]; a change pays above `CHANGE_THRESHOLD`.
     """
     return there - here + politeness * others

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from crgame_ros.traffic.agents import Agents, AgentTable
-from crgame_ros.traffic.car_following import CarFollowing
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.encounters import FIRMEST, moderate
+from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row
 from crgame_ros.traffic.leaders import least, Pairs, Ways
@@ -141,13 +141,13 @@ class Longitudinal:
 
     :param graph: the lanes.
     :param routes: where agents go.
-    :param model: of car following.
+    :param followers: their car-following models.
     """
 
-    def __init__(self, graph: LaneGraph, routes: Routes, model: CarFollowing) -> None:
+    def __init__(self, graph: LaneGraph, routes: Routes, followers: Followers) -> None:
         self._graph = graph
         self._following = routes.next
-        self._model = model
+        self._followers = followers
         self._envelope = _envelope(graph.table, graph.curve_speed)
 
     def slow_for(self, speed: FloatArray) -> None:
@@ -178,11 +178,11 @@ class Longitudinal:
         """
         speed = agents.speed[slots]
         nobody = np.full(len(slots), np.inf)
-        free = self._model.acceleration(speed, desired, nobody, speed)
+        free = self._followers.of(slots).acceleration(speed, desired, nobody, speed)
         if not len(pairs.agent):
             return np.asarray(free)
         who, entry = pairs.agent, pairs.entry
-        wanted = self._model.acceleration(
+        wanted = self._followers.of(slots[who]).acceleration(
             speed[who], desired[who], pairs.gap, entries.speed[entry],
             agents.relief[slots[who]],
             # Who changes lanes brakes for what is in the lane that it leaves.

@@ -40,6 +40,9 @@ class CrossingRules(NamedTuple):
         down gently [s]; own choice.
     :param mercy: the same for one that crosses [s]; own choice.
     :param room: behind the junction, besides the agent's own length [m]
+    :param late: braking needed to halt before the junction, at which who yields late sees that it
+        has to; more than twice what is comfortable, little more than half of the hardest; own
+        choice [m/s^2]
     """
 
     gap_after: float = 0.7
@@ -51,6 +54,7 @@ class CrossingRules(NamedTuple):
     zipper: float = 6.0
     mercy: float = 20.0
     room: float = 1.5
+    late: float = 4.5
 
 
 class Situation(NamedTuple):

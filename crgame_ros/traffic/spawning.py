@@ -12,6 +12,7 @@ from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.traffic.adoption import Adopted, fits
 from crgame_ros.traffic.agents import Agents
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
+from crgame_ros.traffic.desired_speeds import DesiredSpeeds
 from crgame_ros.traffic.encounters import is_in_the_way
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import hold_before
@@ -69,21 +70,21 @@ class Spawner:
     :param lines: with the lights as they are.
     :param adopted: recorded obstacles; they have the first slots.
     :param flow: arrivals at each lane that begins at the edge of the map [1/h]
-    :param speed_factor: mean of desired speed over speed limit; `speed_spread` its deviation.
+    :param desired: speeds of newcomers.
     :param time_step_s: Delta t_c [s]
     :param generator: of random numbers.
     """
 
     def __init__(self, graph: LaneGraph, cells: LaneCells, routes: Routes, conflicts: Conflicts,
                  speeds: Longitudinal, lines: HaltingLines, adopted: Sequence[Adopted],
-                 flow: float, speed_factor: float, speed_spread: float, time_step_s: float,
+                 flow: float, desired: DesiredSpeeds, time_step_s: float,
                  generator: np.random.Generator) -> None:
         self._graph, self._routes, self._conflicts = graph, routes, conflicts
         self._cells = cells
         self._speeds, self._lines = speeds, lines
         self._adopted = tuple(adopted)
         self._waiting = list(range(len(adopted)))
-        self._factor, self._spread = speed_factor, speed_spread
+        self._desired = desired
         self._random = generator
         self._time_step_s = time_step_s
         begins = (graph.predecessors[:, 0] < 0) & (graph.length > 10.0) & ~routes.drops
@@ -228,7 +229,7 @@ class Spawner:
         recorded = np.hypot(found.velocities[:, 0], found.velocities[:, 1])
         fastest = float(np.nanmax(recorded)) / float(graph.limit[lane])
         self._character(agents, slot)
-        agents.factor[slot] = np.clip(fastest, 0.5, 1.5)
+        self._desired.record(agents, slot, float(np.clip(fastest, 0.5, 1.5)))
         agents.put(slot, lane, float(s[0]), float(d[0]), (pose[0], pose[1], pose[2]), speed)
         goal = self._lane_at(found.poses[-1])
         long = is_long(float(agents.length[slot]))
@@ -252,8 +253,7 @@ class Spawner:
         return slots[slots >= len(self._adopted)]
 
     def _character(self, agents: Agents, slot: int) -> None:
-        deviation = float(np.clip(self._random.standard_normal(), -2.0, 2.0))
-        agents.factor[slot] = max(0.1, self._factor * (1.0 + self._spread * deviation))
+        self._desired.draw(agents, slot)
         agents.aggressivity[slot] = self._random.random()
 
     def _speed(self, lane: int, s: float, agents: Agents, slot: int) -> float:

@@ -17,7 +17,8 @@ BOUNDS: dict[str, tuple[float, float]] = {
     'agents': (0, MAX_AGENTS), 'flow': (0.0, 3600.0), 'capacity': (0, MAX_AGENTS),
     'speed_factor': (0.1, 3.0), 'speed_spread': (0.0, 0.5), 'truck_share': (0.0, 1.0),
     'lateral_acceleration': (0.5, 6.0), 'politeness': (0.0, 1.0), 'seed': (0, 2**63 - 1),
-    'reaction_time': (0.0, 2.0), 'imperfection': (0.0, 1.0), 'red_runners': (0.0, 1.0)}
+    'reaction_time': (0.0, 2.0), 'imperfection': (0.0, 1.0), 'red_runners': (0.0, 1.0),
+    'late_yielders': (0.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ class TrafficSpec:
     :param imperfection: random share of its greatest acceleration by which a driver fails to do so
         (sigma of Krauss 1998).
     :param red_runners: share of drivers who ignore traffic lights, for tests of AVs.
+    :param late_yielders: share of drivers who see late that they have to yield, for tests of AVs.
     """
 
     recorded: Literal['replayed', 'reactive'] = 'replayed'
@@ -65,6 +67,7 @@ class TrafficSpec:
     reaction_time: float = 0.0
     imperfection: float = 0.0
     red_runners: float = 0.0
+    late_yielders: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse numbers out of bounds."""

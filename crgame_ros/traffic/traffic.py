@@ -10,18 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.scenario.events import ALL_AGENTS, TrafficChange
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.agents import Agents, FREE, NOBODY
-from crgame_ros.traffic.car_following import CAR_FOLLOWING, CarFollowing
 from crgame_ros.traffic.changing import LaneChanges, SHORTEST_CHANGE
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fade_relief, relief_at_change
 from crgame_ros.traffic.crossings import Crossings, queues
+from crgame_ros.traffic.desired_speeds import DesiredSpeeds
 from crgame_ros.traffic.drivers import Drivers
 from crgame_ros.traffic.driving_side import driving_side
 from crgame_ros.traffic.encounters import brush
+from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
 from crgame_ros.traffic.lane_cells import LaneCells
@@ -107,10 +109,8 @@ class Traffic:
                 self._graph, CAR), TAPER_COST, 0.0),
             tight_lanes(self._graph, TRUCK), side.keeps_left)
         self._lines = HaltingLines(self._graph, scenario.lanelet_network, movements)
-        self._model: CarFollowing = CAR_FOLLOWING.create(spec.model, spec.options, 'traffic')
-        self._longitudinal = Longitudinal(self._graph, self._routes, self._model)
-        self._changes = LaneChanges(self._graph, self._routes, self._conflicts, self._model,
-                                    spec.politeness, spec.cooperative, time_step_s)
+        self._followers = Followers(spec.model, spec.options, len(adopted) + self._capacity())
+        self._longitudinal = Longitudinal(self._graph, self._routes, self._followers)
         self._crossings = Crossings(self._conflicts, CrossingRules(), time_step_s)
         self._swerving = Swerving(self._graph, self._routes, spec.lateral_acceleration,
                                   keeps_left=side.keeps_left)
@@ -120,16 +120,17 @@ class Traffic:
         # Agents taken off the road because they stood in a circle that nobody could open.
         self.taken_off = 0
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
+        self._desired = DesiredSpeeds(spec.speed_factor, spec.speed_spread, self._random)
         self._spawner = Spawner(
             self._graph, self._cells, self._routes, self._conflicts, self._longitudinal,
-            self._lines, adopted, spec.flow, spec.speed_factor, spec.speed_spread, time_step_s,
-            self._random)
+            self._lines, adopted, spec.flow, self._desired, time_step_s, self._random)
         self.descriptions: tuple[ObjectDescription, ...] = (
             *(replace(x.description, role=Role.TRAFFIC) for x in adopted),
             *slot_descriptions(self._capacity(), spec.truck_share, self._random))
         self._agents = Agents(self.descriptions)
-        self._drivers = Drivers(spec, len(self.descriptions), self._model.max_acceleration,
-                                time_step_s, self._random)
+        self._drivers = Drivers(spec, self._agents, self._followers, time_step_s, self._random)
+        self._changes = LaneChanges(self._graph, self._routes, self._conflicts, self._followers,
+                                    self._drivers, spec.cooperative, time_step_s)
         self._others = Others(others, time_step_s)
         if world is None:
             nowhere = np.full((len(others), 3), np.nan)
@@ -171,6 +172,12 @@ class Traffic:
         """Take over the speed limits of roads that differ from those so far in these alone."""
         self._graph.read_speed_limits(network)
 
+    def change(self, change: TrafficChange) -> None:
+        """Let agents drive otherwise from the next decision on, as an event says."""
+        slots = np.flatnonzero([change.agent in (ALL_AGENTS, x.id) for x in self.descriptions])
+        self._drivers.change(change, slots)
+        self._desired.change(change, self._agents, slots)
+
     def advance(self, others: WorldView) -> None:
         """
         Decide on the world at k and move on to k + 1.
@@ -201,7 +208,7 @@ class Traffic:
     def _decide(self, k: int, slots: IntArray, entries: Entries,
                 standing: NDArray[np.bool_]) -> FloatArray:
         """Give the accelerations (A) of the agents; begin lane changes, enter junctions."""
-        agents, model, long = self._agents, self._model, self._longitudinal
+        agents, long = self._agents, self._longitudinal
         speed = agents.speed[slots]
         way, corridor, pairs = self._look_ahead(slots, entries)
         desired, limit = long.speeds(way, agents, slots)
@@ -219,13 +226,13 @@ class Traffic:
         end = self._lane_ends(way, agents.length[slots])
         for distance, braking in ((halt, AT_LINE), (end, AT_END)):
             acceleration = np.minimum(acceleration, halts_before(speed, distance, braking))
-        if self._spec.lane_changes:
+        if self._drivers.change_lanes.any():
             acceleration = np.minimum(acceleration, self._changes.decide(
                 k, agents, slots, desired, limit, acceleration, gap, blocked, standing, entries,
                 way, halt < self._changes.no_change(speed)))
         acceleration = smoothed(agents.acceleration[slots], acceleration, speed,
                                 self._time_step_s)
-        acceleration = np.maximum(acceleration, -model.max_deceleration)
+        acceleration = np.maximum(acceleration, -self._followers.usual.max_deceleration)
         acceleration = self._drivers.do(k, agents, slots, acceleration)
         stands = (speed < STANDING) & (acceleration < 0.5)
         agents.waits[slots] = np.where(stands, agents.waits[slots] + 1, 0)
@@ -266,10 +273,9 @@ class Traffic:
 
     def _follow(self, slots: IntArray, pairs: Pairs, entries: Entries) -> FloatArray:
         """Note who is next ahead, and how much nearer than usual; give the gaps (A) to it."""
-        agents, model = self._agents, self._model
-        speed = agents.speed[slots]
+        agents, speed = self._agents, self._agents.speed[slots]
         gap, leader = nearest(pairs, entries.owner, len(slots))
-        usual = model.desired_gap(speed)
+        usual = self._followers.of(slots).desired_gap(speed)
         relief = np.where(np.isinf(gap), 0.0, fade_relief(
             agents.relief[slots], gap, usual, self._time_step_s))
         if self._spec.cooperative:
@@ -332,7 +338,7 @@ class Traffic:
         agents, graph = self._agents, self._graph
         lane = agents.lane[slots]
         can = ((graph.left[lane] >= 0) | (graph.right[lane] >= 0)) & (
-            agents.source[slots] == NOBODY) & self._spec.lane_changes
+            agents.source[slots] == NOBODY) & self._drivers.change_lanes[slots]
         # Whoever is nearer already cannot make room any more.
         return np.where(can & (blocked > 0.5 * SWING_OUT), blocked - SWING_OUT, np.inf)
 

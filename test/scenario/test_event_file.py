@@ -29,6 +29,7 @@ from crgame_ros.scenario.events import (
     PutObstacle,
     Release,
     SpeedLimit,
+    TrafficChange,
 )
 from crgame_ros.scenario.game_file import dump_game, load_game
 
@@ -56,6 +57,12 @@ events:
   - name: silence
     planner_run: {av: av0, run: false}
     when: {step: 77}
+  - name: hurry
+    traffic: {agent: t3, speed_factor: 1.3, options: {time_gap: 0.8}, politeness: 0,
+              lane_changes: true, reaction_time: 0.5, imperfection: 0.1, red_runner: true,
+              late_yielder: false}
+  - name: crawl
+    traffic: {agent: all, desired_speed: 3}
 """
 
 
@@ -79,7 +86,10 @@ def test_every_key(tmp_path: Path) -> None:
         EventSpec('slow-everywhere', SpeedLimit(8.3), 'slow-everywhere'),
         EventSpec('blank', PlanDisplay('av0', False), 'blank'),
         EventSpec('swap', PlannerSwap('av0', f'{tmp_path}/own.py:Mine', {'v0': 9.0}), 'swap'),
-        EventSpec('silence', PlannerRun('av0', False), 'silence', AtStep(77)))
+        EventSpec('silence', PlannerRun('av0', False), 'silence', AtStep(77)),
+        EventSpec('hurry', TrafficChange('t3', 1.3, None, {'time_gap': 0.8}, 0.0, True, 0.5, 0.1,
+                                         True, False), 'hurry'),
+        EventSpec('crawl', TrafficChange('all', desired_speed=3.0), 'crawl'))
 
 
 def test_dumped_game_has_the_same_events(tmp_path: Path) -> None:
@@ -101,6 +111,8 @@ def test_document_has_the_same_events(tmp_path: Path) -> None:
                           'kind': 'release', 'when': {'time': 5.0}, 'object': 42}
     assert entries[5] == {'name': 'blank', 'label': 'blank', 'kind': 'plan_display', 'when': None,
                           'av': 'av0', 'show': False}
+    assert entries[9] == {'name': 'crawl', 'label': 'crawl', 'kind': 'traffic', 'when': None,
+                          'agent': 'all', 'desired_speed': 3.0, 'options': {}}
     assert {entry['kind'] for entry in entries} == ACTIONS.keys()
     assert parse_document_entries(entries, '/scenario/game') == events
 
@@ -130,6 +142,15 @@ def test_document_has_the_same_events(tmp_path: Path) -> None:
     ('{name: a, plan_display: {av: av0, show: 1}}', '"show" is 1; give a bool'),
     ('{name: a, planner: {av: av0, planner: ""}}', '"planner" is empty'),
     ('{name: a, planner_run: {av: av0}}', '"run" is missing'),
+    ('{name: a, traffic: {speed_factor: 1}}', '"agent" is missing'),
+    ('{name: a, traffic: {agent: 3, speed_factor: 1}}', '"agent" is 3; give a str'),
+    ('{name: a, traffic: {agent: t3}}', 'changes nothing; give what is to change'),
+    ('{name: a, traffic: {agent: t3, speed: 9}}', '"speed" is unknown; known are agent, speed_f'),
+    ('{name: a, traffic: {agent: t3, speed_factor: 9}}', '"speed_factor" is 9; give a number'),
+    ('{name: a, traffic: {agent: t3, desired_speed: -1}}', 'from 0 to 100'),
+    ('{name: a, traffic: {agent: t3, reaction_time: 2.1}}', 'from 0 to 2'),
+    ('{name: a, traffic: {agent: t3, late_yielder: 0.5}}', '"late_yielder" is 0.5; give a bool'),
+    ('{name: a, traffic: {agent: all, speed_factor: 1, desired_speed: 9}}', 'has both "speed_fac'),
     ('{name: a, release: {object: 1}, when: 5}', 'when: is no mapping'),
     ('{name: a, release: {object: 1}, when: {}}', 'has no conditions; give {time:}'),
     ('{name: a, release: {object: 1}, when: {time: 1, step: 2}}', 'has 2 conditions'),
@@ -137,7 +158,7 @@ def test_document_has_the_same_events(tmp_path: Path) -> None:
      '"radius" is 0'),
     ('{name: a, release: {object: 1}, when: {between: [hv0, hv0], distance: 1}}', 'name two ids'),
     ('{name: a, release: {object: 1}, when: {between: [hv0], distance: 1}}', 'name two ids'),
-], ids=range(30))
+], ids=range(39))
 def test_refusals_name_the_entry(text: str, message: str) -> None:
     """Each says what is wrong with which entry, and what would be right."""
     with pytest.raises(InputError, match=message) as caught:

@@ -1,11 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Drivers who react late, fail a little, or ignore lights."""
+"""Drivers who react late, fail a little, or ignore lights; and who drive otherwise when told."""
+
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import traffic_support as support
 
+from crgame_ros.scenario.events import TrafficChange
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.warm_up import crossroads, LIGHT
 from crgame_ros.traffic.world import WorldView
@@ -53,3 +59,129 @@ def test_only_who_ignores_lights_runs_a_red_one() -> None:
         # The stop line is at x = -20.
         crossed.append(bool(np.nanmax(run.series(0)[0][:, 0]) + 2.25 > -20.0))
     assert crossed == [False, True]
+
+
+def chase(spec: TrafficSpec, *changes: tuple[int, TrafficChange], ticks: int = 120,
+          seed: int = 3) -> support.Run:
+    """Let five cars follow a slow one on two lanes; changes come before the decision at a tick."""
+    two = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 900.0, adjacent_left=2,
+                              adjacent_left_same_direction=True),
+        support.straight_lane(2, 3.5, 0.0, 900.0, adjacent_right=1,
+                              adjacent_right_same_direction=True))
+    cars = [support.driving(i, [(200.0 - 30.0 * i, 0.0, 0.0), (890.0, 0.0, 0.0)],
+                            7.0 if i == 0 else 11.0 + 0.5 * i) for i in range(6)]
+    run = support.Run(two, spec, seed, (), cars)
+    for at, change in changes:
+        run.ticks(at - run.k)
+        run.traffic.change(change)
+    return run.ticks(ticks - run.k)
+
+
+def bits(run: support.Run, *numbers: int) -> bytes:
+    """Give all that was seen of some agents, of all without any."""
+    chosen = list(numbers) or list(range(len(run.descriptions)))
+    return np.array(run.poses)[:, chosen].tobytes() + np.array(run.speeds)[:, chosen].tobytes()
+
+
+@pytest.mark.parametrize(('given', 'changed'), [
+    ({'politeness': 1.0}, {'politeness': 1.0}),
+    ({'lane_changes': False}, {'lane_changes': False}),
+    ({'reaction_time': 0.6}, {'reaction_time': 0.6}),
+    ({'imperfection': 0.5}, {'imperfection': 0.5}),
+    ({'options': {'time_gap': 3.0, 'max_acceleration': 0.7}},
+     {'options': {'time_gap': 3.0, 'max_acceleration': 0.7}}),
+    ({'model': 'idm', 'options': {'comfortable_deceleration': 1.0, 'standstill_gap': 4.0}},
+     {'options': {'standstill_gap': 4.0, 'comfortable_deceleration': 1.0}}),
+], ids=lambda given: '-'.join(given))
+def test_a_change_of_all_is_as_if_the_game_said_so(given: dict[str, Any],
+                                                   changed: dict[str, Any]) -> None:
+    """Before the first decision it gives the same bits, and they are others than without it."""
+    plain = {key: value for key, value in given.items() if key == 'model'}
+    said = chase(TrafficSpec(**given))
+    told = chase(TrafficSpec(**plain), (0, TrafficChange('all', **changed)))
+    assert bits(said) == bits(told) != bits(chase(TrafficSpec(**plain)))
+
+
+def test_a_change_of_one_leaves_those_ahead_alone() -> None:
+    """Four seconds of distance instead of 1.5 s, for one who follows; back again later."""
+    alone = TrafficSpec(lane_changes=False)
+    free = chase(alone, ticks=500)
+    timid = TrafficChange('o2', options={'time_gap': 4.0})
+    told = chase(alone, (150, timid), (350, TrafficChange('o2', options={'time_gap': 1.5})),
+                 ticks=500)
+    assert bits(told, 0, 1) == bits(free, 0, 1)
+    assert np.array(told.poses)[:151].tobytes() == np.array(free.poses)[:151].tobytes()
+    speed = free.series(1)[1][340]
+    gaps = [[run.poses[k][1, 0] - run.poses[k][2, 0] - 4.5 for k in (340, 499)]
+            for run in (free, told)]
+    # s0 + T v
+    assert gaps[0] == pytest.approx([2.0 + 1.5 * speed] * 2, abs=0.3)
+    assert gaps[1] == pytest.approx([2.0 + 4.0 * speed, 2.0 + 1.5 * speed], abs=1.0)
+
+
+def test_desired_speeds_of_one_and_of_all() -> None:
+    """A speed whatever the limit; a share of it; all of them, who differ by as much as before."""
+    lane = support.roads(support.straight_lane(1, 0.0, 0.0, 3000.0))
+
+    def settled(*changes: TrafficChange) -> np.ndarray:
+        cars = [support.driving(i, [(1500.0 - 700.0 * i, 0.0, 0.0), (2990.0, 0.0, 0.0)], speed)
+                for i, speed in enumerate((9.0, 12.0))]
+        run = support.Run(lane, TrafficSpec(), 0, (), cars).ticks(20)
+        for change in changes:
+            run.traffic.change(change)
+        return run.ticks(380).speeds[-1]
+
+    limit = 13.9
+    np.testing.assert_allclose(settled(), (9.0, 12.0), atol=0.05)
+    np.testing.assert_allclose(settled(TrafficChange('o1', desired_speed=20.0)), (9.0, 20.0),
+                               atol=0.05)
+    np.testing.assert_allclose(settled(TrafficChange('o0', speed_factor=1.2)),
+                               (1.2 * limit, 12.0), atol=0.05)
+    every = TrafficChange('all', speed_factor=1.5)
+    np.testing.assert_allclose(settled(every), (13.5, 18.0), atol=0.05)
+    # The last word counts, and of all it counts for everybody.
+    np.testing.assert_allclose(settled(TrafficChange('o1', desired_speed=3.0), every),
+                               (13.5, 18.0), atol=0.05)
+    np.testing.assert_allclose(settled(TrafficChange('all', desired_speed=8.0)), (8.0, 8.0),
+                               atol=0.05)
+
+
+def test_newcomers_drive_as_all_were_told() -> None:
+    """Arrivals of a flow, who come after it, at 6 m/s instead of 10 to 16 m/s."""
+    lane = support.roads(support.straight_lane(1, 0.0, 0.0, 300.0))
+    run = support.Run(lane, TrafficSpec(flow=900.0), 1).ticks(300)
+    before = run.speeds[-1]
+    run.traffic.change(TrafficChange('all', desired_speed=6.0))
+    run.ticks(500)
+    assert np.nanmin(before) > 9.0
+    assert np.isfinite(run.speeds[-1]).sum() > 5
+    np.testing.assert_allclose(run.speeds[-1][np.isfinite(run.speeds[-1])], 6.0, atol=0.3)
+
+
+def test_one_driver_begins_to_ignore_lights_and_one_to_yield_late(maps: Path) -> None:
+    """By an event in the middle of a run, as by shares from the start."""
+    car = support.driving(1, [(-150.0, -3.5, 0.0), (190.0, -3.5, 0.0)], 12.0)
+    fronts = []
+    for runs in (False, True):
+        run = support.Run(crossroads(), TrafficSpec(lane_changes=False), 0, (), [car])
+        for k in range(200):
+            if k == 30:
+                run.traffic.change(TrafficChange('o1', red_runner=runs))
+            run.traffic.advance(WorldView(run.k, np.zeros((0, 3)), np.zeros((0, 3)),
+                                          {LIGHT: 'red'}))
+            run.k += 1
+            run.note()
+        fronts.append(np.nanmax(run.series(0)[0][:, 0]) + 2.25)
+    assert fronts[0] < -20.0 < fronts[1]
+    path = maps / 'ZAM_Intersection-1_1_T-1.xml'
+    roads = RoadNetwork(load_scenario(path).scenario.lanelet_network)
+    start = roads.pose_on(21, roads.line(21).length - 50.0)
+    agent = support.driving(1, [start, roads.pose_on(42, 50.0)], 12.0)
+    hardest = []
+    for late in (False, True):
+        run = support.Run(path, TrafficSpec(), 0, [support.human(-110.0, -1.75, 0.0, 13.0)],
+                          [agent]).ticks(2)
+        run.traffic.change(TrafficChange('o1', late_yielder=late))
+        hardest.append(float(-np.diff(run.ticks(100).series(0)[1]).min() / run.dt))
+    assert hardest[0] < 1.7 and 4.0 < hardest[1] < 4.5
