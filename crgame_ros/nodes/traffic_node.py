@@ -18,13 +18,13 @@ from crgame_ros.ros.node_report import NodeReport
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.scenario.events import FiredEvent, SpeedLimit
+from crgame_ros.scenario.events import FiredEvent, TrafficOrder
 from crgame_ros.scenario.objects import ObjectStates, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.documents import parse_events_document
-from crgame_ros.simulation.traffic_limits import TrafficLimits
+from crgame_ros.simulation.traffic_orders import TrafficOrders
 from crgame_ros.simulation.traffic_setup import make_traffic
 from crgame_ros.simulation.world_reader import WorldReader
 from crgame_ros.traffic.spec import parse_traffic, TrafficSpec
@@ -93,7 +93,7 @@ class TrafficNode(Node):
             # Compiled code is loaded when it is first run: a second that no tick has.
             drive_everything()
             self._warm = True
-        self._limits = TrafficLimits(scenario.loaded, scenario.game.events)
+        self._orders = TrafficOrders(scenario.loaded, scenario.game.events)
         self._obeyed = set()
         self._network = RoadNetwork(scenario.loaded.scenario.lanelet_network)
         self._obstacles = ScenarioObstacles(scenario.loaded)
@@ -122,7 +122,7 @@ class TrafficNode(Node):
         traffic = self._traffic
         if traffic is None or k != self._k:
             traffic = self._made(view, k, step)
-        self._obey_limits(traffic, k)
+        self._obey(traffic, k)
         taken_off = traffic.taken_off
         traffic.advance(view)
         if traffic.taken_off > taken_off:
@@ -142,8 +142,8 @@ class TrafficNode(Node):
         if self._ticks % COLLECT_EVERY == 0:
             gc.collect()
 
-    def _obey_limits(self, traffic: Traffic, k: int) -> None:
-        """Let agents know the speed limits that events have set by a tick."""
+    def _obey(self, traffic: Traffic, k: int) -> None:
+        """Let agents do as events have told them by a tick."""
         assert self._scenario is not None
         epoch, fired = self._fired
         game = self._scenario.game
@@ -151,9 +151,9 @@ class TrafficNode(Node):
         for event in fired if epoch == game.epoch else ():
             action = actions.get(event.name)
             if event.k <= k and event.name not in self._obeyed \
-                    and isinstance(action, SpeedLimit):
+                    and isinstance(action, TrafficOrder):
                 self._obeyed.add(event.name)
-                self._limits.change(action, traffic)
+                self._orders.obey(action, traffic)
 
     def _made(self, view: WorldView, k: int, step: WorldStep) -> Traffic:
         """Make the agents of a new run, or go on with those that others have seen."""

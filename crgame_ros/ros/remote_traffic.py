@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crgame_ros.planner.joints import JointSeries, object_joint_names
-from crgame_ros.scenario.events import SpeedLimit
+from crgame_ros.scenario.events import TrafficOrder
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.traffic_setup import TrafficSetup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
@@ -61,7 +61,7 @@ class RemoteTraffic:
     def tell(self, view: 'WorldView') -> None:
         """Tell nothing: traffic_node reads the published world."""
 
-    def limit_speed(self, action: SpeedLimit) -> None:
+    def obey(self, order: TrafficOrder) -> None:
         """Tell nothing: traffic_node reads the published events."""
 
     def _keep(self, series: JointSeries, k: int) -> None:

@@ -12,7 +12,7 @@ from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.planner.joints import JointSeries
 from crgame_ros.planner.registry import EXTERNAL
 from crgame_ros.planner.road_limit import RoadLimit
-from crgame_ros.scenario.events import FiredEvent, PlannerRun, SpeedLimit
+from crgame_ros.scenario.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.av_models import (
@@ -210,8 +210,8 @@ class Simulation:
         for action in events.actions(fired):
             if isinstance(action, PlannerRun):
                 self.set_planner_running(action.av, action.run)
-            elif isinstance(action, SpeedLimit):
-                self._world.limit_speed(action)
+            elif isinstance(action, TrafficOrder):
+                self._world.obey(action)
         return fired
 
     def _localise(self) -> None:

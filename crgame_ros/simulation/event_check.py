@@ -8,6 +8,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.planner.registry import EXTERNAL
 from crgame_ros.scenario.events import (
+    ALL_AGENTS,
     Between,
     Brake,
     EventSpec,
@@ -18,6 +19,7 @@ from crgame_ros.scenario.events import (
     PutObstacle,
     Release,
     SpeedLimit,
+    TrafficChange,
 )
 from crgame_ros.scenario.game import AvSpec, Game
 from crgame_ros.scenario.objects import ObjectDescription, Role
@@ -83,6 +85,29 @@ def _named(event: EventSpec) -> list[tuple[str, str | int]]:
     elif isinstance(when, Between):
         named += [('vehicle or object', name) for name in when.between]
     return named
+
+
+def check_changes(game: Game, where: str, agents: Sequence[str]) -> None:
+    """
+    Refuse events about agents that never come, or with options that their model does not take.
+
+    :param where: file name for messages.
+    :param agents: ids of all that may be on the road.
+    :raises InputError: naming the event and what there is.
+    """
+    for event in game.events:
+        if not isinstance(event.action, TrafficChange):
+            continue
+        place = f'{where}: event {event.name}'
+        if game.traffic is None or not agents:
+            raise InputError('the game has no traffic', place, 'add "traffic" to the game')
+        if event.action.agent not in (ALL_AGENTS, *agents):
+            raise InputError(f'there is no agent "{event.action.agent}"', place,
+                             f'{_listed(agents)}; {ALL_AGENTS} is everybody')
+        # Imports numba: only runs with agents should wait for that.
+        from crgame_ros.traffic.car_following import CAR_FOLLOWING
+        CAR_FOLLOWING.create(game.traffic.model, {**game.traffic.options, **event.action.options},
+                             place)
 
 
 def check_swap(event: EventSpec, where: str, avs: Sequence[AvSpec]) -> None:

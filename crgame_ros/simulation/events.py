@@ -8,6 +8,7 @@ import math
 from crgame_ros.scenario.courses import ObstacleCourses
 from crgame_ros.scenario.events import (
     Action,
+    ALL_AGENTS,
     AtStep,
     AtTime,
     Brake,
@@ -17,6 +18,7 @@ from crgame_ros.scenario.events import (
     Near,
     PutObstacle,
     Release,
+    TrafficChange,
 )
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.setup import Setup
@@ -49,6 +51,7 @@ class RunEvents:
         self._columns = {item.id: column
                          for column, item in enumerate(setup.obstacles.descriptions)}
         self._k = setup.scheduler.k0
+        self._objects: ObjectStates | None = None
 
     def trigger(self, name: str) -> str | None:
         """
@@ -79,7 +82,7 @@ class RunEvents:
         :param objects: at k, as earlier events have left them.
         :return: what took effect now.
         """
-        self._k = k
+        self._k, self._objects = k, objects
         if not self._waiting:
             return ()
         where = _Places(self._setup, states, self._columns, objects)
@@ -102,6 +105,8 @@ class RunEvents:
     def _hindrance(self, event: EventSpec, k: int) -> str | None:
         """Say why an event cannot take effect now, if it cannot."""
         action = event.action
+        if isinstance(action, TrafficChange):
+            return self._absence(action.agent)
         if not isinstance(action, Release | Brake):
             return None
         object_id = f'o{action.object}'
@@ -112,6 +117,13 @@ class RunEvents:
             return f'{object_id} stands until it is released'
         present = self.obstacles.is_present(self._columns[object_id], k)
         return None if present else f'{object_id} is not there'
+
+    def _absence(self, agent: str) -> str | None:
+        """Say that an agent is not on the road, if so."""
+        if agent == ALL_AGENTS or self._objects is None:
+            return None
+        present = math.isfinite(self._objects.poses[self._columns[agent], 0])
+        return None if present else f'{agent} is not on the road'
 
     def _holds(self, condition: Condition, k: int, place: Callable[[str], Point]) -> bool:
         """Tell whether a condition holds at k; NaN, somebody who is absent, makes it false."""

@@ -26,7 +26,12 @@ from crgame_ros.scenario.scripted_objects import ScriptedObjects
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.simulation.av_models import check_models
 from crgame_ros.simulation.cast import cast_avs, Part
-from crgame_ros.simulation.event_check import check_events, held_obstacles, put_obstacles
+from crgame_ros.simulation.event_check import (
+    check_changes,
+    check_events,
+    held_obstacles,
+    put_obstacles,
+)
 from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, TrafficSetup
 from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
@@ -220,6 +225,8 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
                  [(human.id, human.dynamics, human.vehicle) for human in humans])
     setup.open_occupancy()
     setup = _with_living(setup)
+    check_changes(game, loaded.source, () if setup.traffic is None else [
+        item.id for item in setup.traffic.descriptions])
     if not setup.descriptions:
         raise InputError('nobody takes part: no human, no planning problem, no traffic and no '
                          'obstacle', loaded.source, 'add one of them to the game')

@@ -5,12 +5,12 @@
 from collections.abc import Sequence
 from typing import Protocol, TYPE_CHECKING
 
-from crgame_ros.scenario.events import SpeedLimit
+from crgame_ros.scenario.events import TrafficOrder
 from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.simulation.surroundings import Surroundings
-from crgame_ros.simulation.traffic_limits import TrafficLimits
+from crgame_ros.simulation.traffic_orders import TrafficOrders
 from crgame_ros.vehicle.state import VehicleState
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ class TrafficFeed(Protocol):
     def tell(self, view: 'WorldView') -> None:
         """Tell what the agents react to."""
 
-    def limit_speed(self, action: SpeedLimit) -> None:
-        """Change a speed limit by an event, before the world of its tick is told."""
+    def obey(self, order: TrafficOrder) -> None:
+        """Do as an event says, before the world of its tick is told."""
 
 
 class LocalTraffic:
@@ -42,12 +42,12 @@ class LocalTraffic:
 
     :param traffic: at the first tick.
     :param k: that tick.
-    :param limits: the roads as the agents know them.
+    :param orders: what events tell them.
     """
 
-    def __init__(self, traffic: 'Traffic', k: int, limits: TrafficLimits) -> None:
+    def __init__(self, traffic: 'Traffic', k: int, orders: TrafficOrders) -> None:
         self._traffic = traffic
-        self._limits = limits
+        self._orders = orders
         self._k = k
         self._view: WorldView | None = None
 
@@ -62,9 +62,9 @@ class LocalTraffic:
         """Keep what the agents will react to."""
         self._view = view
 
-    def limit_speed(self, action: SpeedLimit) -> None:
-        """Change a speed limit."""
-        self._limits.change(action, self._traffic)
+    def obey(self, order: TrafficOrder) -> None:
+        """Do as an event says."""
+        self._orders.obey(order, self._traffic)
 
 
 class World:
@@ -88,7 +88,7 @@ class World:
         self._feed = feed
         if feed is None and setup.traffic is not None:
             self._feed = LocalTraffic(setup.traffic.make(), self._k,
-                                      TrafficLimits(setup.loaded, setup.game.events))
+                                      TrafficOrders(setup.loaded, setup.game.events))
         self._surroundings = Surroundings(setup)
         self.agents_k: int | None = None
         self._agents: ObjectStates | None = None
@@ -117,10 +117,10 @@ class World:
         self.objects = self._at(k)
         return self.objects
 
-    def limit_speed(self, action: SpeedLimit) -> None:
-        """Let agents obey an event's speed limit."""
+    def obey(self, order: TrafficOrder) -> None:
+        """Let agents do as an event says."""
         if self._feed is not None:
-            self._feed.limit_speed(action)
+            self._feed.obey(order)
 
     def settle(self, states: Sequence[VehicleState]) -> ObjectStates:
         """

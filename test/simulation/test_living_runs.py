@@ -14,6 +14,7 @@ from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.game_file import dump_game, parse_game
 from crgame_ros.scenario.objects import Role
 from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.replay import with_recorded_events
 from crgame_ros.simulation.setup import build_setup, Setup
 
 
@@ -93,3 +94,65 @@ def test_the_written_game_has_objects_traffic_and_map() -> None:
     assert again.descriptions == setup.descriptions
     hashes = [run_offline(item, duration_s=3.0).object_poses.tobytes() for item in (setup, again)]
     assert hashes[0] == hashes[1]
+
+
+def test_agents_drive_otherwise_by_an_event() -> None:
+    """
+    One hurries, then all crawl; until each of both everything is as without it, to the last bit.
+
+    The run repeats, and again with the recorded events as conditions.
+    """
+    events = [{'name': 'hurry', 'traffic': {'agent': 't1', 'desired_speed': 30.0},
+               'when': {'time': 2.0}},
+              {'name': 'crawl', 'traffic': {'agent': 'all', 'speed_factor': 0.3}}]
+    traffic = {'agents': 8, 'speed_spread': 0.0}
+
+    def run(told: list[dict[str, Any]], *triggers: tuple[int, str]) -> OfflineResult:
+        setup = living('cut_in', humans=[], avs=[], traffic=traffic, events=told)
+        return run_offline(setup, duration_s=18.0, triggers=triggers)
+
+    free, once = run([]), run(events)
+    twice, again = (run(events, (700, 'crawl')) for _ in range(2))
+    assert twice.state_hash == again.state_hash
+    assert twice.object_poses.tobytes() == again.object_poses.tobytes()
+    np.testing.assert_array_equal(speeds(once)[:21], speeds(free)[:21])
+    np.testing.assert_array_equal(speeds(twice)[:71], speeds(once)[:71])
+    column = [item.id for item in once.setup.traffic.descriptions].index('t1')
+    # A truck, whose 80 km/h the event overrides; then 0.3 of 100 km/h.
+    assert np.nanmax(speeds(free)[:, column]) < 22.3 < 25.0 < np.nanmax(speeds(once)[:, column])
+    assert np.nanmax(speeds(twice)[-1]) < 0.3 * 100.0 / 3.6 + 0.1
+    recorded = with_recorded_events(twice.setup.game, twice.fired)
+    repeated = run_offline(build_setup(recorded), duration_s=18.0)
+    assert repeated.object_poses.tobytes() == twice.object_poses.tobytes()
+
+
+def test_an_event_waits_for_its_agent() -> None:
+    """It is due from the start, and takes effect when the first arrival comes."""
+    setup = living('cut_in', humans=[], avs=[], traffic={'flow': 600.0, 'capacity': 3}, events=[
+        {'name': 'stop', 'traffic': {'agent': 't0', 'desired_speed': 1.0}, 'when': {'time': 0.0}}])
+    result = run_offline(setup, duration_s=8.0)
+    column = setup.agent_columns[0]
+    there = np.isfinite(result.object_poses[:, column, 0])
+    first = int(there.argmax())
+    assert first > 1 and not there[:first].any()
+    assert [(event.name, event.k) for event in result.fired] == [('stop', first)]
+    with pytest.raises(InputError, match='trigger at step 15: t0 is not on the road'):
+        run_offline(setup, duration_s=2.0, triggers=[(15, 'stop')])
+
+
+@pytest.mark.parametrize(('traffic', 'change', 'message'), [
+    ({'agents': 2}, {'agent': 't7', 'politeness': 0},
+     'event a: there is no agent "t7"; there is t0, t1; all is everybody'),
+    ({'agents': 2}, {'agent': 'hv0', 'politeness': 0}, 'there is no agent "hv0"'),
+    (None, {'agent': 'all', 'politeness': 0}, 'the game has no traffic; add "traffic"'),
+    ({'agents': 2}, {'agent': 't0', 'options': {'headway': 1}},
+     'event a: options of car-following model acc: "headway" is unknown; allowed are: time_gap'),
+    ({'agents': 2}, {'agent': 't0', 'options': {'time_gap': 0}},
+     'event a: options of car-following model acc: "time_gap" is 0; give a number above 0'),
+], ids=['no such agent', 'no agent', 'no traffic', 'no such option', 'no good value'])
+def test_changes_that_cannot_be_are_refused(traffic: Any, change: dict[str, Any],
+                                            message: str) -> None:
+    """Before the run, in one line with the event's name."""
+    with pytest.raises(InputError, match=message) as raised:
+        living('cut_in', traffic=traffic, events=[{'name': 'a', 'traffic': change}])
+    assert '\n' not in str(raised.value)

@@ -18,6 +18,8 @@ const ACTIONS = {
     + `${fixed(event.length, 1)} × ${fixed(event.width, 1)} m ${place(event)}`,
   speed_limit: (event) => `Sets the speed limit of ${lanelets(event.lanelets)} to `
     + speed(event.speed),
+  traffic: (event) => `${event.agent === 'all' ? 'All agents of traffic'
+    : `Agent ${event.agent}`} from then on: ${driving(event)}`,
   plan_display: (event) => `${event.show ? 'Shows' : 'Hides'} the plan of ${event.av}`,
   planner: (event) => `Replaces the planner of ${event.av} by ${baseName(event.planner)}`,
   planner_run: (event) => (event.run ? `Lets the planner of ${event.av} go on`
@@ -26,7 +28,8 @@ const ACTIONS = {
 
 const TITLES = {
   release: 'Release', brake: 'Brake', obstacle: 'Obstacle', speed_limit: 'Speed limit',
-  plan_display: 'Plan display', planner: 'Planner', planner_run: 'Planner stop or go',
+  traffic: 'Traffic', plan_display: 'Plan display', planner: 'Planner',
+  planner_run: 'Planner stop or go',
 };
 
 /**
@@ -76,6 +79,27 @@ export function conditionWords(when) {
 function speed(value) {
   const shown = fixed(value * KMH, 0);
   return shown === NONE ? 'another speed' : `${shown} km/h`;
+}
+
+function driving(event) {
+  const said = [];
+  const add = (name, words) => {
+    if (event[name] !== undefined && event[name] !== null) {
+      said.push(words(event[name]));
+    }
+  };
+  add('speed_factor', (value) => `${fixed(100 * value, 0)} % of the speed limit`);
+  add('desired_speed', (value) => `${speed(value)} whatever the limit`);
+  for (const [key, value] of Object.entries(event.options ?? {})) {
+    said.push(`${key.replaceAll('_', ' ')} ${value}`);
+  }
+  add('politeness', (value) => `politeness ${fixed(value, 2)}`);
+  add('lane_changes', (value) => (value ? 'lane changes' : 'no lane changes'));
+  add('reaction_time', (value) => `reaction time ${fixed(value, 1)} s`);
+  add('imperfection', (value) => `imperfection ${fixed(value, 2)}`);
+  add('red_runner', (value) => (value ? 'ignores lights' : 'obeys lights'));
+  add('late_yielder', (value) => (value ? 'yields late' : 'yields in time'));
+  return said.join(', ');
 }
 
 function place(event) {

@@ -1,11 +1,11 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Speed limits that events change, for agents of traffic."""
+"""What events tell the agents of traffic: speed limits, and to drive otherwise."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from crgame_ros.scenario.events import EventSpec, SpeedLimit
+from crgame_ros.scenario.events import EventSpec, SpeedLimit, TrafficOrder
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.scenario.speed_limits import set_speed_limit, with_own_roads
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from crgame_ros.traffic.traffic import Traffic
 
 
-class TrafficLimits:
+class TrafficOrders:
     """
-    The roads of a run as its agents know them.
+    Passes orders on to agents, with the roads of the run as they know them.
 
     :param loaded: the scenario, which stays as it is.
     :param events: of the game; without one about speed limits nothing is copied.
@@ -28,7 +28,10 @@ class TrafficLimits:
         if any(isinstance(event.action, SpeedLimit) for event in events):
             self._scenario = with_own_roads(loaded.scenario)
 
-    def change(self, action: SpeedLimit, traffic: 'Traffic') -> None:
-        """Let agents obey another limit from their next decision on."""
-        set_speed_limit(self._scenario, action.speed, action.lanelets)
-        traffic.read_speed_limits(RoadNetwork(self._scenario.lanelet_network))
+    def obey(self, order: TrafficOrder, traffic: 'Traffic') -> None:
+        """Let agents do as they are told from their next decision on."""
+        if isinstance(order, SpeedLimit):
+            set_speed_limit(self._scenario, order.speed, order.lanelets)
+            traffic.read_speed_limits(RoadNetwork(self._scenario.lanelet_network))
+        else:
+            traffic.change(order)
