@@ -9,7 +9,13 @@ import numpy as np
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled, inlined
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.lane_table import angle_between, LaneTable, nearest_row, point_on, project_on
+from crgame_ros.traffic.lane_table import (
+    angle_between,
+    LaneTable,
+    nearest_row,
+    point_on,
+    project_on,
+)
 from crgame_ros.traffic.leaders import first_from, LONGEST, Pairs, swing, Ways
 from crgame_ros.traffic.motion import onward
 from crgame_ros.traffic.placement import Entries
