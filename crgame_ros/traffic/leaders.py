@@ -167,7 +167,7 @@ def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: f
         return np.inf
     row = nearest_row(lanes, lane, min(max(middle, 0.0), lanes.length[lane]))
     shift = reference[row] if len(reference) else 0.0
-    margin = SIDE_MARGIN + swing(lanes.curvature[row], corridor.front[i])
+    margin = SIDE_MARGIN + swing(lanes.line[row].curvature, corridor.front[i])
     return float(rear_within(entries, n, corridor.low[i] + shift - margin,
                              corridor.high[i] + shift + margin))
 
