@@ -6,6 +6,7 @@ import math
 
 from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
 from crgame_ros.traffic.compiled import bare, inlined
+from crgame_ros.traffic.lane_change import offset_at
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row, project_on, segment
 from crgame_ros.traffic.routes import Routes
@@ -112,7 +113,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     curvature = here.curvature + share * (after.curvature - here.curvature)
     d += min(max(0.25 * curvature * front * front, -MAX_CURVE_SHIFT), MAX_CURVE_SHIFT)
     if agents.source[i] != NOBODY:
-        d += change_offset(agents.curve[i], along - agents.from_s[i], agents.span[i])
+        d += offset_at(agents.curve[i], along - agents.from_s[i], agents.span[i])
     cos = here.cos + share * (after.cos - here.cos)
     sin = here.sin + share * (after.sin - here.sin)
     return (here.x + beyond * (after.x - here.x) - d * sin,
@@ -132,14 +133,6 @@ def _onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
         s -= lanes.length[lane]
         lane = onward
     return lane, s
-
-
-@bare
-def change_offset(curve: FloatArray, x: float, span: float) -> float:
-    """Evaluate the path of a lane change (FS 4) a distance behind its start [m]."""
-    x = min(max(x, 0.0), span)
-    return float(curve[0] + x * (curve[1] + x * (curve[2] + x * (
-        curve[3] + x * (curve[4] + x * curve[5])))))
 
 
 @bare

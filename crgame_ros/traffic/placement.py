@@ -52,11 +52,6 @@ class Bodies(NamedTuple):
     time: FloatArray
     claim: IntArray
 
-    @classmethod
-    def join(cls, parts: 'list[Bodies]') -> 'Bodies':
-        """Put several together."""
-        return cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-
 
 class Entries(NamedTuple):
     """
