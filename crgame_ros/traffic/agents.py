@@ -129,7 +129,7 @@ def write_centers(agents: AgentTable, slots: IntArray, poses: FloatArray,
 @compiled
 def states_of(agents: AgentTable) -> tuple[FloatArray, FloatArray]:
     """Give poses (A, 3) in (-pi, pi] and velocities (A, 3) of all; see `Agents.states`."""
-    poses, velocities = centers_of(agents, np.arange(len(agents)))
+    poses, velocities = centers_of(agents, np.arange(len(agents.x)))
     for i in range(len(poses)):
         # As `wrap_pi_array` does.
         wrapped = math.pi - (math.pi - poses[i, 2]) % (2.0 * math.pi)

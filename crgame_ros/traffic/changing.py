@@ -3,6 +3,7 @@
 """When agents change lanes, and who makes room for them (FS M3)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +64,9 @@ class Wish:
         """Pick some of them."""
         if rows.all():
             return self
+        columns: list[Any] = [column[rows] for column in self.beside]
         return Wish(self.slots[rows], self.side[rows], self.urgency[rows], self.room[rows],
-                    Beside(*(column[rows] for column in self.beside)))
+                    Beside(*columns))
 
 
 class LaneChanges:
@@ -266,9 +268,9 @@ class LaneChanges:
 @compiled
 def _finish(agents: AgentTable, give_up: int) -> IntArray:
     """End changes that have come to their end; list the agents whose come to nothing."""
-    stuck = np.empty(len(agents), np.int64)
+    stuck = np.empty(len(agents.x), np.int64)
     count = 0
-    for i in range(len(agents)):
+    for i in range(len(agents.x)):
         if agents.source[i] == NOBODY:
             continue
         done = agents.s[i] - agents.from_s[i]

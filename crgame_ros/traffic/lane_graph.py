@@ -161,7 +161,9 @@ class LaneGraph:
         :param rounds: of correction; one is enough for a guess that is off by centimetres.
         :return: s [m], d [m] and the lane's heading there [rad]
         """
-        return project_all(self.table, lane, x, y, np.asarray(guess, dtype=np.float64), rounds)
+        # Copies: compiled code differs for views, and for arrays that are not to be written to.
+        return project_all(self.table, np.array(lane), np.array(x), np.array(y),
+                           np.array(guess, dtype=np.float64), rounds)
 
     def is_tight(self, width: float, front: float, room: float) -> NDArray[np.bool_]:
         """
