@@ -229,15 +229,6 @@ def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: f
 
 
 @compiled
-def least(agent: IntArray, values: FloatArray, count: int, default: float) -> FloatArray:
-    """Give the least value (count) of each agent, the default where there is none."""
-    result = np.full(count, default)
-    for i in range(len(agent)):
-        result[agent[i]] = min(result[agent[i]], values[i])
-    return result
-
-
-@compiled
 def obstacles(pairs: Pairs, standing: NDArray[np.bool_], count: int) -> FloatArray:
     """Give the least gap (count) of each agent to what stands for good, or inf."""
     result = np.full(count, np.inf)
