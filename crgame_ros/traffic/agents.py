@@ -3,13 +3,15 @@
 """The state of all agents, one array per quantity."""
 
 from collections.abc import Sequence
+import math
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.compiled import bare, compiled
+from crgame_ros.traffic.lane_table import FloatArray, IntArray
 
 # Share of its length by which a vehicle's axles are apart, and its rear axle from its centre.
 WHEELBASE = 0.6
@@ -105,6 +107,43 @@ def empty_table(count: int) -> AgentTable:
     return cast(AgentTable, table)
 
 
+@compiled
+def centers_of(agents: AgentTable, slots: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Give the poses (N, 3) and velocities (N, 3) of the centres of agents (N)."""
+    poses, velocities = np.empty((len(slots), 3)), np.empty((len(slots), 3))
+    write_centers(agents, slots, poses, velocities)
+    return poses, velocities
+
+
+@bare
+def write_centers(agents: AgentTable, slots: IntArray, poses: FloatArray,
+                  velocities: FloatArray) -> None:
+    """Write the poses (N, 3) and velocities (N, 3) of the centres of agents (N)."""
+    for i, slot in enumerate(slots):
+        yaw, middle, speed = agents.yaw[slot], agents.rear_to_center[slot], agents.speed[slot]
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        aside = middle * agents.yaw_rate[slot]
+        poses[i, 0], poses[i, 1] = agents.x[slot] + middle * cos, agents.y[slot] + middle * sin
+        poses[i, 2] = yaw
+        velocities[i, 0] = speed * cos - aside * sin
+        velocities[i, 1] = speed * sin + aside * cos
+        velocities[i, 2] = agents.yaw_rate[slot]
+
+
+@compiled
+def states_of(agents: AgentTable) -> tuple[FloatArray, FloatArray]:
+    """Give poses (A, 3) in (-pi, pi] and velocities (A, 3) of all; see `Agents.states`."""
+    poses, velocities = centers_of(agents, np.arange(len(agents.x)))
+    for i in range(len(poses)):
+        # As `wrap_pi_array` does.
+        wrapped = math.pi - (math.pi - poses[i, 2]) % (2.0 * math.pi)
+        poses[i, 2] = math.pi if wrapped <= -math.pi else wrapped
+        if not agents.active[i]:
+            poses[i] = math.nan
+            velocities[i] = math.nan
+    return poses, velocities
+
+
 class Agents(AgentTable):
     """
     The agents (A): who may be on the road; each has a slot of its own.
@@ -134,15 +173,15 @@ class Agents(AgentTable):
 
     def centers(self) -> FloatArray:
         """Give the poses (A, 3) of the centres [m, rad]."""
-        return np.stack((self.x + self.rear_to_center * np.cos(self.yaw),
-                         self.y + self.rear_to_center * np.sin(self.yaw), self.yaw), axis=-1)
+        return centers_of(self.table, np.arange(self.count))[0]
 
     def velocities(self) -> FloatArray:
         """Give the velocities (A, 3) of the centres [m/s, rad/s]."""
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        aside = self.rear_to_center * self.yaw_rate
-        return np.stack((self.speed * cos - aside * sin, self.speed * sin + aside * cos,
-                         self.yaw_rate), axis=-1)
+        return centers_of(self.table, np.arange(self.count))[1]
+
+    def states(self) -> tuple[FloatArray, FloatArray]:
+        """Give poses, their angles wrapped, and velocities of the centres; NaN where absent."""
+        return states_of(self.table)
 
     def put(self, slot: int, lane: int, s: float, d: float, pose: tuple[float, float, float],
             speed: float) -> None:

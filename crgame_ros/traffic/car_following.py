@@ -3,6 +3,7 @@
 """Keeping a distance to the vehicle ahead (FS M2), vectorised over agents."""
 
 from abc import ABC, abstractmethod
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -33,25 +34,31 @@ FORESIGHT = 1.05
 PATIENT = 3.5
 
 
-@vectorized
-def _spared(relief: float, desired_gap: float, gap: float, standstill_gap: float) -> float:
+@compiled
+def _spared_of(relief: float, desired_gap: float, gap: float, standstill_gap: float) -> float:
     """Give what of a relief counts: nearer than the gap at standstill nobody is patient [m]."""
     patience = min(max(2.0 * gap / standstill_gap - 1.0, 0.0), 1.0)
     return min(relief, max(desired_gap - gap, 0.0)) * patience
 
 
+@vectorized
+def _spared(relief: float, desired_gap: float, gap: float, standstill_gap: float) -> float:
+    return _spared_of(relief, desired_gap, gap, standstill_gap)
+
+
 @compiled
 def _guard_of(speed: float, gap: float, lead_speed: float, standstill_gap: float,
               hardest: float) -> float:
+    """
+    Give the braking without which it would soon be too late, whatever the law wants [m/s^2].
+
+    Behind a leader that brakes its hardest, b_max, to a stop, constant braking with
+    v^2 / (2 (gap - s0 / 2 + v_leader^2 / (2 b_max))) just avoids contact, as in Gipps (1981).
+    What is demanded rises from 0 where that is 0.8 b_max to b_max where it is b_max.
+    """
     stopping = gap - GUARD_GAP * standstill_gap + max(lead_speed, 0.0)**2 / (2.0 * hardest)
     share = speed**2 / (2.0 * hardest * max(stopping, LEAST_ROOM))
     return hardest * min(max((share - GUARD_SHARE) / (1.0 - GUARD_SHARE), 0.0), 1.0)
-
-
-@vectorized
-def _guard(speed: float, gap: float, lead_speed: float, standstill_gap: float,
-           hardest: float) -> float:
-    return _guard_of(speed, gap, lead_speed, standstill_gap, hardest)
 
 
 @compiled
@@ -71,10 +78,10 @@ def needed_deceleration(speed: float, room: float, lead_speed: float,
     return result
 
 
-@vectorized
-def _limited(wanted: float, speed: float, gap: float, lead_speed: float,
-             lead_acceleration: float, patience: float, standstill_gap: float, most: float,
-             hardest: float) -> float:
+@compiled
+def _limited_of(wanted: float, speed: float, gap: float, lead_speed: float,
+                lead_acceleration: float, patience: float, standstill_gap: float, most: float,
+                hardest: float) -> float:
     """Limit what a law wants, and brake as hard as the guard demands."""
     guard = _guard_of(speed, gap, lead_speed, standstill_gap, hardest)
     if lead_acceleration > BRAKES_HARD:
@@ -87,6 +94,14 @@ def _limited(wanted: float, speed: float, gap: float, lead_speed: float,
     if speed < STANDING and wanted < START:
         wanted = min(wanted, -START)
     return min(max(wanted, -hardest), most)
+
+
+@vectorized
+def _limited(wanted: float, speed: float, gap: float, lead_speed: float,
+             lead_acceleration: float, patience: float, standstill_gap: float, most: float,
+             hardest: float) -> float:
+    return _limited_of(wanted, speed, gap, lead_speed, lead_acceleration, patience,
+                       standstill_gap, most, hardest)
 
 
 class CarFollowing(ABC):
@@ -155,24 +170,11 @@ class CarFollowing(ABC):
         """
         return np.full(np.broadcast_shapes(np.shape(speed), np.shape(gap)), np.inf)
 
-    def guard_deceleration(self, speed: Array, gap: Array, lead_speed: Array) -> Array:
-        """
-        Give the braking without which it would soon be too late, whatever the law wants.
 
-        Behind a leader that brakes its hardest, b_max, to a stop, constant braking with
-        v^2 / (2 (gap - s0 / 2 + v_leader^2 / (2 b_max))) just avoids contact, as in Gipps (1981).
-        What is demanded rises from 0 where that is 0.8 b_max to b_max where it is b_max.
-
-        :return: (A,) [m/s^2]
-        """
-        return np.asarray(_guard(speed, gap, lead_speed, self.standstill_gap,
-                                 self.max_deceleration))
-
-
-@vectorized
-def _cruise(speed: float, desired: float, gap: float, lead_speed: float, time_gap: float,
-            h: float, gain: float, standstill_gap: float, comfortable: float,
-            speed_time: float) -> float:
+@compiled
+def _cruise_of(speed: float, desired: float, gap: float, lead_speed: float, time_gap: float,
+               h: float, gain: float, standstill_gap: float, comfortable: float,
+               speed_time: float) -> float:
     """FS 3 with timely braking, or the approach to the desired speed if that is less."""
     error = standstill_gap + time_gap * speed - gap
     following = -(speed - lead_speed + gain * error) / h
@@ -181,6 +183,30 @@ def _cruise(speed: float, desired: float, gap: float, lead_speed: float, time_ga
     if needed > comfortable:
         following = min(following, -needed)
     return min(following, max((desired - speed) / speed_time, -comfortable))
+
+
+@vectorized
+def _cruise(speed: float, desired: float, gap: float, lead_speed: float, time_gap: float,
+            h: float, gain: float, standstill_gap: float, comfortable: float,
+            speed_time: float) -> float:
+    return _cruise_of(speed, desired, gap, lead_speed, time_gap, h, gain, standstill_gap,
+                      comfortable, speed_time)
+
+
+@vectorized
+def _cruise_behind(speed: float, desired: float, gap: float, lead_speed: float, relief: float,
+                   lead_acceleration: float, time_gap: float, h: float, gain: float,
+                   standstill_gap: float, comfortable: float, speed_time: float, most: float,
+                   hardest: float) -> float:
+    """Do what `CarFollowing.acceleration` does with this law, in one loop."""
+    if gap == math.inf:
+        lead_speed = speed
+    spared = gap + _spared_of(relief, standstill_gap + time_gap * speed, gap, standstill_gap)
+    wanted = _cruise_of(speed, desired, spared, lead_speed, time_gap, h, gain, standstill_gap,
+                        comfortable, speed_time)
+    return _limited_of(wanted, speed, gap, lead_speed, lead_acceleration, max(
+        PATIENT, gain * (standstill_gap + time_gap * speed - spared) / h), standstill_gap, most,
+        hardest)
 
 
 class AdaptiveCruise(CarFollowing):
@@ -235,6 +261,18 @@ class AdaptiveCruise(CarFollowing):
         return np.asarray(_cruise(
             speed, desired_speed, gap, lead_speed, self.time_gap, self.h, self.gain,
             self.standstill_gap, self._comfortable_deceleration, self._speed_time))
+
+    def acceleration(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array,
+                     relief: Array | float = 0.0,
+                     lead_acceleration: Array | float = -np.inf) -> Array:
+        """Give the acceleration for the next decision interval."""
+        if type(self) is not AdaptiveCruise:
+            return super().acceleration(speed, desired_speed, gap, lead_speed, relief,
+                                        lead_acceleration)
+        return np.asarray(_cruise_behind(
+            speed, desired_speed, gap, lead_speed, relief, lead_acceleration, self.time_gap,
+            self.h, self.gain, self.standstill_gap, self._comfortable_deceleration,
+            self._speed_time, self.max_acceleration, self.max_deceleration))
 
     def patience(self, speed: Array, gap: Array) -> Array:
         """

@@ -3,11 +3,13 @@
 """When agents change lanes, and who makes room for them (FS M3)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.agents import Agents, AgentTable, centers_of, NOBODY
+from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.courtesy import CourtesyRules, relief_at_change
 from crgame_ros.traffic.drivers import Drivers
@@ -18,41 +20,26 @@ from crgame_ros.traffic.lane_change import (
     incentive,
     look_ahead,
     quintic,
-    urgency,
+    SHORTEST_CHANGE,
 )
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.neighbours import Beside, look_beside
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.wishes import Destinations, Situations, SLOWEST, TOO_NEAR, wishes
 
 BoolArray = NDArray[np.bool_]
 
 # After a change, time without another one; and with which the next for speed is thought of [s].
 CALM = 4.0
-# Where a lane ends, changes take no less than this: 2.5 m/s^2 to the side [s].
-SWERVE_TIME = 2.8
-# After any change, time without one for speed; and how often agents think of those, spread over
-# the ticks where there are more than so many agents [s].
+# After any change, time without one for speed; and how often agents think of those [s].
 CONTENT = 12.0
-THOUGHT, AT_ONCE = 1.0, 50
-# Changes for speed are left alone where the route wants the lane within this distance [m].
-COMMITTED = 400.0
-SLOWEST = 3.0
-# The route's change begins this far before the last point where it is possible [m].
-PREPARE = 400.0
-# Nobody begins to change lanes this shortly before or in a junction [m].
-NO_CHANGE = 15.0
-# Who changes lanes before a junction can halt before it with this [m/s^2].
-BEFORE_JUNCTION = 2.0
-# Nor this near to an obstacle: the front would hit it; with less than that room the way out of the
-# lane is as short as this allows [m].
-TOO_NEAR = 5.0
+THOUGHT = 1.0
+# With less room than this to an obstacle the way out of the lane is as short as possible [m].
 TIGHT = 10.0
-# A change is as long as this, and as so many lengths of the vehicle, at least [m].
-SHORTEST_CHANGE, LENGTHS = 12.0, 2.7
-# Below `SLOWEST` nobody swings out with less room to the one ahead in the own lane [m].
-OUT_OF_QUEUE = 7.0
+# A change is as long as so many lengths of the vehicle at least.
+LENGTHS = 2.7
 # Share of the braking that is needed, with which somebody stops for who stands at a lane's end.
 LETTING_IN = 1.1
 # Who has not got far in a change for so long gives it up [s].
@@ -76,11 +63,11 @@ class Wish:
 
     def take(self, rows: NDArray[np.bool_]) -> 'Wish':
         """Pick some of them."""
-        columns = {name: getattr(self.beside, name)[rows] for name in (
-            'lane', 's', 'd', 'turn', 'lead_gap', 'lead_speed', 'leader', 'follow_gap',
-            'follow_speed', 'follower')}
+        if rows.all():
+            return self
+        columns: list[Any] = [column[rows] for column in self.beside]
         return Wish(self.slots[rows], self.side[rows], self.urgency[rows], self.room[rows],
-                    Beside(**columns))
+                    Beside(*columns))
 
 
 class LaneChanges:
@@ -99,7 +86,9 @@ class LaneChanges:
     def __init__(self, graph: LaneGraph, routes: Routes, conflicts: Conflicts,
                  followers: Followers, drivers: Drivers, cooperative: bool,
                  time_step_s: float) -> None:
-        self._graph, self._routes, self._conflicts = graph, routes, conflicts
+        self._graph, self._routes = graph, routes
+        self._to = Destinations(routes.next, routes.change, routes.remaining, routes.cost,
+                                routes.drops, np.isfinite(conflicts.table.entry), NARROW)
         self._followers, self._drivers = followers, drivers
         self._cooperative = cooperative
         self._calm = max(1, round(CALM / time_step_s))
@@ -110,20 +99,12 @@ class LaneChanges:
         self._courtesy = CourtesyRules()
         self._patience = max(1, round(self._courtesy.patience / time_step_s))
 
-    @staticmethod
-    def no_change(speed: FloatArray) -> FloatArray:
-        """Give how far before a junction or a line nobody changes lanes any more [m]."""
-        return np.asarray(NO_CHANGE + speed**2 / (2.0 * BEFORE_JUNCTION))
-
     def finish(self, k: int, agents: Agents) -> None:
         """End the changes that have come to their end, and those that come to nothing."""
-        done = agents.s - agents.from_s
-        agents.source[done >= agents.span] = NOBODY
-        stuck = np.flatnonzero(
-            agents.active & (agents.source != NOBODY) & (agents.source != agents.lane)
-            & (agents.waits > np.where(done < STARTED * agents.span, 1, LATER) * self._give_up))
+        stuck = _finish(agents.table, self._give_up)
         if len(stuck):
-            graph, lane, center = self._graph, agents.source[stuck], agents.centers()[stuck]
+            graph, lane = self._graph, agents.source[stuck]
+            center, _ = centers_of(agents.table, stuck)
             guess = agents.s[stuck] * graph.length[lane] / graph.length[agents.lane[stuck]]
             agents.s[stuck], agents.d[stuck], _ = graph.project(
                 lane, center[:, 0], center[:, 1], guess)
@@ -131,27 +112,26 @@ class LaneChanges:
             agents.calm_until[stuck] = k + self._give_up
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
-               limit: FloatArray, acceleration: FloatArray, gap: FloatArray, blocked: FloatArray,
-               standing: BoolArray, entries: Entries, way: Ways,
-               halts: BoolArray) -> FloatArray:
+               limit: FloatArray, acceleration: FloatArray, at: Situations, standing: BoolArray,
+               entries: Entries, way: Ways) -> None:
         """
-        Begin lane changes, and say how those brake who make room.
+        Begin lane changes, and have those brake who make room.
 
         :param slots: (A) of the agents.
         :param desired: (A) desired speeds [m/s]
         :param limit: (A) acceleration with which nobody gets too fast, in any lane [m/s^2]
-        :param acceleration: (A) that they want in their own lanes [m/s^2]
-        :param gap: (A) to whatever is ahead in the own lane, or inf [m]
-        :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
-        :param standing: (E) which entries are such obstacles.
+        :param acceleration: (A) that they want in their own lanes; lowered where courtesy asks
+            for it [m/s^2]
+        :param standing: (E) which entries are obstacles that stand for good.
         :param way: of the agents.
-        :param halts: (A) whether one is about to halt at a light or junction.
-        :return: (A) accelerations that courtesy allows, inf where it asks for nothing.
         """
-        yielding = np.full(agents.count, np.inf)
-        wish = self._wishes(k, agents, slots, gap, blocked, entries, halts)
-        if wish is None:
-            return yielding[slots]
+        graph = self._graph
+        found = wishes(k, graph.table, self._to, agents.table, slots, at,
+                       self._drivers.change_lanes, self._thoughts)
+        if not len(found.slots):
+            return
+        wish = Wish(found.slots, found.side, found.urgency, found.room, look_beside(
+            graph.table, self._routes.next, agents.table, found.slots, found.lane, entries))
         wish = wish.take(~_blocked(wish, standing))
         want, now, most = (np.zeros(agents.count) for _ in range(3))
         want[slots], now[slots], most[slots] = desired, acceleration, limit
@@ -160,56 +140,12 @@ class LaneChanges:
         gain = np.where(must, 100.0 + wish.urgency, gain)
         chosen = ok & (must | (gain > CHANGE_THRESHOLD))
         begun = self._begin(k, agents, wish, chosen, gain)
-        if self._cooperative:
+        if self._cooperative and must.any():
+            yielding = np.full(agents.count, np.inf)
             waiting = wish.take(must & ~np.isin(wish.slots, begun))
             self._make_room(agents, waiting, yielding)
             self._let_in(agents, slots, waiting, way, yielding)
-        return yielding[slots]
-
-    def _wishes(self, k: int, agents: Agents, slots: IntArray, gap: FloatArray,
-                blocked: FloatArray, entries: Entries, halts: BoolArray) -> Wish | None:
-        """List who may want to change to which side; urgency -1 is for speed alone."""
-        graph, routes, found = self._graph, self._routes, []
-        lane, destination = agents.lane[slots], agents.destination[slots]
-        needs = routes.change[destination, lane]
-        remaining = routes.remaining[destination, lane] - agents.s[slots]
-        stuck = blocked < PREPARE
-        hurry = urgency(np.minimum(remaining, blocked), agents.speed[slots])
-        free = self._drivers.change_lanes[slots] & (
-            agents.source[slots] == NOBODY) & (agents.calm_until[slots] <= k) & (
-            blocked > TOO_NEAR) & ((agents.speed[slots] > SLOWEST) | (gap > OUT_OF_QUEUE)
-                                   | np.isfinite(blocked))
-        wide = (agents.width[slots] > NARROW).astype(np.int64)
-        has = np.isfinite(self._conflicts.table.entry)
-        onto = routes.next[destination, lane]
-        junction = has[wide, lane] | ((onto >= 0) & has[wide, np.maximum(onto, 0)] & (
-            graph.length[lane] - agents.s[slots] <= self.no_change(agents.speed[slots])))
-        # Where a lane ends there is no other place.
-        ends = routes.drops[lane]
-        rest = np.where(ends, graph.length[lane] - agents.s[slots], np.inf)
-        # Nor is the road left: what is too fast for the rest brakes instead.
-        free &= np.where(ends, rest > SWERVE_TIME * agents.speed[slots], ~junction & ~halts)
-        content = agents.content_until[slots] <= k
-        content &= (slots * (len(slots) > AT_ONCE) + k) % self._thoughts == 0
-        for side, table in ((1, graph.left), (-1, graph.right)):
-            aside = table[lane]
-            at = np.maximum(aside, 0)
-            must = free & (aside >= 0) & (stuck | ((needs == side) & (remaining < PREPARE)))
-            must &= np.isfinite(routes.cost[destination, at])
-            may = free & content & ~must & (needs == 0) & (aside >= 0) & (
-                np.isfinite(routes.cost[destination, at])) & (
-                (routes.change[destination, at] == 0)
-                | (routes.remaining[destination, at] - agents.s[slots] > COMMITTED)) & (
-                agents.speed[slots] > SLOWEST)
-            row = np.flatnonzero(must | may)
-            found.append((slots[row], np.full(len(row), side), aside[row],
-                          np.where(must[row], hurry[row], -1.0), blocked[row]))
-        who, sides, lanes, hurries, room = (
-            np.concatenate([f[i] for f in found]) for i in range(5))
-        if not len(who):
-            return None
-        beside = look_beside(graph.table, routes.next, agents.table, who, lanes, entries)
-        return Wish(who, sides, hurries, room, beside)
+            np.minimum(acceleration, yielding[slots], out=acceleration)
 
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
                acceleration: FloatArray, limit: FloatArray) -> tuple[BoolArray, FloatArray]:
@@ -252,17 +188,17 @@ class LaneChanges:
     def _start(self, k: int, agents: Agents, wish: Wish, i: int) -> None:
         """Put an agent into the lane beside it, on a polynomial to its middle (FS 4)."""
         slot, beside = int(wish.slots[i]), wish.beside
-        speed = agents.speed[slot:slot + 1]
-        shift, slope = beside.d[i:i + 1], np.tan(beside.turn[i:i + 1])
-        span = look_ahead(speed, np.abs(shift), shortest=max(
+        speed, shift = float(agents.speed[slot]), beside.d[i:i + 1]
+        span = look_ahead(speed, float(beside.d[i]), shortest=max(
             SHORTEST_CHANGE, LENGTHS * float(agents.length[slot])))
         if self._routes.drops[agents.lane[slot]]:
-            rest = self._graph.length[agents.lane[slot]] - agents.s[slot]
-            span = np.maximum(np.minimum(span, rest), 0.6 * SHORTEST_CHANGE)
-        if wish.room[i] < TIGHT and speed[0] < SLOWEST:
-            span = np.minimum(span, np.maximum(wish.room[i] + 1.0, 1.5 * TOO_NEAR))
-        agents.curve[slot] = quintic(shift, slope, np.zeros(1), np.zeros(1), span)[0]
-        agents.span[slot], agents.from_s[slot] = span[0], beside.s[i]
+            rest = float(self._graph.length[agents.lane[slot]] - agents.s[slot])
+            span = max(min(span, rest), 0.6 * SHORTEST_CHANGE)
+        if wish.room[i] < TIGHT and speed < SLOWEST:
+            span = min(span, max(float(wish.room[i]) + 1.0, 1.5 * TOO_NEAR))
+        agents.curve[slot] = quintic(shift, np.tan(beside.turn[i:i + 1]), np.zeros(1),
+                                     np.zeros(1), np.array([span]))[0]
+        agents.span[slot], agents.from_s[slot] = span, beside.s[i]
         agents.source[slot], agents.side[slot] = agents.lane[slot], wish.side[i]
         agents.lane[slot], agents.s[slot] = beside.lane[i], beside.s[i]
         agents.d[slot] = beside.d[i]
@@ -270,8 +206,8 @@ class LaneChanges:
         agents.waits[slot] = 0
         agents.content_until[slot] = k + self._content
         agents.calm_until[slot] = k + self._calm + round(
-            float(span[0] / max(speed[0], 1.0)) * self._calm / CALM)
-        self._relieve(agents, slot, beside.lead_gap[i], float(speed[0]))
+            span / max(speed, 1.0) * self._calm / CALM)
+        self._relieve(agents, slot, beside.lead_gap[i], speed)
         if beside.follower[i] >= 0:
             self._relieve(agents, int(beside.follower[i]), beside.follow_gap[i],
                           float(beside.follow_speed[i]))
@@ -280,8 +216,8 @@ class LaneChanges:
         """Let a driver open a gap that a change has shortened without haste (Hidas 2005)."""
         if self._cooperative and np.isfinite(gap):
             wanted = self._followers.of(np.array([slot])).desired_gap(np.array([speed]))
-            agents.relief[slot] = max(agents.relief[slot], float(
-                relief_at_change(np.array([gap]), wanted)[0]))
+            agents.relief[slot] = max(agents.relief[slot], relief_at_change(
+                float(gap), float(wanted[0])))
 
     def _make_room(self, agents: Agents, wish: Wish, yielding: FloatArray) -> None:
         """Let followers beside, and agents that have to fall back, open the gaps (Hidas 2005)."""
@@ -314,7 +250,8 @@ class LaneChanges:
         speed = agents.speed[slots]
         for i in np.flatnonzero(agents.waits[wish.slots] >= self._patience).tolist():
             slot, lane, s = int(wish.slots[i]), wish.beside.lane[i], wish.beside.s[i]
-            row, step = np.nonzero(way.lane == lane)
+            row, step = np.nonzero((way.lane == lane) & (
+                np.arange(way.lane.shape[1]) < way.depth[:, None]))
             room = way.offset[row, step] + s - 0.5 * (
                 agents.length[slots[row]] + agents.length[slot]) - self._gaps.standstill_gap
             fits = (room > 0.0) & (slots[row] != slot) & (
@@ -327,6 +264,24 @@ class LaneChanges:
             # A little more than needed: less is needed then, and it stays the one who stops.
             braking = LETTING_IN * agents.speed[who]**2 / (2.0 * room[first])
             yielding[who] = min(yielding[who], -braking)
+
+
+@compiled
+def _finish(agents: AgentTable, give_up: int) -> IntArray:
+    """End changes that have come to their end; list the agents whose come to nothing."""
+    stuck = np.empty(len(agents.x), np.int64)
+    count = 0
+    for i in range(len(agents.x)):
+        if agents.source[i] == NOBODY:
+            continue
+        done = agents.s[i] - agents.from_s[i]
+        if done >= agents.span[i]:
+            agents.source[i] = NOBODY
+        elif agents.active[i] and agents.source[i] != agents.lane[i] and (
+                agents.waits[i] > (1 if done < STARTED * agents.span[i] else LATER) * give_up):
+            stuck[count] = i
+            count += 1
+    return stuck[:count]
 
 
 def _blocked(wish: Wish, standing: BoolArray) -> BoolArray:

@@ -42,3 +42,16 @@ def compiled(function: Function) -> Function:
     """Compile a function of numbers and arrays; divisions by zero give inf and NaN, as numpy's."""
     _choose_cache(function)
     return cast(Function, numba.njit(cache=True, error_model='numpy')(function))
+
+
+def bare(function: Function) -> Function:
+    """
+    Compile a function that makes no arrays, without counting the references to those it is given.
+
+    numba counts each array of a table wherever some of it is looked at, which takes more time than
+    all the rest of a short loop.
+    """
+    _choose_cache(function)
+    # Not among numba's documented options.
+    options: dict[str, Any] = {'cache': True, 'error_model': 'numpy', '_nrt': False}
+    return cast(Function, numba.njit(**options)(function))

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from crgame_ros.traffic.agents import AgentTable
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.lane_table import IntArray
+
 Array = NDArray[np.float64]
 
 
@@ -79,7 +83,8 @@ class CourtesyRules:
         return np.where(yields, wanted, 0.0), yields
 
 
-def relief_at_change(gap: Array, desired_gap: Array) -> Array:
+@compiled
+def relief_at_change(gap: float, desired_gap: float) -> float:
     """
     Give how much shorter than usual a gap may be right after a lane change.
 
@@ -90,28 +95,57 @@ def relief_at_change(gap: Array, desired_gap: Array) -> Array:
     (FS 3) would, and send a wave of braking backwards. The relief is added to the gap that the
     controller sees.
 
-    :param gap: (A,) to the new leader, bumper to bumper [m]
-    :param desired_gap: (A,) of the car-following model [m]
-    :return: (A,) [m]
+    :param gap: to the new leader, bumper to bumper [m]
+    :param desired_gap: of the car-following model [m]
+    :return: [m]
     """
-    return np.maximum(desired_gap - gap, 0.0)
+    return max(desired_gap - gap, 0.0)
 
 
-def fade_relief(relief: Array, gap: Array, desired_gap: Array, dt_s: float,
-                opening_time: float = 10.0) -> Array:
+def fading(dt_s: float, opening_time: float = 10.0) -> float:
+    """
+    Give the share of a relief that is left after some time.
+
+    :param opening_time: time constant of what Laval and Leclercq (2008) call relaxation; the
+        value is ours [s]
+    """
+    return float(np.exp(-dt_s / opening_time))
+
+
+@compiled
+def fade_relief(relief: float, gap: float, desired_gap: float, left: float) -> float:
     """
     Let the gap open gradually to the usual one.
 
     The relief decays with a time constant, and is never more than what is missing: once the gap
     has opened it is gone, and a vehicle that stops keeps none.
 
-    :param relief: (A,) before [m]
-    :param gap: (A,) to the leader; inf where there is none [m]
-    :param desired_gap: (A,) of the car-following model at the present speed [m]
-    :param dt_s: time since the last call [s]
-    :param opening_time: time constant of what Laval and Leclercq (2008) call relaxation; the
-        value is ours [s]
-    :return: (A,) [m]
+    :param relief: before [m]
+    :param gap: to the leader; inf where there is none [m]
+    :param desired_gap: of the car-following model at the present speed [m]
+    :param left: from `fading`, for the time since the last call.
+    :return: [m]
     """
-    missing = np.maximum(desired_gap - gap, 0.0)
-    return np.minimum(relief * np.exp(-dt_s / opening_time), missing)
+    return min(relief * left, max(desired_gap - gap, 0.0))
+
+
+@compiled
+def note_leaders(agents: AgentTable, slots: IntArray, gap: Array, leader: IntArray,
+                 desired_gap: Array, left: float, cooperative: bool) -> None:
+    """
+    Note who is next ahead of agents (A), and how much nearer than usual for now.
+
+    :param gap: (A) inf where nobody is ahead [m]
+    :param leader: (A) as `AgentTable.leader`.
+    :param desired_gap: (A) of the car-following model [m]
+    :param left: from `fading`.
+    :param cooperative: whether the gap to somebody who has cut in opens gradually, as after a
+        change that was agreed upon.
+    """
+    for i, slot in enumerate(slots):
+        relief = 0.0
+        if abs(gap[i]) < np.inf:
+            relief = fade_relief(agents.relief[slot], gap[i], desired_gap[i], left)
+            if cooperative and leader[i] != agents.leader[slot]:
+                relief = max(relief, relief_at_change(gap[i], desired_gap[i]))
+        agents.relief[slot], agents.leader[slot] = relief, leader[i]

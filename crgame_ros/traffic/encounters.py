@@ -4,10 +4,8 @@
 
 import math
 
-import numpy as np
-
 from crgame_ros.traffic.agents import AgentTable
-from crgame_ros.traffic.compiled import compiled, inlined
+from crgame_ros.traffic.compiled import bare, inlined
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import (
     angle_between,
@@ -16,7 +14,7 @@ from crgame_ros.traffic.lane_table import (
     point_on,
     project_on,
 )
-from crgame_ros.traffic.leaders import first_from, LONGEST, Pairs, swing, Ways
+from crgame_ros.traffic.leaders import Corridors, first_from, LONGEST, Pairs, swing, Ways
 from crgame_ros.traffic.motion import onward
 from crgame_ros.traffic.placement import Entries
 
@@ -52,51 +50,49 @@ ACROSS = 2.0
 SPARE_TIME, SPARE_ROOM = 0.4, 0.4
 
 
-@compiled
-def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
-             entries: Entries, pairs: Pairs, low: FloatArray, high: FloatArray,
-             wanted: FloatArray) -> None:
+@bare
+def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, entries: Entries,
+             pairs: Pairs, corridor: Corridors, wanted: FloatArray, result: FloatArray) -> None:
     """
-    Replace accelerations (P) that a model of car following wants by what the encounter demands.
+    Lower accelerations (A) to what a model of car following wants, or the encounter demands.
 
     Behind who drives the same way nothing above `FIRMEST` unless that is what it takes to halt
     when the other does. For another agent that drives across only the last moment to brake
     counts, and nothing if both pass each other as they go; for who walks into the way nothing
     if one has passed before.
 
-    :param slots: (A) of the agents that `pairs` are of.
-    :param low, high: (A) right and left edge of what each agent takes [m]
-    :param wanted: (P) [m/s^2]
+    :param corridor: what agents (A) take.
+    :param wanted: (P) by the model [m/s^2]
     """
     for p in range(len(pairs.agent)):
         i, n = pairs.agent[p], pairs.entry[p]
-        slot = slots[i]
+        slot, behind = corridor.owner[i], wanted[p]
         if entries.crosses[n] and entries.owner[n] >= 0:
             needed = agents.speed[slot]**2 / (2.0 * max(pairs.gap[p] - 0.5, 0.05))
-            wanted[p] = -_braking(lanes, following, agents, slot, entries.owner[n]) \
+            behind = -_braking(lanes, following, agents, slot, entries.owner[n]) \
                 if needed > ALARM else math.inf
         elif entries.owner[n] < 0 and abs(entries.speed[n]) < ACROSS and _passes_before(
-                agents, slot, entries, n, pairs.gap[p], low[i], high[i]):
-            wanted[p] = math.inf
+                agents, slot, entries, n, pairs.gap[p], corridor.low[i], corridor.high[i]):
+            behind = math.inf
         elif entries.speed[n] > -0.5:
             theirs = max(entries.speed[n], 0.0)
             room = pairs.gap[p] - LAST_GAP + theirs**2 / (
                 2.0 * max(THEIRS, -entries.acceleration[n]))
             needed = agents.speed[slot]**2 / (2.0 * max(room, 0.01)) if pairs.gap[p] > 0.0 \
                 else 0.0
-            wanted[p] = max(wanted[p], -max(needed, FIRMEST))
+            behind = max(behind, -max(needed, FIRMEST))
+        result[i] = min(result[i], behind)
 
 
-@compiled
+@bare
 def brush(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
-          entries: Entries, way: Ways) -> FloatArray:
+          entries: Entries, way: Ways, result: FloatArray) -> None:
     """
-    Give accelerations (A) with which agents don't touch who pokes into their lanes from another.
+    Lower accelerations (A) so that agents don't touch who pokes into their lanes from another.
 
     Where ways part, join or turn beside each other somebody may be in none's way and yet touch.
     Of two the one that is behind brakes; for who stands everybody does.
     """
-    result = np.full(len(slots), math.inf)
     for i, slot in enumerate(slots):
         reach = 0.5 * agents.length[slot] + 3.0 + BRUSH_TIME * agents.speed[slot]
         if agents.source[slot] >= 0:
@@ -112,10 +108,9 @@ def brush(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntA
                     result[i] = min(result[i], _brushed(
                         lanes, following, agents, slot, other))
                 n += 1
-    return result
 
 
-@compiled
+@bare
 def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
              other: int) -> float:
     """Give the acceleration with which an agent does not touch another, inf for any [m/s^2]."""
@@ -139,7 +134,7 @@ def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: in
     return -TRIED[-1]
 
 
-@compiled
+@bare
 def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
                   slot: int) -> bool:
     """
@@ -160,7 +155,7 @@ def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slo
     return False
 
 
-@compiled
+@bare
 def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap: float,
                    low: float, high: float) -> bool:
     """Tell whether an agent has passed when somebody beside its way gets there."""
@@ -176,7 +171,7 @@ def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap:
                 * agents.speed[slot])
 
 
-@compiled
+@bare
 def _braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
              other: int) -> float:
     """Give the gentlest braking with which two agents miss each other, -inf if none is needed."""
@@ -192,7 +187,7 @@ def _braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: in
     return TRIED[-1] if soon < LAST_MOMENT else FIRMEST
 
 
-@compiled
+@bare
 def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, speed: float,
            other: int, braking: float, foreseen: float, beside: float) -> float:
     """
@@ -239,12 +234,12 @@ def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, floa
 @inlined
 def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float) -> float:
     """Give how far to the left of a bend's middle the rear axle runs [m]."""
-    bend = lanes.curvature[nearest_row(lanes, lane, s)]
+    bend = lanes.line[nearest_row(lanes, lane, s)].curvature
     shift = swing(bend, agents.rear_to_center[slot] + 0.5 * agents.length[slot])
     return shift if bend > 0.0 else -shift
 
 
-@compiled
+@bare
 def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                 start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
     """Foresee x, y and heading of an agent's centre after some way along its route [m, rad]."""
@@ -259,7 +254,7 @@ def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
             y + d * math.cos(yaw) + middle * math.sin(heading), heading)
 
 
-@compiled
+@bare
 def _overlap(east: float, north: float, yaw: float, other_yaw: float, length: float,
              width: float, other_length: float, other_width: float) -> bool:
     """Tell whether two rectangles, given by half their sizes, overlap: no axis parts them."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.compiled import bare, compiled
+from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
 
 CELL = 3.0
 # How far from a centre line a body's centre may be and still reach into the lane [m].
@@ -23,9 +23,12 @@ class CellTable(NamedTuple):
 
     :param origin_x, origin_y: corner of the grid [m]
     :param columns, rows: of cells in y and in x.
-    :param keys: (K) of the cells with lanes, ascending; `starts` (K + 1) of their lanes.
+    :param keys: (K) of the cells with lanes, ascending, by rows; `row_starts` (rows + 1) of those
+        of each row, `starts` (K + 1) of their lanes.
     :param lanes: (N) of all cells, one cell behind the other.
     :param guesses: (N) arc length of the lane nearest to the cell [m]
+    :param turning: (L) greatest angle between any two parts of a lane [rad]
+    :param widest: (L) greatest distance from its middle to its edge [m]
     """
 
     origin_x: float
@@ -33,12 +36,15 @@ class CellTable(NamedTuple):
     columns: int
     rows: int
     keys: IntArray
+    row_starts: IntArray
     starts: IntArray
     lanes: IntArray
     guesses: FloatArray
+    turning: FloatArray
+    widest: FloatArray
 
 
-@compiled
+@bare
 def cell_of(cells: CellTable, x: float, y: float) -> int:
     """Give the row of the cell around a point, or -1 where no lane is near."""
     row, column = math.floor((x - cells.origin_x) / CELL), math.floor(
@@ -46,8 +52,14 @@ def cell_of(cells: CellTable, x: float, y: float) -> int:
     if not (0 <= row < cells.rows and 0 <= column < cells.columns):
         return -1
     key = int(row) * cells.columns + int(column)
-    found = int(np.searchsorted(cells.keys, key))
-    return found if found < len(cells.keys) and cells.keys[found] == key else -1
+    low, high = cells.row_starts[int(row)], cells.row_starts[int(row) + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if cells.keys[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return int(low) if low < len(cells.keys) and cells.keys[low] == key else -1
 
 
 @compiled
@@ -93,7 +105,19 @@ class LaneCells:
         filled, starts = np.unique(key[order], return_index=True)
         self.table = CellTable(
             float(self._origin[0]), float(self._origin[1]), self._columns, self._rows, filled,
-            np.append(starts, len(key)), lane_of[order].astype(np.int64), guess[order])
+            np.searchsorted(filled, np.arange(self._rows + 1) * self._columns),
+            np.append(starts, len(key)), lane_of[order].astype(np.int64), guess[order],
+            np.array([self._turning(i) for i in range(len(graph))]),
+            np.maximum.reduceat(graph.half_width, graph.first))
+
+    def _turning(self, lane: int) -> float:
+        """Give the greatest angle between headings or chords of a lane [rad]."""
+        graph, first = self._graph, int(self._graph.first[lane])
+        rows = slice(first, first + int(graph.count[lane]))
+        chords = np.arctan2(np.diff(graph.y[rows]), np.diff(graph.x[rows]))
+        turned = np.concatenate((heading_difference(chords, graph.yaw[first]),
+                                 graph.yaw[rows] - graph.yaw[first]))
+        return float(np.ptp(turned))
 
     def near(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """

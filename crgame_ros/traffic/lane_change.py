@@ -8,31 +8,36 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from crgame_ros.traffic.compiled import compiled, inlined
+
 Array = NDArray[np.float64]
 
 # Greatest |f''| of f(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2 -+ sqrt(3) / 6.
 PEAK = 10.0 / math.sqrt(3.0)
+# A change is as long as this at least [m].
+SHORTEST_CHANGE = 12.0
 # Advantage below which nobody changes lanes (Kesting, Treiber and Helbing 2007: 0.1) [m/s^2].
 CHANGE_THRESHOLD = 0.2
 
 
-def look_ahead(speed: Array, shift: Array | float = 3.5, duration: float = 4.0,
-               shortest: float = 12.0, max_lateral_acceleration: float = 2.0) -> Array:
+@compiled
+def look_ahead(speed: float, shift: float = 3.5, duration: float = 4.0,
+               shortest: float = SHORTEST_CHANGE, max_lateral_acceleration: float = 2.0) -> float:
     """
     Give the length of a lane change, FS's empirical function of the speed.
 
     L = max(L_min, v t, v sqrt(10 / sqrt(3) W / a_max)): drivers take about the same time at every
     speed, and no more lateral acceleration than is comfortable.
 
-    :param speed: (A,) [m/s]
-    :param shift: W, (A,) distance between the lanes [m]
+    :param speed: [m/s]
+    :param shift: W, distance between the lanes [m]
     :param duration: t; drivers take 3 to 6 s (ours) [s]
     :param shortest: L_min, about two and a half lengths of a car (ours) [m]
     :param max_lateral_acceleration: comfortable (ours) [m/s^2]
-    :return: (A,) [m]
+    :return: [m]
     """
-    fastest = np.sqrt(PEAK * np.abs(shift) / max_lateral_acceleration)
-    return np.maximum(shortest, speed * np.maximum(duration, fastest))
+    fastest = math.sqrt(PEAK * abs(shift) / max_lateral_acceleration)
+    return max(shortest, speed * max(duration, fastest))
 
 
 def quintic(offset: Array, slope: Array, curvature: Array, target: Array,
@@ -60,34 +65,20 @@ def quintic(offset: Array, slope: Array, curvature: Array, target: Array,
     return scaled / length[:, None] ** np.arange(6)
 
 
-def evaluate(coefficients: Array, x: Array, length: Array) -> tuple[Array, Array, Array]:
+@inlined
+def offset_at(curve: Array, x: float, length: float) -> float:
     """
-    Evaluate paths of lane changes.
+    Evaluate the path of a lane change (FS 4).
 
-    :param coefficients: (A, 6) from `quintic`
-    :param x: (A,) or (A, P) distance since the start of the change; clipped to [0, L], so that
-        behind its end the path stays in the centre of the lane [m]
-    :param length: (A,) L [m]
-    :return: y [m], y', y'' [1/m], each of the shape of x
-    """
-    p = coefficients.T if x.ndim == 1 else coefficients.T[..., None]
-    x = np.clip(x, 0.0, length if x.ndim == 1 else length[:, None])
-    return (p[0] + x * (p[1] + x * (p[2] + x * (p[3] + x * (p[4] + x * p[5])))),
-            p[1] + x * (2.0 * p[2] + x * (3.0 * p[3] + x * (4.0 * p[4] + 5.0 * x * p[5]))),
-            2.0 * p[2] + x * (6.0 * p[3] + x * (12.0 * p[4] + 20.0 * x * p[5])))
-
-
-def peak_lateral_acceleration(shift: Array | float, speed: Array | float,
-                              length: Array | float) -> Array | float:
-    """
-    Give the greatest v^2 y'' of a change between parallel lanes: 10 / sqrt(3) W v^2 / L^2.
-
-    :param shift: W [m]
-    :param speed: v [m/s]
+    :param curve: (6,) from `quintic`
+    :param x: distance since the start of the change; clipped to [0, L], so that behind its end the
+        path stays in the centre of the lane [m]
     :param length: L [m]
-    :return: [m/s^2]
+    :return: y [m]
     """
-    return PEAK * np.abs(shift) * np.square(speed) / np.square(length)
+    x = min(max(x, 0.0), length)
+    return curve[0] + x * (curve[1] + x * (curve[2] + x * (
+        curve[3] + x * (curve[4] + x * curve[5]))))
 
 
 @dataclass(frozen=True)
@@ -166,21 +157,22 @@ def incentive(here: Array, there: Array, others: Array | float = 0.0,
     return there - here + politeness * others
 
 
-def urgency(distance: Array, speed: Array, changes: Array | float = 1.0,
-            horizon: float = 15.0, shortest: float = 100.0) -> Array:
+@compiled
+def urgency(distance: float, speed: float, changes: float = 1.0, horizon: float = 15.0,
+            shortest: float = 100.0) -> float:
     """
     Give the hurry of a change that the route asks for, growing towards the last place for it.
 
     0 until the time horizon, then linear up to 1 where the lane change has just its length left;
     every further lane to cross moves both back by as much (ours).
 
-    :param distance: (A,) to the last place for the change, inf where none is needed [m]
-    :param speed: (A,) [m/s]
-    :param changes: (A,) lanes to cross
+    :param distance: to the last place for the change, inf where none is needed [m]
+    :param speed: [m/s]
+    :param changes: lanes to cross
     :param horizon: time before that place at which the hurry begins [s]
     :param shortest: distance at which it begins at least [m]
-    :return: (A,) from 0 to 1
+    :return: from 0 to 1
     """
     last = look_ahead(speed) * changes
-    first = np.maximum(shortest, horizon * speed) * changes
-    return np.clip((first - distance) / np.maximum(first - last, 1.0), 0.0, 1.0)
+    first = max(shortest, horizon * speed) * changes
+    return min(max((first - distance) / max(first - last, 1.0), 0.0), 1.0)

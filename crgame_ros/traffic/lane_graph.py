@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.lane_table import LaneTable, poses_on, project_all
+from crgame_ros.traffic.lane_table import LaneTable, point_records, poses_on, project_all
 from crgame_ros.traffic.tracking import PURSUIT_TIME
 
 FloatArray = NDArray[np.float64]
@@ -56,8 +56,8 @@ class LaneGraph:
         self._slow_at_kinks(lateral_acceleration)
         self.table = LaneTable(
             self.first, self.count, self.length, self.step, self.limit, self.left, self.right,
-            self.successors, self.predecessors, self.x, self.y, self.yaw, np.cos(self.yaw),
-            np.sin(self.yaw), self.curvature, self.half_width)
+            self.successors, self.predecessors, point_records(
+                self.x, self.y, self.yaw, self.curvature, self.half_width))
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -161,7 +161,9 @@ class LaneGraph:
         :param rounds: of correction; one is enough for a guess that is off by centimetres.
         :return: s [m], d [m] and the lane's heading there [rad]
         """
-        return project_all(self.table, lane, x, y, np.asarray(guess, dtype=np.float64), rounds)
+        # Copies: compiled code differs for views, and for arrays that are not to be written to.
+        return project_all(self.table, np.array(lane), np.array(x), np.array(y),
+                           np.array(guess, dtype=np.float64), rounds)
 
     def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Find points (N) in the coordinates of one lane, wherever on it; s, d [m]."""

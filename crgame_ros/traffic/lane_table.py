@@ -3,7 +3,7 @@
 """The lanes as flat tables, and the curvilinear frame of a lane, for compiled loops."""
 
 import math
-from typing import NamedTuple
+from typing import cast, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,42 @@ from crgame_ros.traffic.compiled import compiled, inlined
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+
+class Point(Protocol):
+    """
+    A point of a centre line; cosine and sine are those of its yaw.
+
+    :param x, y, yaw: [m, rad]
+    :param curvature: [1/m]
+    :param half_width: of the lane [m]
+    """
+
+    x: float
+    y: float
+    yaw: float
+    cos: float
+    sin: float
+    curvature: float
+    half_width: float
+
+
+class Points(Protocol):
+    """Points one behind the other: a structured array, whose records are rows of the cache."""
+
+    def __getitem__(self, row: int) -> Point: ...
+
+
+def point_records(x: FloatArray, y: FloatArray, yaw: FloatArray, curvature: FloatArray,
+                  half_width: FloatArray) -> Points:
+    """Put the columns of points into records."""
+    columns = {'x': x, 'y': y, 'yaw': yaw, 'cos': np.cos(yaw), 'sin': np.sin(yaw),
+               'curvature': curvature, 'half_width': half_width}
+    # Filled up to 64 bytes.
+    result = np.zeros(len(x), dtype=[(name, 'f8') for name in (*columns, 'unused')])
+    for name, column in columns.items():
+        result[name] = column
+    return cast(Points, result)
 
 
 class LaneTable(NamedTuple):
@@ -25,8 +61,7 @@ class LaneTable(NamedTuple):
     :param limit: (L) speed limit [m/s]
     :param left, right: (L) neighbours of the same direction, or -1.
     :param successors, predecessors: (L, S) filled up with -1.
-    :param x, y, yaw, cos, sin, curvature, half_width: of the points; cosine and sine are those of
-        the yaw [m, rad, 1/m, m]
+    :param line: the points, a record each.
     """
 
     first: IntArray
@@ -38,13 +73,7 @@ class LaneTable(NamedTuple):
     right: IntArray
     successors: IntArray
     predecessors: IntArray
-    x: FloatArray
-    y: FloatArray
-    yaw: FloatArray
-    cos: FloatArray
-    sin: FloatArray
-    curvature: FloatArray
-    half_width: FloatArray
+    line: Points
 
 
 @inlined
@@ -62,9 +91,9 @@ def point_on(lanes: LaneTable, lane: int, s: float) -> tuple[float, float, float
     share -= row
     row += lanes.first[lane]
     inside = min(max(share, 0.0), 1.0)
-    x, y, yaw = lanes.x[row], lanes.y[row], lanes.yaw[row]
-    return (x + share * (lanes.x[row + 1] - x), y + share * (lanes.y[row + 1] - y),
-            yaw + inside * (lanes.yaw[row + 1] - yaw))
+    here, after = lanes.line[row], lanes.line[row + 1]
+    return (here.x + share * (after.x - here.x), here.y + share * (after.y - here.y),
+            here.yaw + inside * (after.yaw - here.yaw))
 
 
 @inlined
@@ -89,14 +118,15 @@ def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
     s, d, yaw = guess, 0.0, 0.0
     for _ in range(rounds):
         row, share = segment(lanes, lane, s)
-        east = x - lanes.x[row] - share * (lanes.x[row + 1] - lanes.x[row])
-        north = y - lanes.y[row] - share * (lanes.y[row + 1] - lanes.y[row])
+        here, after = lanes.line[row], lanes.line[row + 1]
+        east = x - here.x - share * (after.x - here.x)
+        north = y - here.y - share * (after.y - here.y)
         inside = min(max(share, 0.0), 1.0)
-        cos = lanes.cos[row] + inside * (lanes.cos[row + 1] - lanes.cos[row])
-        sin = lanes.sin[row] + inside * (lanes.sin[row + 1] - lanes.sin[row])
+        cos = here.cos + inside * (after.cos - here.cos)
+        sin = here.sin + inside * (after.sin - here.sin)
         s += east * cos + north * sin
         d = north * cos - east * sin
-        yaw = lanes.yaw[row] + inside * (lanes.yaw[row + 1] - lanes.yaw[row])
+        yaw = here.yaw + inside * (after.yaw - here.yaw)
     return s, d, yaw
 
 

@@ -5,9 +5,10 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crgame_ros.traffic.agents import FREE
-from crgame_ros.traffic.compiled import compiled, inlined
+from crgame_ros.traffic.agents import AgentTable, FREE
+from crgame_ros.traffic.compiled import bare, compiled, inlined
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row
 from crgame_ros.traffic.placement import Entries, rear_within
@@ -26,7 +27,7 @@ class Ways(NamedTuple):
     """
     The lanes that agents (A) will drive, in steps (J).
 
-    :param lane: (A, J) -1 behind the end of the way.
+    :param lane: (A, J) of no meaning behind the end of the way, as the offsets.
     :param offset: (A, J) from the agent's centre to the lane's beginning [m]; negative for the
         lane that it is in.
     :param depth: (A) steps of each way.
@@ -72,33 +73,78 @@ class Corridors(NamedTuple):
     high: FloatArray
 
 
-def look_distance(speed: FloatArray) -> FloatArray:
+@inlined
+def look_distance(speed: float) -> float:
     """Give how far ahead an agent looks: it stops in half of that, comfortably [m]."""
-    return np.asarray(50.0 + 3.0 * speed + speed**2 / 4.0)
+    return 50.0 + 3.0 * speed + speed**2 / 4.0
 
 
 @compiled
-def ways(lanes: LaneTable, following: IntArray, lane: IntArray, s: FloatArray,
-         destination: IntArray, horizon: FloatArray) -> Ways:
+def ways(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+         lane: IntArray, s: FloatArray) -> Ways:
     """
-    Follow the routes of agents (A) from where they are, each as far as it looks.
+    Follow the routes of agents (A), each as far as it looks.
 
     :param following: (D, L) next lane to a destination, or -1 (`Routes.next`).
+    :param lane, s: (A) where on the road they are looked at [m].
     """
-    count = len(lane)
-    way = Ways(np.full((count, MAX_LANES), -1, np.int64), np.zeros((count, MAX_LANES)),
-               np.ones(count, np.int64), horizon)
+    count = len(slots)
+    way = Ways(np.empty((count, MAX_LANES), np.int64), np.empty((count, MAX_LANES)),
+               np.empty(count, np.int64), np.empty(count))
     for i in range(count):
-        current, offset = lane[i], -s[i]
-        way.lane[i, 0], way.offset[i, 0] = current, offset
-        for step in range(1, MAX_LANES):
-            offset += lanes.length[current]
-            current = following[destination[i], current]
-            if current < 0 or offset >= horizon[i]:
-                break
-            way.lane[i, step], way.offset[i, step] = current, offset
-            way.depth[i] = step + 1
+        _follow(lanes, following, agents, slots[i], lane[i], s[i], way, i)
     return way
+
+
+@compiled
+def own_ways(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray) -> Ways:
+    """Follow the routes of agents (A) from where they are; see `ways`."""
+    count = len(slots)
+    way = Ways(np.empty((count, MAX_LANES), np.int64), np.empty((count, MAX_LANES)),
+               np.empty(count, np.int64), np.empty(count))
+    for i, slot in enumerate(slots):
+        _follow(lanes, following, agents, slot, agents.lane[slot], agents.s[slot], way, i)
+    return way
+
+
+@bare
+def _follow(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, lane: int,
+            s: float, way: Ways, i: int) -> None:
+    """Write the way of an agent."""
+    offset, horizon, depth = -s, look_distance(agents.speed[slot]), 1
+    way.lane[i, 0], way.offset[i, 0], way.horizon[i] = lane, offset, horizon
+    for step in range(1, MAX_LANES):
+        offset += lanes.length[lane]
+        lane = following[agents.destination[slot], lane]
+        if lane < 0 or offset >= horizon:
+            break
+        way.lane[i, step], way.offset[i, step] = lane, offset
+        depth = step + 1
+    way.depth[i] = depth
+
+
+@compiled
+def corridors(agents: AgentTable, slots: IntArray, right: FloatArray,
+              left: FloatArray) -> Corridors:
+    """Give what agents (A) take whose middles are between offsets (A) from the reference [m]."""
+    count = len(slots)
+    result = Corridors(slots, np.empty(count), np.empty(count), np.empty(count), np.empty(count))
+    for i, slot in enumerate(slots):
+        half, length = 0.5 * agents.width[slot], agents.length[slot]
+        result.length[i], result.front[i] = length, agents.rear_to_center[slot] + 0.5 * length
+        result.low[i], result.high[i] = right[i] - half, left[i] + half
+    return result
+
+
+@compiled
+def own_corridors(lanes: LaneTable, agents: AgentTable, slots: IntArray,
+                  reference: FloatArray) -> Corridors:
+    """Give what agents (A) take between the reference that they follow and where they are."""
+    right, left = np.empty(len(slots)), np.empty(len(slots))
+    for i, slot in enumerate(slots):
+        off = agents.d[slot] - reference[nearest_row(lanes, agents.lane[slot], agents.s[slot])]
+        right[i], left[i] = min(off, 0.0), max(off, 0.0)
+    return corridors(agents, slots, right, left)
 
 
 @inlined
@@ -133,32 +179,42 @@ def ahead(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
 
     :param reference: offset of the reference at each point of the lanes [m]; empty: none.
     """
-    count = len(way.depth)
-    agent, entry = np.empty(count * MAX_AHEAD, np.int64), np.empty(count * MAX_AHEAD, np.int64)
-    distance = np.empty(count * MAX_AHEAD)
+    room = len(way.depth) * MAX_AHEAD
+    found = Pairs(np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room),
+                  np.empty(room))
+    used = _find(lanes, entries, way, corridor, reference, found)
+    return Pairs(found.agent[:used], found.entry[:used], found.gap[:used], found.distance[:used])
+
+
+@bare
+def _find(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
+          reference: FloatArray, found: Pairs) -> int:
+    """Write the pairs of all agents; return how many there are."""
     used = 0
-    for i in range(count):
-        end = used + MAX_AHEAD
+    for i in range(len(way.depth)):
+        end, horizon = used + MAX_AHEAD, way.horizon[i]
         leaders = 0
         for step in range(way.depth[i]):
             lane, offset = way.lane[i, step], way.offset[i, step]
-            n = first_from(entries, lane, -offset - LONGEST)
-            while n < entries.begin[lane + 1] and used < end and leaders < MAX_LEADERS and (
-                    entries.rear[n] + offset < way.horizon[i]):
+            behind = entries.begin[lane + 1]
+            for n in range(first_from(entries, lane, -offset - LONGEST), behind):
+                if entries.rear[n] + offset >= horizon:
+                    break
                 rear = _in_the_way(lanes, entries, n, lane, offset, corridor, i, reference)
                 if rear < np.inf:
-                    agent[used], entry[used], distance[used] = i, n, rear + offset
+                    found.agent[used], found.entry[used] = i, n
+                    found.distance[used] = rear + offset
+                    found.gap[used] = rear + offset - 0.5 * corridor.length[i]
                     used += 1
                     leaders += 0 if entries.crosses[n] else 1
-                n += 1
+                    if used >= end or leaders >= MAX_LEADERS:
+                        break
             if used >= end or leaders >= MAX_LEADERS:
                 break
-    who = agent[:used].copy()
-    return Pairs(who, entry[:used].copy(), distance[:used] - 0.5 * corridor.length[who],
-                 distance[:used].copy())
+    return used
 
 
-@compiled
+@bare
 def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: float,
                 corridor: Corridors, i: int, reference: FloatArray) -> float:
     """Give where an entry that is in an agent's way begins [m], inf for any other."""
@@ -167,26 +223,34 @@ def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: f
         return np.inf
     row = nearest_row(lanes, lane, min(max(middle, 0.0), lanes.length[lane]))
     shift = reference[row] if len(reference) else 0.0
-    margin = SIDE_MARGIN + swing(lanes.curvature[row], corridor.front[i])
+    margin = SIDE_MARGIN + swing(lanes.line[row].curvature, corridor.front[i])
     return float(rear_within(entries, n, corridor.low[i] + shift - margin,
                              corridor.high[i] + shift + margin))
 
 
 @compiled
-def least(agent: IntArray, values: FloatArray, count: int, default: float) -> FloatArray:
-    """Give the least value (count) of each agent, the default where there is none."""
-    result = np.full(count, default)
-    for i in range(len(agent)):
-        result[agent[i]] = min(result[agent[i]], values[i])
+def obstacles(pairs: Pairs, standing: NDArray[np.bool_], count: int) -> FloatArray:
+    """Give the least gap (count) of each agent to what stands for good, or inf."""
+    result = np.full(count, np.inf)
+    for p in range(len(pairs.agent)):
+        if standing[pairs.entry[p]]:
+            result[pairs.agent[p]] = min(result[pairs.agent[p]], pairs.gap[p])
     return result
 
 
 @compiled
-def nearest(pairs: Pairs, owner: IntArray, count: int) -> tuple[FloatArray, IntArray]:
-    """Give the least gap (count) of each agent and whose it is; inf and `FREE` without one."""
+def nearest(pairs: Pairs, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, IntArray]:
+    """
+    Find who is next ahead of each agent.
+
+    :return: its gap (count), whose it is (count) and its row of `Entries` (count); inf, `FREE` and
+        -1 without one.
+    """
     gap, leader = np.full(count, np.inf), np.full(count, FREE, np.int64)
+    entry = np.full(count, -1, np.int64)
     for p in range(len(pairs.agent)):
         i = pairs.agent[p]
         if pairs.gap[p] < gap[i]:
-            gap[i], leader[i] = pairs.gap[p], owner[pairs.entry[p]]
-    return gap, leader
+            gap[i], entry[i] = pairs.gap[p], pairs.entry[p]
+            leader[i] = owner[entry[i]]
+    return gap, leader, entry

@@ -5,14 +5,16 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crgame_ros.traffic.agents import Agents, AgentTable
-from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
+from crgame_ros.traffic.compiled import bare, compiled
 from crgame_ros.traffic.encounters import FIRMEST, moderate
 from crgame_ros.traffic.followers import Followers
+from crgame_ros.traffic.lane_change import SHORTEST_CHANGE
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row
-from crgame_ros.traffic.leaders import least, Pairs, Ways
+from crgame_ros.traffic.leaders import Corridors, Pairs, Ways
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
 
@@ -25,6 +27,10 @@ LOOKS = (0.3, 0.6, 1.0)
 AT_LINE, AT_END = 1.6, 3.0
 # Lines are halted at with this gap [m], and a standing agent this near stays [m].
 LINE_GAP, AT_REST = 0.5, 0.3
+# Room before a standing obstacle from which one gets into the next lane [m].
+SWING_OUT = 10.0
+# Of a short lane that ends this share is left to change lanes in.
+REST_SHARE = 0.2
 # Comfortable jerk [m/s^3]: of braking more, of braking less or accelerating; what is wanted beyond
 # `EMERGENCY` is done at once [m/s^2].
 JERK, RELEASE, EMERGENCY = 3.0, 4.0, 3.0
@@ -41,7 +47,7 @@ def _envelope(lanes: LaneTable, speed: FloatArray) -> FloatArray:
     return result
 
 
-@compiled
+@bare
 def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: float, top: float,
              ahead: float) -> float:
     """Give the speed that limits and curves allow an agent a distance ahead of its centre."""
@@ -62,6 +68,13 @@ def _speeds(lanes: LaneTable, envelope: FloatArray, way: Ways, agents: AgentTabl
             slots: IntArray) -> tuple[FloatArray, FloatArray]:
     """Give what is allowed now (A), and the acceleration (A) that keeps to what is ahead."""
     desired, limit = np.empty(len(slots)), np.full(len(slots), math.inf)
+    _fill_speeds(lanes, envelope, way, agents, slots, desired, limit)
+    return desired, limit
+
+
+@bare
+def _fill_speeds(lanes: LaneTable, envelope: FloatArray, way: Ways, agents: AgentTable,
+                 slots: IntArray, desired: FloatArray, limit: FloatArray) -> None:
     for i, slot in enumerate(slots):
         factor, top, speed = agents.factor[slot], agents.top[slot], agents.speed[slot]
         desired[i] = _allowed(lanes, envelope, way, i, factor, top, 0.0)
@@ -70,10 +83,9 @@ def _speeds(lanes: LaneTable, envelope: FloatArray, way: Ways, agents: AgentTabl
             limit[i] = min(limit[i], (there - speed) / look)
         # Whoever is much too fast, because a limit has changed, takes its time.
         limit[i] = max(limit[i], -2.0 * COASTING)
-    return desired, limit
 
 
-@compiled
+@bare
 def halt_before(speed: float, distance: float, braking: float) -> float:
     """
     Give the acceleration that halts a distance ahead.
@@ -94,12 +106,34 @@ def halt_before(speed: float, distance: float, braking: float) -> float:
 
 
 @compiled
-def halts_before(speed: FloatArray, distance: FloatArray, braking: float) -> FloatArray:
-    """Give the accelerations (A) that halt distances ahead; see `halt_before`."""
-    result = np.empty(len(speed))
-    for i in range(len(speed)):
-        result[i] = halt_before(speed[i], max(distance[i], 0.0), braking)
-    return result
+def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTable,
+         slots: IntArray, distance: FloatArray, blocked: FloatArray,
+         swings: NDArray[np.bool_], wanted: FloatArray) -> None:
+    """
+    Let agents (A) halt at lines, where there is room to get around obstacles, and at lane ends.
+
+    :param drops: (L) lanes that end on the road.
+    :param distance: (A) of the front from a line, or inf; obstacles are added [m]
+    :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
+    :param swings: who changes lanes, of all slots.
+    :param wanted: (A) accelerations, which are lowered [m/s^2]
+    """
+    for i, slot in enumerate(slots):
+        speed, lane = agents.speed[slot], agents.lane[slot]
+        beside = lanes.left[lane] >= 0 or lanes.right[lane] >= 0
+        # Whoever is nearer already cannot make room any more.
+        if swings[slot] and beside and agents.source[slot] == NOBODY and (
+                blocked[i] > 0.5 * SWING_OUT):
+            distance[i] = min(distance[i], blocked[i] - SWING_OUT)
+        last = way.lane[i, way.depth[i] - 1]
+        end = math.inf
+        if drops[last]:
+            # Whoever halts there still has the room that a change of lanes takes.
+            end = (way.offset[i, way.depth[i] - 1] + lanes.length[last]
+                   - 0.5 * agents.length[slot]
+                   - min(SHORTEST_CHANGE, REST_SHARE * lanes.length[last]))
+        wanted[i] = min(wanted[i], halt_before(speed, max(distance[i], 0.0), AT_LINE))
+        wanted[i] = min(wanted[i], halt_before(speed, max(end, 0.0), AT_END))
 
 
 @compiled
@@ -118,21 +152,21 @@ def before_lines(speed: FloatArray, light: FloatArray) -> FloatArray:
 
 
 @compiled
-def smoothed(previous: FloatArray, wanted: FloatArray, speed: FloatArray,
-             dt_s: float) -> FloatArray:
-    """Limit how fast accelerations (A) change, but for emergencies [m/s^2]."""
-    result = np.empty(len(wanted))
-    for i in range(len(wanted)):
-        before = previous[i] if speed[i] > 0.0 else max(previous[i], 0.0)
+def smooth(agents: AgentTable, slots: IntArray, wanted: FloatArray, hardest: float,
+           dt_s: float) -> None:
+    """Limit accelerations (A), and but for emergencies how fast they change [m/s^2]."""
+    for i, slot in enumerate(slots):
+        speed, before = agents.speed[slot], agents.acceleration[slot]
+        if speed <= 0.0:
+            before = max(before, 0.0)
         low, high = before - JERK * dt_s, before + RELEASE * dt_s
         if wanted[i] < -EMERGENCY:
             low = wanted[i]
-        if before < -EMERGENCY or speed[i] < 1.0:
+        if before < -EMERGENCY or speed < 1.0:
             high = math.inf
-        result[i] = min(max(wanted[i], low), high)
-        if speed[i] <= 0.0 and wanted[i] < 0.0:
-            result[i] = wanted[i]
-    return result
+        if speed > 0.0 or wanted[i] >= 0.0:
+            wanted[i] = min(max(wanted[i], low), high)
+        wanted[i] = max(wanted[i], -hardest)
 
 
 class Longitudinal:
@@ -169,24 +203,25 @@ class Longitudinal:
         row = nearest_row(self._graph.table, lane, s)
         return float(min(self._graph.limit[lane] * factor, self._envelope[row]))
 
-    def behind(self, agents: Agents, slots: IntArray, desired: FloatArray, pairs: Pairs,
-               entries: Entries, corridor: tuple[FloatArray, FloatArray]) -> FloatArray:
+    def behind(self, agents: Agents, desired: FloatArray, pairs: Pairs, entries: Entries,
+               corridor: Corridors) -> FloatArray:
         """
         Give the acceleration (A) behind everything ahead; that of a free road at most.
 
-        :param corridor: right and left edge (A) of what each agent takes [m]
+        :param corridor: what each agent takes.
         """
+        slots = corridor.owner
         speed = agents.speed[slots]
         nobody = np.full(len(slots), np.inf)
-        free = self._followers.of(slots).acceleration(speed, desired, nobody, speed)
-        if not len(pairs.agent):
-            return np.asarray(free)
-        who, entry = pairs.agent, pairs.entry
-        wanted = self._followers.of(slots[who]).acceleration(
-            speed[who], desired[who], pairs.gap, entries.speed[entry],
-            agents.relief[slots[who]],
-            # Who changes lanes brakes for what is in the lane that it leaves.
-            np.where(entries.claims[entry], 0.0, entries.acceleration[entry]))
-        moderate(self._graph.table, self._following, agents.table, slots, entries, pairs,
-                 *corridor, wanted)
-        return np.asarray(np.minimum(free, least(who, wanted, len(slots), np.inf)))
+        result = np.asarray(self._followers.of(slots).acceleration(
+            speed, desired, nobody, speed), dtype=float)
+        if len(pairs.agent):
+            who, entry = pairs.agent, pairs.entry
+            wanted = self._followers.of(slots[who]).acceleration(
+                speed[who], desired[who], pairs.gap, entries.speed[entry],
+                agents.relief[slots[who]],
+                # Who changes lanes brakes for what is in the lane that it leaves.
+                np.where(entries.claims[entry], 0.0, entries.acceleration[entry]))
+            moderate(self._graph.table, self._following, agents.table, entries, pairs, corridor,
+                     np.asarray(wanted, dtype=float), result)
+        return result

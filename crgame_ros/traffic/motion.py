@@ -5,7 +5,8 @@
 import math
 
 from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
-from crgame_ros.traffic.compiled import compiled, inlined
+from crgame_ros.traffic.compiled import bare, inlined
+from crgame_ros.traffic.lane_change import offset_at
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row, project_on, segment
 from crgame_ros.traffic.routes import Routes
@@ -47,34 +48,38 @@ class Motion:
               self._dt_s)
 
 
-@compiled
+@bare
 def move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
          reference: FloatArray, substeps: int, dt_s: float) -> None:
     """Move agents by some steps; see `Motion.move`."""
     for slot in slots:
         # The sharpest bend as far as one looks where it is straight.
-        speed, bend = agents.speed[slot], 0.0
+        reach, bend = pursuit_distance(agents.speed[slot], 0.0), 0.0
         rear = agents.s[slot] - agents.rear_to_center[slot]
         for n in range(3):
             lane, there = onward(lanes, following, agents.destination[slot], agents.lane[slot],
-                                  rear + 0.5 * n * pursuit_distance(speed, 0.0))
-            bend = max(bend, abs(lanes.curvature[nearest_row(lanes, lane, there)]))
-        distance = pursuit_distance(speed, bend)
+                                  rear + 0.5 * n * reach)
+            bend = max(bend, abs(lanes.line[nearest_row(lanes, lane, there)].curvature))
+        distance = pursuit_distance(agents.speed[slot], bend)
         _drive(lanes, following, agents, slot, reference, distance, substeps, dt_s)
 
 
-@compiled
+@inlined
 def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
            reference: FloatArray, distance: float, substeps: int, dt_s: float) -> None:
     """Move one agent by some steps, each towards a point a distance ahead on its reference."""
     x, y, yaw = agents.x[i], agents.y[i], agents.yaw[i]
-    speed, steering = agents.speed[i], agents.steering[i]
+    speed, steering, acceleration = agents.speed[i], agents.steering[i], agents.acceleration[i]
     wheelbase, middle = agents.wheelbase[i], agents.rear_to_center[i]
-    acceleration = agents.acceleration[i]
+    lane, s, d = agents.lane[i], agents.s[i], agents.d[i]
+    length = lanes.length[lane]
+    # The corners of a vehicle whose front is f ahead of its rear axle stay equally far from
+    # the middle of a curve if that axle runs f^2 / (4 R) inside.
+    front = middle + 0.5 * agents.length[i]
     cos, sin, half_turn = math.cos(yaw), math.sin(yaw), 0.0
     for _ in range(substeps):
-        target_x, target_y = _target(lanes, following, agents, i, reference,
-                                     agents.s[i] - middle + distance)
+        target_x, target_y = _target(lanes, following, agents, i, reference, lane,
+                                     s - middle + distance, front)
         dx, dy = target_x - x, target_y - y
         steering = steer_towards(dx * cos + dy * sin, dy * cos - dx * sin, wheelbase, steering,
                                  MAX_STEERING, MAX_STEERING_RATE, dt_s)
@@ -86,45 +91,34 @@ def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
         x, y = x + chord * cos, y + chord * sin
         cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
         yaw += 2.0 * half_turn
-        _follow(lanes, following, agents, i, x + middle * cos, y + middle * sin, speed * dt_s)
-    agents.x[i], agents.y[i], agents.yaw[i] = x, y, yaw
+        s, d, _ = project_on(lanes, lane, x + middle * cos, y + middle * sin, s + speed * dt_s,
+                             1)
+        if s > length and following[agents.destination[i], lane] >= 0:
+            lane, s, d = _go_over(lanes, following, agents, i, s, x + middle * cos,
+                                  y + middle * sin)
+            length = lanes.length[lane]
+    agents.x[i], agents.y[i], agents.yaw[i], agents.s[i], agents.d[i] = x, y, yaw, s, d
     agents.speed[i], agents.steering[i] = speed, steering
     agents.yaw_rate[i] = 2.0 * half_turn / dt_s
 
 
 @inlined
-def _follow(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, x: float,
-            y: float, way: float) -> None:
-    """Find where an agent's centre is in its lane now, or in the next one."""
-    lane = agents.lane[i]
-    agents.s[i], agents.d[i], _ = project_on(lanes, lane, x, y, agents.s[i] + way, 1)
-    if agents.s[i] > lanes.length[lane]:
-        onward = following[agents.destination[i], lane]
-        if onward >= 0:
-            _go_over(lanes, agents, i, onward, x, y)
-
-
-@inlined
 def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
-            reference: FloatArray, along: float) -> tuple[float, float]:
+            reference: FloatArray, lane: int, along: float, front: float) -> tuple[float, float]:
     """Find the point of the reference to steer for, at an arc length of the agent's lane."""
-    lane, there = agents.lane[i], along
-    if there > lanes.length[lane]:
-        lane, there = onward(lanes, following, agents.destination[i], lane, along)
-    row, beyond = segment(lanes, lane, there)
+    onto, there = onward(lanes, following, agents.destination[i], lane, along)
+    row, beyond = segment(lanes, onto, there)
     share = min(max(beyond, 0.0), 1.0)
+    here, after = lanes.line[row], lanes.line[row + 1]
     d = reference[row] + share * (reference[row + 1] - reference[row])
-    # The corners of a vehicle whose front is f ahead of its rear axle stay equally far from
-    # the middle of a curve if that axle runs f^2 / (4 R) inside.
-    front = agents.rear_to_center[i] + 0.5 * agents.length[i]
-    curvature = lanes.curvature[row] + share * (lanes.curvature[row + 1] - lanes.curvature[row])
+    curvature = here.curvature + share * (after.curvature - here.curvature)
     d += min(max(0.25 * curvature * front * front, -MAX_CURVE_SHIFT), MAX_CURVE_SHIFT)
     if agents.source[i] != NOBODY:
-        d += change_offset(agents.curve[i], along - agents.from_s[i], agents.span[i])
-    cos = lanes.cos[row] + share * (lanes.cos[row + 1] - lanes.cos[row])
-    sin = lanes.sin[row] + share * (lanes.sin[row + 1] - lanes.sin[row])
-    return (lanes.x[row] + beyond * (lanes.x[row + 1] - lanes.x[row]) - d * sin,
-            lanes.y[row] + beyond * (lanes.y[row + 1] - lanes.y[row]) + d * cos)
+        d += offset_at(agents.curve[i], along - agents.from_s[i], agents.span[i])
+    cos = here.cos + share * (after.cos - here.cos)
+    sin = here.sin + share * (after.sin - here.sin)
+    return (here.x + beyond * (after.x - here.x) - d * sin,
+            here.y + beyond * (after.y - here.y) + d * cos)
 
 
 @inlined
@@ -132,33 +126,27 @@ def onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
             s: float) -> tuple[int, float]:
     """Give the lane on a route, and the arc length there, for an arc length of an earlier one."""
     for _ in range(LANES_AHEAD):
+        if s <= lanes.length[lane]:
+            break
         onward = following[destination, lane]
-        if s <= lanes.length[lane] or onward < 0:
+        if onward < 0:
             break
         s -= lanes.length[lane]
         lane = onward
     return lane, s
 
 
-@compiled
-def change_offset(curve: FloatArray, x: float, span: float) -> float:
-    """Evaluate the path of a lane change (FS 4) a distance behind its start [m]."""
-    x = min(max(x, 0.0), span)
-    return float(curve[0] + x * (curve[1] + x * (curve[2] + x * (
-        curve[3] + x * (curve[4] + x * curve[5])))))
-
-
-@compiled
-def _go_over(lanes: LaneTable, agents: AgentTable, i: int, onward: int, x: float,
-             y: float) -> None:
-    """Take an agent over to the next lane where its own has ended."""
+@bare
+def _go_over(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, s: float,
+             x: float, y: float) -> tuple[int, float, float]:
+    """Take an agent over to the next lane where its own has ended; give it, s and d there [m]."""
     lane = agents.lane[i]
-    length = lanes.length[lane]
-    agents.previous[i] = lane
+    length, onward = lanes.length[lane], following[agents.destination[i], lane]
+    agents.previous[i], agents.lane[i] = lane, onward
     agents.from_s[i] -= length
-    agents.lane[i] = onward
-    agents.s[i], agents.d[i], _ = project_on(lanes, onward, x, y, agents.s[i] - length, 3)
+    s, d, _ = project_on(lanes, onward, x, y, s - length, 3)
     if agents.source[i] != NOBODY:
         # A change in progress goes on even where the lane that it leaves has ended.
         beside = lanes.right[onward] if agents.side[i] > 0 else lanes.left[onward]
         agents.source[i] = beside if beside >= 0 else onward
+    return onward, s, d

@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from crgame_ros.traffic.agents import AgentTable
-from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.compiled import bare, compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import LaneTable, project_on
 from crgame_ros.traffic.leaders import first_from
 from crgame_ros.traffic.placement import Entries, front_within, rear_within
 
 LOOK_BEHIND = 120.0
-MAX_LANES_BEHIND = 8
+MAX_LANES_BEHIND = 32
 MAX_LANES_AHEAD = 12
 # Who is beside has to be clear of the own width by this [m].
 SIDE_MARGIN = 0.15
@@ -66,6 +66,17 @@ def look_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots
         lane, np.empty(count), np.empty(count), np.empty(count), np.full(count, math.inf),
         np.zeros(count), np.full(count, -1, np.int64), np.full(count, math.inf),
         np.zeros(count), np.full(count, -1, np.int64))
+    _look(lanes, following, agents, slots, entries, result, np.empty(MAX_LANES_BEHIND, np.int64),
+          np.empty(MAX_LANES_BEHIND))
+    return result
+
+
+@bare
+def _look(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+          entries: Entries, result: Beside, pending_lane: IntArray,
+          pending_offset: FloatArray) -> None:
+    """Write what is beside all agents; `pending_…` is room to note lanes in."""
+    lane = result.lane
     for i, slot in enumerate(slots):
         yaw = agents.yaw[slot]
         x = agents.x[slot] + agents.rear_to_center[slot] * math.cos(yaw)
@@ -74,11 +85,10 @@ def look_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots
         s, d, heading = project_on(lanes, lane[i], x, y, guess, 3)
         result.s[i], result.d[i], result.turn[i] = s, d, yaw - heading
         _look_ahead(lanes, following, agents, slot, entries, result, i)
-        _look_behind(lanes, agents, slot, entries, result, i)
-    return result
+        _look_behind(lanes, agents, slot, entries, result, i, pending_lane, pending_offset)
 
 
-@compiled
+@bare
 def _look_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                 entries: Entries, result: Beside, i: int) -> None:
     """Find who is next ahead in the lane beside and those that follow on the route."""
@@ -101,13 +111,12 @@ def _look_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
             break
 
 
-@compiled
+@bare
 def _look_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entries,
-                 result: Beside, i: int) -> None:
+                 result: Beside, i: int, pending_lane: IntArray,
+                 pending_offset: FloatArray) -> None:
     """Find who is next behind, in the lane or those that lead to it."""
     half = 0.5 * agents.width[slot] + SIDE_MARGIN
-    pending_lane = np.full(32, -1, np.int64)
-    pending_offset = np.zeros(32)
     pending_lane[0], pending_offset[0] = result.lane[i], -result.s[i]
     done, pending = 0, 1
     while done < pending:

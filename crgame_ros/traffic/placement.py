@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.traffic.compiled import compiled, inlined
+from crgame_ros.traffic.compiled import bare, compiled, inlined
 from crgame_ros.traffic.lane_cells import cell_of, CellTable
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.lane_table import angle_between, LaneTable, project_on
+from crgame_ros.traffic.lane_table import angle_between, LaneTable, nearest_row, project_on
 
 # How far ahead a body's way to the side counts as taken, by what it is [s], and at most [m].
 WALKER_TIME, WALKER_SHIFT = 4.0, 6.0
@@ -22,6 +22,8 @@ CROSSING = 0.7
 BESIDE = 0.4
 # From the middle of a lane to its edge, at most, and what a first guess is off by [m].
 FARTHEST = 5.0
+# Beyond what rounding errors make of a body beside a straight lane [m].
+SURE = 0.01
 # Lanes with more bodies are sorted by a general algorithm.
 FEW = 32
 
@@ -48,11 +50,6 @@ class Bodies(NamedTuple):
     owner: IntArray
     time: FloatArray
     claim: IntArray
-
-    @classmethod
-    def join(cls, parts: 'list[Bodies]') -> 'Bodies':
-        """Put several together."""
-        return cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 class Entries(NamedTuple):
@@ -107,19 +104,15 @@ def place(lanes: LaneTable, cells: CellTable, bodies: Bodies) -> Entries:
     in the way of whom. Where it moves to the side, or walks, what it takes within its time ahead
     belongs to it; who changes lanes has the new one already.
     """
-    room = 0
     cell = np.empty(len(bodies.owner), np.int64)
-    for i in range(len(cell)):
-        cell[i] = cell_of(cells, bodies.poses[i, 0], bodies.poses[i, 1])
-        if cell[i] >= 0:
-            room += cells.starts[cell[i] + 1] - cells.starts[cell[i]]
-    found = _empty(len(lanes.first), room)
-    count = 0
-    for i in range(len(cell)):
-        if cell[i] >= 0:
-            for j in range(cells.starts[cell[i]], cells.starts[cell[i] + 1]):
-                count += _put(lanes, bodies, i, cells.lanes[j], cells.guesses[j], found, count)
-    return _sorted(found, count)
+    found = _empty(len(lanes.first), _find_cells(cells, bodies, cell))
+    count = _find(lanes, cells, bodies, cell, found)
+    order = np.empty(count, np.int64)
+    fill = np.empty(len(lanes.first), np.int64)
+    _sort(found, count, order, fill)
+    result = _empty(len(lanes.first), count)
+    _take(found, order, result)
+    return result
 
 
 @compiled
@@ -131,17 +124,56 @@ def _empty(lanes: int, room: int) -> Entries:
         np.empty(room, np.int64), np.empty(room, np.int64))
 
 
+@bare
+def _find_cells(cells: CellTable, bodies: Bodies, cell: IntArray) -> int:
+    """Write the cells of bodies (B); return how many lanes there are in them."""
+    room = 0
+    for i in range(len(cell)):
+        cell[i] = cell_of(cells, bodies.poses[i, 0], bodies.poses[i, 1])
+        if cell[i] >= 0:
+            room += cells.starts[cell[i] + 1] - cells.starts[cell[i]]
+    return int(room)
+
+
+@bare
+def _find(lanes: LaneTable, cells: CellTable, bodies: Bodies, cell: IntArray,
+          found: Entries) -> int:
+    """Write the entries of all bodies; return how many there are."""
+    count = 0
+    for i in range(len(cell)):
+        if cell[i] < 0:
+            continue
+        x, y, heading = bodies.poses[i, 0], bodies.poses[i, 1], bodies.poses[i, 2]
+        east, north = math.cos(heading), math.sin(heading)
+        half_length, half_width = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
+        reach = half_length + half_width
+        drift = min(math.hypot(bodies.velocities[i, 0], bodies.velocities[i, 1])
+                    * bodies.time[i], WALKER_SHIFT)
+        for j in range(cells.starts[cell[i]], cells.starts[cell[i] + 1]):
+            lane = cells.lanes[j]
+            s, d, yaw = project_on(lanes, lane, x, y, cells.guesses[j], 1)
+            if abs(d) > reach + FARTHEST:
+                continue
+            here = lanes.line[nearest_row(lanes, lane, cells.guesses[j])]
+            aside = half_length * abs(north * here.cos - east * here.sin) + half_width * abs(
+                east * here.cos + north * here.sin)
+            # Where a lane is straight its frame is the same all over.
+            slack = cells.turning[lane] * (40.0 + 3.0 * reach)
+            if abs(d) - aside - drift - slack > cells.widest[lane] + BESIDE + SURE and (
+                    bodies.claim[i] != lane):
+                continue
+            count += _put(lanes, bodies, i, lane, s, east, north, found, count)
+    return count
+
+
 @inlined
-def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, found: Entries,
-         n: int) -> int:
+def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, ahead_x: float,
+         ahead_y: float, found: Entries, n: int) -> int:
     """Write the entry of a body in a lane into row n, if it is in it; return how many."""
     x, y, heading = bodies.poses[i, 0], bodies.poses[i, 1], bodies.poses[i, 2]
     half_length, half_width = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
     reach = half_length + half_width
-    s, d, yaw = project_on(lanes, lane, x, y, guess, 1)
-    if abs(d) > reach + FARTHEST:
-        return 0
-    s, d, yaw = project_on(lanes, lane, x, y, s, 2)
+    s, d, yaw = project_on(lanes, lane, x, y, guess, 2)
     if s < -reach or s > lanes.length[lane] + reach or abs(d) > 20.0:
         return 0
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -149,7 +181,6 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, foun
     aside = v * cos - u * sin
     most = WALKER_SHIFT if bodies.time[i] > VEHICLE_TIME else VEHICLE_SHIFT
     drift = min(max(aside * bodies.time[i], -most), most)
-    ahead_x, ahead_y = math.cos(heading), math.sin(heading)
     rear = low = math.inf
     front = high = -math.inf
     for corner in range(4):
@@ -166,8 +197,7 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, foun
     claims = bodies.claim[i] == lane
     if claims:
         low, high = min(low, -half_width), max(high, half_width)
-    row = int(np.rint(s / lanes.step[lane]))
-    half = lanes.half_width[lanes.first[lane] + min(max(row, 0), lanes.points[lane] - 1)] + BESIDE
+    half = lanes.line[nearest_row(lanes, lane, s)].half_width + BESIDE
     if not (low < half and high > -half and front > 0.0 and rear < lanes.length[lane]):
         return 0
     turn = math.cos(angle_between(heading, yaw))
@@ -180,26 +210,39 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, foun
 
 
 @compiled
-def _sorted(found: Entries, count: int) -> Entries:
-    """Sort the first entries by lane, beginning and body."""
+def _sort(found: Entries, count: int, order: IntArray, fill: IntArray) -> None:
+    """Order the first entries by lane, beginning and body."""
     begin = found.begin
     for i in range(count):
         begin[found.lane[i] + 1] += 1
-    for lane in range(len(begin) - 1):
+    for lane in range(len(fill)):
         begin[lane + 1] += begin[lane]
-    fill = begin.copy()
-    order = np.empty(count, np.int64)
+        fill[lane] = begin[lane]
     for i in range(count):
         lane = found.lane[i]
         order[fill[lane]] = i
         fill[lane] += 1
-    for lane in range(len(begin) - 1):
-        _sort_part(order, found.rear, begin[lane], begin[lane + 1])
-    return Entries(
-        begin, found.lane[order], found.rear[order], found.front[order], found.low[order],
-        found.high[order], found.corners[order], found.drift[order], found.speed[order],
-        found.aside[order], found.acceleration[order], found.crosses[order],
-        found.claims[order], found.owner[order], found.body[order])
+    for lane in range(len(fill)):
+        if begin[lane + 1] - begin[lane] > 1:
+            _sort_part(order, found.rear, begin[lane], begin[lane + 1])
+
+
+@bare
+def _take(found: Entries, order: IntArray, result: Entries) -> None:
+    """Write entries in an order."""
+    for lane in range(len(found.begin)):
+        result.begin[lane] = found.begin[lane]
+    for n, i in enumerate(order):
+        result.lane[n], result.owner[n], result.body[n] = (
+            found.lane[i], found.owner[i], found.body[i])
+        result.rear[n], result.front[n] = found.rear[i], found.front[i]
+        result.low[n], result.high[n] = found.low[i], found.high[i]
+        for corner in range(4):
+            result.corners[n, corner, 0] = found.corners[i, corner, 0]
+            result.corners[n, corner, 1] = found.corners[i, corner, 1]
+        result.drift[n], result.speed[n] = found.drift[i], found.speed[i]
+        result.aside[n], result.acceleration[n] = found.aside[i], found.acceleration[i]
+        result.crosses[n], result.claims[n] = found.crosses[i], found.claims[i]
 
 
 @compiled
@@ -218,7 +261,7 @@ def _sort_part(order: IntArray, keys: FloatArray, start: int, end: int) -> None:
         order[j] = moved
 
 
-@compiled
+@bare
 def rear_within(entries: Entries, i: int, low: float, high: float) -> float:
     """
     Give where the part of an entry begins that is in the way between two offsets.
@@ -230,10 +273,10 @@ def rear_within(entries: Entries, i: int, low: float, high: float) -> float:
         return math.inf
     if entries.claims[i]:
         return float(entries.rear[i])
-    return _cut(entries.corners[i], low, high)
+    return _cut(entries.corners, i, 1.0, low, high)
 
 
-@compiled
+@bare
 def front_within(entries: Entries, i: int, low: float, high: float) -> float:
     """Give where the part of an entry between two offsets ends, -inf without one [m]."""
     low, high = low - max(entries.drift[i], 0.0), high - min(entries.drift[i], 0.0)
@@ -241,21 +284,20 @@ def front_within(entries: Entries, i: int, low: float, high: float) -> float:
         return -math.inf
     if entries.claims[i]:
         return float(entries.front[i])
-    corners = entries.corners[i].copy()
-    corners[:, 0] *= -1.0
-    return -_cut(corners, low, high)
+    return -_cut(entries.corners, i, -1.0, low, high)
 
 
-@compiled
-def _cut(corners: FloatArray, low: float, high: float) -> float:
-    """Give the least arc length of a quadrangle (4, 2) between two offsets, or inf."""
+@inlined
+def _cut(corners: FloatArray, i: int, way: float, low: float, high: float) -> float:
+    """Give the least arc length, times the way 1 or -1, of a part between offsets, or inf."""
     result = math.inf
     for n in range(4):
-        s, d = corners[n, 0], corners[n, 1]
-        after_s, after_d = corners[(n + 1) % 4, 0], corners[(n + 1) % 4, 1]
+        s, d = way * corners[i, n, 0], corners[i, n, 1]
+        after_s, after_d = way * corners[i, (n + 1) % 4, 0], corners[i, (n + 1) % 4, 1]
         if low <= d <= high:
             result = min(result, s)
-        for edge in (low, high):
-            if (d < edge) != (after_d < edge):
-                result = min(result, s + (edge - d) / (after_d - d) * (after_s - s))
+        if (d < low) != (after_d < low):
+            result = min(result, s + (low - d) / (after_d - d) * (after_s - s))
+        if (d < high) != (after_d < high):
+            result = min(result, s + (high - d) / (after_d - d) * (after_s - s))
     return result

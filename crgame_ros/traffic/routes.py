@@ -2,12 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where agents can go, and which lane leads there."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from crgame_ros.traffic.agents import AgentTable
+from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.lane_table import LaneTable
 
 # A lane change counts as this detour [m], more where the lane is shorter than it wants to be.
 CHANGE_COST = 20.0
@@ -193,3 +198,22 @@ def _road(graph: LaneGraph, lane: int) -> IntArray:
             members.add(current)
             current = int(side[current])
     return np.array(sorted(members))
+
+
+@compiled
+def leaving(lanes: LaneTable, following: IntArray, cost: FloatArray, is_exit: NDArray[np.bool_],
+            agents: AgentTable, slots: IntArray) -> tuple[IntArray, IntArray]:
+    """List the agents that have left the map, and those that need a new destination."""
+    gone, lost = np.empty(len(slots), np.int64), np.empty(len(slots), np.int64)
+    left = need = 0
+    for slot in slots:
+        lane, destination = agents.lane[slot], agents.destination[slot]
+        rest = cost[destination, lane]
+        if following[destination, lane] < 0 and (
+                agents.s[slot] > lanes.length[lane] + 0.5 * agents.length[slot]):
+            gone[left] = slot
+            left += 1
+        elif not math.isfinite(rest) or (rest <= 0.0 and not is_exit[lane]):
+            lost[need] = slot
+            need += 1
+    return gone[:left], lost[:need]

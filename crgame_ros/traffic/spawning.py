@@ -18,7 +18,7 @@ from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import hold_before
 from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import ahead, Corridors, look_distance, ways
+from crgame_ros.traffic.leaders import ahead, corridors, nearest, own_ways
 from crgame_ros.traffic.longitudinal import COASTING, Longitudinal
 from crgame_ros.traffic.placement import Bodies, place
 from crgame_ros.traffic.room import (
@@ -31,7 +31,7 @@ from crgame_ros.traffic.room import (
     STOP_GAP,
 )
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.world import agent_bodies
+from crgame_ros.traffic.world import with_agents
 
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
 TRIES = 40
@@ -151,18 +151,14 @@ class Spawner:
     def _ahead(self, agents: Agents, slots: IntArray,
                others: Bodies) -> tuple[FloatArray, FloatArray]:
         """Give the gaps (A) to who is ahead of agents on their ways, and its speeds (A)."""
-        lanes, count = self._graph.table, len(slots)
-        entries = place(lanes, self._cells.table, Bodies.join([others, agent_bodies(agents)]))
-        way = ways(lanes, self._routes.next, agents.lane[slots], agents.s[slots],
-                   agents.destination[slots], look_distance(agents.speed[slots]))
-        half, length = 0.5 * agents.width[slots], agents.length[slots]
-        pairs = ahead(lanes, entries, way, Corridors(
-            slots, length, agents.rear_to_center[slots] + 0.5 * length, -half, half),
-            np.empty(0))
-        gap, speed = np.full(count, np.inf), np.zeros(count)
-        for row in np.lexsort((pairs.gap, pairs.agent))[::-1].tolist():
-            gap[pairs.agent[row]] = pairs.gap[row]
-            speed[pairs.agent[row]] = entries.speed[pairs.entry[row]]
+        lanes, middle = self._graph.table, np.zeros(len(slots))
+        entries = place(lanes, self._cells.table, with_agents(others, agents.table))
+        way = own_ways(lanes, self._routes.next, agents.table, slots)
+        pairs = ahead(lanes, entries, way, corridors(agents.table, slots, middle, middle),
+                      np.empty(0))
+        gap, _, entry = nearest(pairs, entries.owner, len(slots))
+        speed = np.zeros(len(slots))
+        speed[entry >= 0] = entries.speed[entry[entry >= 0]]
         return gap, speed
 
     def adopt(self, k: int, agents: Agents, others: Bodies) -> list[int]:

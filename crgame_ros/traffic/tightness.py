@@ -86,8 +86,8 @@ def _drive(graph: LaneGraph, shape: Shape,
         slots = slots[~past]
         if not len(slots):
             break
-    points = np.concatenate([x for _, x in found])
-    return np.concatenate([i for i, _ in found]), points[:, 0], points[:, 1]
+    driven = np.concatenate([x for _, x in found])
+    return np.concatenate([i for i, _ in found]), driven[:, 0], driven[:, 1]
 
 
 def _corners(agents: Agents, slots: IntArray) -> NDArray[np.float64]:

@@ -9,15 +9,14 @@ from commonroad.scenario.scenario import Scenario
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.scenario.events import ALL_AGENTS, TrafficChange
 from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.agents import Agents, FREE, NOBODY
-from crgame_ros.traffic.changing import LaneChanges, SHORTEST_CHANGE
+from crgame_ros.traffic.agents import Agents, centers_of, FREE, NOBODY
+from crgame_ros.traffic.changing import LaneChanges
 from crgame_ros.traffic.conflicts import Conflicts
-from crgame_ros.traffic.courtesy import fade_relief, relief_at_change
+from crgame_ros.traffic.courtesy import fading, note_leaders
 from crgame_ros.traffic.crossings import Crossings, queues
 from crgame_ros.traffic.desired_speeds import DesiredSpeeds
 from crgame_ros.traffic.drivers import Drivers
@@ -30,47 +29,44 @@ from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import (
     ahead,
-    Corridors,
-    least,
-    look_distance,
+    corridors,
     nearest,
+    obstacles,
+    own_corridors,
+    own_ways,
     Pairs,
     Ways,
     ways,
 )
-from crgame_ros.traffic.longitudinal import (
-    AT_END,
-    AT_LINE,
-    before_lines,
-    halts_before,
-    Longitudinal,
-    smoothed,
-)
+from crgame_ros.traffic.longitudinal import before_lines, halt, Longitudinal, smooth
 from crgame_ros.traffic.meetings import CrossingRules, Situation
 from crgame_ros.traffic.motion import Motion
 from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
-from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.routes import leaving, Routes
 from crgame_ros.traffic.spawning import CAR, is_long, slot_descriptions, Spawner, TRUCK
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.swerving import Swerving
 from crgame_ros.traffic.tightness import tight_lanes
-from crgame_ros.traffic.waiting import break_circles, hopeless, INSISTS, LAST_RESORT, WAITS
-from crgame_ros.traffic.world import agent_bodies, Others, standing_entries, WorldView
+from crgame_ros.traffic.waiting import (
+    break_circles,
+    hopeless,
+    INSISTS,
+    LAST_RESORT,
+    note_standing,
+    WAITS,
+)
+from crgame_ros.traffic.wishes import Situations
+from crgame_ros.traffic.world import Others, standing_entries, with_agents, WorldView
 
 # Slots for arrivals, where the game says nothing: one for so much lane, and at most so many [m].
 LANE_PER_SLOT = 15.0
 MAX_SLOTS = 300
-STANDING = 0.3
 # What merging at the very end of a lane, or a bend too tight, counts as [m].
 TAPER_COST = 250.0
-# Room before a standing obstacle from which one gets into the next lane [m].
-SWING_OUT = 10.0
 CLOSE = 1.3
 # Whoever stands behind somebody who stands, with less than this between them, queues [m].
 QUEUE = 12.0
-# Of a short lane that ends this share is left to change lanes in.
-REST_SHARE = 0.2
 NO_REFERENCE = np.empty(0)
 
 
@@ -117,6 +113,7 @@ class Traffic:
         self._slowed = self._swerving.version
         self._waiting, self._insisting, self._last_resort = (
             round(seconds / time_step_s) for seconds in (WAITS, INSISTS, LAST_RESORT))
+        self._fading = fading(time_step_s)
         # Agents taken off the road because they stood in a circle that nobody could open.
         self.taken_off = 0
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
@@ -151,12 +148,7 @@ class Traffic:
     @property
     def states(self) -> ObjectStates:
         """Where everybody is at the present k; NaN where absent."""
-        agents = self._agents
-        poses, velocities = agents.centers(), agents.velocities()
-        poses[:, 2] = wrap_pi_array(poses[:, 2])
-        poses[~agents.active] = np.nan
-        velocities[~agents.active] = np.nan
-        return ObjectStates(poses, velocities)
+        return ObjectStates(*self._agents.states())
 
     def resume(self, k: int, states: ObjectStates) -> None:
         """
@@ -184,19 +176,14 @@ class Traffic:
 
         :param others: everything that is no agent, at k.
         """
-        agents, spec = self._agents, self._spec
+        agents = self._agents
         bodies = self._others.bodies(others)
         slots = np.flatnonzero(agents.active)
         if len(slots):
             self._lines.show(others.signals)
-            entries = place(self._graph.table, self._cells.table, Bodies.join(
-                [bodies, agent_bodies(agents)]))
-            standing = standing_entries(entries, self._others.standing(others))
-            if spec.swerve:
-                self._swerving.update(entries.take(np.flatnonzero(standing)))
-                if self._swerving.version != self._slowed:
-                    self._slowed = self._swerving.version
-                    self._longitudinal.slow_for(self._swerving.speed)
+            entries = place(self._graph.table, self._cells.table, with_agents(
+                bodies, agents.table))
+            standing = self._look_at_obstacles(entries, others)
             acceleration = self._decide(others.k, slots, entries, standing)
             self._motion.move(agents, slots, acceleration, self._swerving.reference,
                               self._substeps)
@@ -205,109 +192,82 @@ class Traffic:
         self._adopt(others.k + 1, bodies)
         self._spawner.arrive(others.k + 1, agents, bodies)
 
+    def _look_at_obstacles(self, entries: Entries, others: WorldView) -> NDArray[np.bool_]:
+        """Tell which entries (E) stand for good, and swerve around them."""
+        if not len(self._others):
+            return np.zeros(len(entries.owner), dtype=bool)
+        standing = standing_entries(entries, self._others.standing(others))
+        if self._spec.swerve:
+            self._swerving.update(entries.take(np.flatnonzero(standing)))
+            if self._swerving.version != self._slowed:
+                self._slowed = self._swerving.version
+                self._longitudinal.slow_for(self._swerving.speed)
+        return standing
+
     def _decide(self, k: int, slots: IntArray, entries: Entries,
                 standing: NDArray[np.bool_]) -> FloatArray:
         """Give the accelerations (A) of the agents; begin lane changes, enter junctions."""
-        agents, long = self._agents, self._longitudinal
-        speed = agents.speed[slots]
-        way, corridor, pairs = self._look_ahead(slots, entries)
+        agents, long, lanes = self._agents, self._longitudinal, self._graph.table
+        way = own_ways(lanes, self._routes.next, agents.table, slots)
         desired, limit = long.speeds(way, agents, slots)
-        gap = self._follow(slots, pairs, entries)
-        acceleration = np.minimum(limit, long.behind(
-            agents, slots, desired, pairs, entries, (corridor.low, corridor.high)))
+        corridor = own_corridors(lanes, agents.table, slots, self._swerving.reference)
+        pairs = ahead(lanes, entries, way, corridor, self._swerving.reference)
+        gap, leader, _ = nearest(pairs, entries.owner, len(slots))
+        note_leaders(agents.table, slots, gap, leader, np.asarray(
+            self._followers.of(slots).desired_gap(agents.speed[slots]), dtype=float),
+            self._fading,
+            self._spec.cooperative)
+        acceleration = np.minimum(limit, long.behind(agents, desired, pairs, entries, corridor))
         self._mind_left_lanes(slots, desired, entries, standing, acceleration)
-        blocked = least(pairs.agent, np.where(standing[pairs.entry], pairs.gap, np.inf),
-                        len(slots), np.inf)
-        halt = np.minimum(self._junctions(
-            k, slots, way, entries, pairs, desired, gap, self._time_step_s),
-            self._before_obstacles(slots, blocked))
-        acceleration = np.minimum(acceleration, brush(
-            self._graph.table, self._routes.next, agents.table, slots, entries, way))
-        end = self._lane_ends(way, agents.length[slots])
-        for distance, braking in ((halt, AT_LINE), (end, AT_END)):
-            acceleration = np.minimum(acceleration, halts_before(speed, distance, braking))
+        blocked = obstacles(pairs, standing, len(slots))
+        halts = self._junctions(k, slots, way, entries, pairs, desired, gap, self._time_step_s)
+        brush(lanes, self._routes.next, agents.table, slots, entries, way, acceleration)
+        halt(lanes, self._routes.drops, way, agents.table, slots, halts, blocked,
+             self._drivers.change_lanes, acceleration)
         if self._drivers.change_lanes.any():
-            acceleration = np.minimum(acceleration, self._changes.decide(
-                k, agents, slots, desired, limit, acceleration, gap, blocked, standing, entries,
-                way, halt < self._changes.no_change(speed)))
-        acceleration = smoothed(agents.acceleration[slots], acceleration, speed,
-                                self._time_step_s)
-        acceleration = np.maximum(acceleration, -self._followers.usual.max_deceleration)
+            self._changes.decide(k, agents, slots, desired, limit, acceleration,
+                                 Situations(gap, blocked, halts), standing, entries, way)
+        smooth(agents.table, slots, acceleration, self._followers.usual.max_deceleration,
+               self._time_step_s)
         acceleration = self._drivers.do(k, agents, slots, acceleration)
-        stands = (speed < STANDING) & (acceleration < 0.5)
-        agents.waits[slots] = np.where(stands, agents.waits[slots] + 1, 0)
+        note_standing(agents.table, slots, acceleration)
         return acceleration
-
-    def _look_ahead(self, slots: IntArray,
-                    entries: Entries) -> tuple[Ways, Corridors, Pairs]:
-        """Give the ways of agents (A), what they take of them, and who is in the way."""
-        agents, lanes = self._agents, self._graph.table
-        way = ways(lanes, self._routes.next, agents.lane[slots], agents.s[slots],
-                   agents.destination[slots], look_distance(agents.speed[slots]))
-        corridor = self._corridors(slots)
-        return way, corridor, ahead(lanes, entries, way, corridor, self._swerving.reference)
 
     def _adopt(self, k: int, bodies: Bodies) -> None:
         """Let recorded obstacles appear, no faster than they can halt where they must."""
-        agents = self._agents
+        agents, lanes = self._agents, self._graph.table
         newcomers = self._spawner.adopt(k, agents, bodies)
         if not newcomers:
             return
         slots = np.flatnonzero(agents.active)
-        entries = place(self._graph.table, self._cells.table, Bodies.join(
-            [bodies, agent_bodies(agents)]))
-        way, _, pairs = self._look_ahead(slots, entries)
+        entries = place(lanes, self._cells.table, with_agents(bodies, agents.table))
+        way = own_ways(lanes, self._routes.next, agents.table, slots)
         desired, _ = self._longitudinal.speeds(way, agents, slots)
-        gap, _ = nearest(pairs, entries.owner, len(slots))
-        halt = self._junctions(k, slots, way, entries, pairs, desired, gap, 0.0)
-        self._spawner.slow_down(agents, slots, desired, halt, newcomers)
-
-    def _corridors(self, slots: IntArray) -> Corridors:
-        """Give what agents take of their lanes, from the references that they follow."""
-        agents, graph = self._agents, self._graph
-        here = self._swerving.reference[graph.rows(agents.lane[slots], agents.s[slots])]
-        off, half = agents.d[slots] - here, 0.5 * agents.width[slots]
-        length = agents.length[slots]
-        return Corridors(slots, length, agents.rear_to_center[slots] + 0.5 * length,
-                         np.minimum(off, 0.0) - half, np.maximum(off, 0.0) + half)
-
-    def _follow(self, slots: IntArray, pairs: Pairs, entries: Entries) -> FloatArray:
-        """Note who is next ahead, and how much nearer than usual; give the gaps (A) to it."""
-        agents, speed = self._agents, self._agents.speed[slots]
-        gap, leader = nearest(pairs, entries.owner, len(slots))
-        usual = self._followers.of(slots).desired_gap(speed)
-        relief = np.where(np.isinf(gap), 0.0, fade_relief(
-            agents.relief[slots], gap, usual, self._time_step_s))
-        if self._spec.cooperative:
-            # Somebody has cut in: the gap opens gradually, as after a change that was agreed upon.
-            new = (leader != agents.leader[slots]) & np.isfinite(gap)
-            relief = np.where(new, np.maximum(relief, relief_at_change(gap, usual)), relief)
-        agents.relief[slots] = relief
-        agents.leader[slots] = leader
-        return gap
+        pairs = ahead(lanes, entries, way, own_corridors(
+            lanes, agents.table, slots, self._swerving.reference), self._swerving.reference)
+        gap, _, _ = nearest(pairs, entries.owner, len(slots))
+        halts = self._junctions(k, slots, way, entries, pairs, desired, gap, 0.0)
+        self._spawner.slow_down(agents, slots, desired, halts, newcomers)
 
     def _mind_left_lanes(self, slots: IntArray, desired: FloatArray, entries: Entries,
                          standing: NDArray[np.bool_], acceleration: FloatArray) -> None:
         """Let those who change lanes mind who is ahead in the lane that they leave."""
-        agents, long = self._agents, self._longitudinal
-        row = np.flatnonzero((agents.source[slots] != NOBODY)
-                             & (agents.source[slots] != agents.lane[slots]))
+        agents, lanes = self._agents, self._graph.table
+        source = agents.source[slots]
+        row = np.flatnonzero((source != NOBODY) & (source != agents.lane[slots]))
         if not len(row):
             return
-        who = slots[row]
-        lane, center = agents.source[who], agents.centers()[who]
+        who, lane = slots[row], source[row]
+        center, _ = centers_of(agents.table, who)
         guess = agents.s[who] * self._graph.length[lane] / self._graph.length[agents.lane[who]]
         s, d, _ = self._graph.project(lane, center[:, 0], center[:, 1], guess)
-        way = ways(self._graph.table, self._routes.next, lane, s, agents.destination[who],
-                   look_distance(agents.speed[who]))
-        half, length = 0.5 * agents.width[who], agents.length[who]
-        low, high = d - half, d + half
-        pairs = ahead(self._graph.table, entries, way, Corridors(
-            who, length, agents.rear_to_center[who] + 0.5 * length, low, high), NO_REFERENCE)
+        corridor = corridors(agents.table, who, d, d)
+        pairs = ahead(lanes, entries, ways(lanes, self._routes.next, agents.table, who, lane, s),
+                      corridor, NO_REFERENCE)
         # Whoever steers out from behind an obstacle gets nearer to it than s0.
         pairs.gap[standing[pairs.entry]] += CLOSE
-        acceleration[row] = np.minimum(acceleration[row], long.behind(
-            agents, who, desired[row], pairs, entries, (low, high)))
+        acceleration[row] = np.minimum(acceleration[row], self._longitudinal.behind(
+            agents, desired[row], pairs, entries, corridor))
 
     def _junctions(self, k: int, slots: IntArray, way: Ways, entries: Entries, pairs: Pairs,
                    desired: FloatArray, gap: FloatArray, elapsed_s: float) -> FloatArray:
@@ -333,37 +293,15 @@ class Traffic:
             break_circles(k, agents.table, slots, self._waiting, self._insisting)
         return np.minimum(before_lines(agents.speed[slots], light), halt)
 
-    def _before_obstacles(self, slots: IntArray, blocked: FloatArray) -> FloatArray:
-        """Give the distances (A) to halt at so that there is room to change lanes, or inf."""
-        agents, graph = self._agents, self._graph
-        lane = agents.lane[slots]
-        can = ((graph.left[lane] >= 0) | (graph.right[lane] >= 0)) & (
-            agents.source[slots] == NOBODY) & self._drivers.change_lanes[slots]
-        # Whoever is nearer already cannot make room any more.
-        return np.where(can & (blocked > 0.5 * SWING_OUT), blocked - SWING_OUT, np.inf)
-
-    def _lane_ends(self, way: Ways, length: FloatArray) -> FloatArray:
-        """Give the distances (A) of the fronts from the end of lanes that end on the road."""
-        row = np.arange(len(length))
-        last = way.depth - 1
-        lane = way.lane[row, last]
-        reach = way.offset[row, last] + self._graph.length[lane]
-        # Whoever halts there still has the room that a change of lanes takes.
-        rest = np.minimum(SHORTEST_CHANGE, REST_SHARE * self._graph.length[lane])
-        return np.where(self._routes.drops[lane], reach - 0.5 * length - rest, np.inf)
-
     def _leave(self, k: int, slots: IntArray) -> None:
         """Take away who has left the map, and give new destinations to who needs one."""
         agents, routes = self._agents, self._routes
-        lane, s = agents.lane[slots], agents.s[slots]
-        gone = (routes.next[agents.destination[slots], lane] < 0) & (
-            s > self._graph.length[lane] + 0.5 * agents.length[slots])
-        agents.remove(slots[gone], k)
+        gone, lost = leaving(self._graph.table, routes.next, routes.cost, routes.is_exit,
+                             agents.table, slots)
+        agents.remove(gone, k)
         stuck = hopeless(agents.table, slots, self._last_resort)
         agents.remove(stuck, k)
         self.taken_off += len(stuck)
-        cost = routes.cost[agents.destination[slots], lane]
-        lost = ~gone & (~np.isfinite(cost) | ((cost <= 0.0) & ~routes.is_exit[lane]))
-        for slot in slots[lost].tolist():
+        for slot in lost.tolist():
             agents.destination[slot] = routes.draw(
                 int(agents.lane[slot]), self._random, is_long(float(agents.length[slot])))

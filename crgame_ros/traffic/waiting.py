@@ -6,12 +6,22 @@ import numpy as np
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.lane_graph import IntArray
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 
+# Slower is standing [m/s], for who does not want to accelerate by more than this [m/s^2].
+STANDING, STARTS = 0.3, 0.5
 # Standing for so many seconds is waiting; who insists does so for so long [s].
 WAITS, INSISTS = 2.0, 6.0
 # Who has stood this long in a circle that nobody can open is taken off the road [s].
 LAST_RESORT = 45.0
+
+
+@compiled
+def note_standing(agents: AgentTable, slots: IntArray, acceleration: FloatArray) -> None:
+    """Count the ticks for which agents (A) have been standing."""
+    for i, slot in enumerate(slots):
+        stands = agents.speed[slot] < STANDING and acceleration[i] < STARTS
+        agents.waits[slot] = agents.waits[slot] + 1 if stands else 0
 
 
 @compiled

@@ -65,6 +65,24 @@ def drive_everything() -> None:
                       world(0))
     for k in range(TICKS):
         traffic.advance(world(k))
+    drive_where_a_lane_ends()
+
+
+def drive_where_a_lane_ends() -> None:
+    """Drive where everybody has to change lanes, and some are let in."""
+    x, scenario = np.linspace(-200.0, 0.0, 41), Scenario(0.1)
+    level = np.zeros_like(x)
+    scenario.add_objects([
+        _lanelet(1, x, level, adjacent_right=2, adjacent_right_same_direction=True,
+                 successor=[3]),
+        _lanelet(2, x, level - 3.5, adjacent_left=1, adjacent_left_same_direction=True),
+        _lanelet(3, x + 200.0, level, predecessor=[1])])
+    traffic = Traffic(TrafficSpec(agents=12, flow=1800.0, capacity=30),
+                      RoadNetwork(scenario.lanelet_network), scenario, (), (), 0.1, 10, 0, 0)
+    nowhere = np.zeros((0, 3))
+    for k in range(TICKS):
+        traffic.advance(WorldView(k, nowhere, nowhere))
+        traffic.states  # noqa: B018 - it is compiled as well
 
 
 def crossroads() -> Scenario:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.agents import AgentTable, NOBODY, write_centers
+from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray
 from crgame_ros.traffic.placement import Bodies, Entries, VEHICLE_TIME, WALKER_TIME
 
@@ -41,6 +42,11 @@ class WorldView:
     poses: FloatArray
     velocities: FloatArray
     signals: Mapping[int, str] = field(default_factory=dict)
+
+
+_NONE, _NOWHERE = np.zeros(0), np.zeros((0, 3))
+NOTHING = Bodies(_NOWHERE, _NOWHERE, _NONE, _NONE, _NONE, _NONE.astype(np.int64), _NONE,
+                 _NONE.astype(np.int64))
 
 
 class Others:
@@ -78,8 +84,13 @@ class Others:
         self._time = np.where(self.drives, VEHICLE_TIME, WALKER_TIME)[self._of] if of else \
             np.zeros(0)
 
+    def __len__(self) -> int:
+        return len(self._descriptions)
+
     def bodies(self, world: WorldView) -> Bodies:
         """Give the pieces of all who are there."""
+        if not len(self):
+            return NOTHING
         present = np.isfinite(world.poses[self._of]).all(axis=1) & np.isfinite(
             world.velocities[self._of]).all(axis=1)
         piece = np.flatnonzero(present)
@@ -112,13 +123,27 @@ class Others:
         return np.asarray(still & (self._parked | (self._still > self._long_enough)))
 
 
-def agent_bodies(agents: Agents) -> Bodies:
-    """Give the bodies of the agents on the road; those changing lanes claim the new one."""
+@compiled
+def with_agents(others: Bodies, agents: AgentTable) -> Bodies:
+    """Join the agents on the road to the others; those changing lanes claim the new one."""
     slots = np.flatnonzero(agents.active)
-    claim = np.where(agents.source[slots] != NOBODY, agents.lane[slots], NOBODY)
-    return Bodies(agents.centers()[slots], agents.velocities()[slots],
-                  agents.acceleration[slots], agents.length[slots], agents.width[slots], slots,
-                  np.zeros(len(slots)), claim)
+    first = len(others.owner)
+    count = first + len(slots)
+    result = Bodies(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.empty(count),
+                    np.empty(count), np.empty(count, np.int64), np.empty(count),
+                    np.empty(count, np.int64))
+    result.poses[:first], result.velocities[:first] = others.poses, others.velocities
+    result.acceleration[:first], result.length[:first] = others.acceleration, others.length
+    result.width[:first], result.owner[:first] = others.width, others.owner
+    result.time[:first], result.claim[:first] = others.time, others.claim
+    write_centers(agents, slots, result.poses[first:], result.velocities[first:])
+    for i, slot in enumerate(slots):
+        n = first + i
+        result.acceleration[n], result.owner[n] = agents.acceleration[slot], slot
+        result.length[n], result.width[n] = agents.length[slot], agents.width[slot]
+        result.time[n] = 0.0
+        result.claim[n] = agents.lane[slot] if agents.source[slot] != NOBODY else NOBODY
+    return result
 
 
 def standing_entries(entries: Entries,

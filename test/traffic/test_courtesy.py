@@ -6,12 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
+from crgame_ros.traffic import courtesy
 from crgame_ros.traffic.car_following import AdaptiveCruise
-from crgame_ros.traffic.courtesy import CourtesyRules, fade_relief, relief_at_change
+from crgame_ros.traffic.courtesy import CourtesyRules, fading
 from crgame_ros.traffic.lane_change import GapAcceptance
 
 Array = NDArray[np.float64]
 LENGTH = 4.5
+# The functions of one vehicle, for platoons.
+relief_at_change = np.vectorize(courtesy.relief_at_change)
+fade_relief = np.vectorize(courtesy.fade_relief)
 
 
 def one(value: float) -> Array:
@@ -89,12 +93,12 @@ def test_relief_is_what_is_missing_and_fades() -> None:
     relief = relief_at_change(gap, desired)
     np.testing.assert_allclose(relief, [19.5, 0.0, 0.0])
     for _ in range(100):
-        relief = fade_relief(relief, gap, desired, 0.1)
+        relief = fade_relief(relief, gap, desired, fading(0.1))
     np.testing.assert_allclose(relief, [19.5 / np.e, 0.0, 0.0])
     # Once the gap is nearly open only the rest is left; nobody ahead, no relief.
-    np.testing.assert_allclose(fade_relief(relief, np.array([23.0, 1.0, 1.0]), desired, 0.1)[0],
-                               1.5)
-    assert fade_relief(one(5.0), one(np.inf), one(24.5), 0.1)[0] == 0.0
+    left = fade_relief(relief, np.array([23.0, 1.0, 1.0]), desired, fading(0.1))
+    np.testing.assert_allclose(left[0], 1.5)
+    assert fade_relief(one(5.0), one(np.inf), one(24.5), fading(0.1))[0] == 0.0
 
 
 def merge(cooperative: bool, merging_speed: float = 15.0) -> tuple[Array, float, float]:
@@ -139,7 +143,7 @@ def merge(cooperative: bool, merging_speed: float = 15.0) -> tuple[Array, float,
         desired = model.desired_gap(v)
         if relief is None:
             relief = relief_at_change(gap, desired) * (cooperative & (np.arange(11) < 6))
-        relief = fade_relief(relief, gap, desired, 0.1)
+        relief = fade_relief(relief, gap, desired, fading(0.1))
         wanted = model.acceleration(v, desired_speed, gap, np.concatenate(([0.0], v[:-1])),
                                     relief)
         worst = np.minimum(worst, wanted)

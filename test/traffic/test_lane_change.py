@@ -9,19 +9,20 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 import pytest
 
+from crgame_ros.traffic import lane_change
 from crgame_ros.traffic.car_following import AdaptiveCruise
 from crgame_ros.traffic.lane_change import (
     CHANGE_THRESHOLD,
-    evaluate,
     GapAcceptance,
     incentive,
-    look_ahead,
-    peak_lateral_acceleration,
+    offset_at,
+    PEAK,
     quintic,
-    urgency,
 )
 
 Array = NDArray[np.float64]
+# The functions of one vehicle, for several.
+look_ahead, urgency = np.vectorize(lane_change.look_ahead), np.vectorize(lane_change.urgency)
 
 
 def random_changes(count: int) -> tuple[Array, Array, Array, Array, Array]:
@@ -48,47 +49,35 @@ def test_coefficients_solve_the_six_conditions() -> None:
         np.testing.assert_allclose(got[i] * powers, expected * powers, atol=1e-8)
 
 
-def test_evaluation_is_the_polynomial_and_its_derivatives() -> None:
-    """Compare with numpy's polynomials, for one point and for several per agent."""
+def test_evaluation_is_the_polynomial_up_to_its_end() -> None:
+    """Compare with numpy's polynomials; behind the end the path stays in the lane's centre."""
     offset, slope, curvature, target, length = random_changes(20)
     p = quintic(offset, slope, curvature, target, length)
-    x = length[:, None] * np.linspace(0.0, 1.0, 7)
-    several = evaluate(p, x, length)
     for i in range(20):
-        curve = Polynomial(p[i])
-        for got, derivative in zip(several, (curve, curve.deriv(), curve.deriv(2)), strict=True):
-            np.testing.assert_allclose(got[i], derivative(x[i]), atol=1e-10)
-    for column, got in zip((offset, slope, curvature), evaluate(p, 0.0 * length, length),
-                           strict=True):
-        np.testing.assert_allclose(got, column, atol=1e-12)
-    end = evaluate(p, length + 30.0, length)
-    np.testing.assert_allclose(end[0], target, atol=1e-9)
-    np.testing.assert_allclose(end[1], 0.0, atol=1e-9)
-    np.testing.assert_allclose(end[2], 0.0, atol=1e-9)
+        for x in length[i] * np.linspace(0.0, 1.0, 7):
+            assert offset_at(p[i], x, length[i]) == pytest.approx(Polynomial(p[i])(x), abs=1e-10)
+        assert offset_at(p[i], -5.0, length[i]) == pytest.approx(offset[i], abs=1e-12)
+        assert offset_at(p[i], length[i] + 30.0, length[i]) == pytest.approx(target[i], abs=1e-9)
 
 
 def test_the_greatest_lateral_acceleration_has_its_closed_form() -> None:
     """10 / sqrt(3) W v^2 / L^2 = 5.7735 W v^2 / L^2 against a fine sampling."""
-    shift, speed, length = np.array([3.5]), np.array([20.0]), np.array([80.0])
     zero = np.zeros(1)
-    p = quintic(zero, zero, zero, shift, length)
-    sampled = evaluate(p, np.linspace(0.0, 80.0, 200001)[None, :], length)[2]
-    peak = peak_lateral_acceleration(shift, speed, length)
-    assert peak == pytest.approx(5.7735 * 3.5 * 400.0 / 6400.0, rel=1e-5)
-    assert peak == pytest.approx(np.abs(sampled).max() * 400.0, rel=1e-9)
+    p = quintic(zero, zero, zero, np.array([3.5]), np.array([80.0]))
+    sampled = Polynomial(p[0]).deriv(2)(np.linspace(0.0, 80.0, 200001))
+    assert np.abs(sampled).max() == pytest.approx(PEAK * 3.5 / 6400.0, rel=1e-9)
+    assert pytest.approx(5.7735, rel=1e-5) == PEAK
 
 
 def test_a_change_in_progress_is_continued_smoothly() -> None:
-    """Re-planned half-way to the same end, the path stays; to another lane it has no kink."""
+    """Re-planned half-way to the same end, the path stays."""
     length, zero = np.array([60.0]), np.zeros(1)
-    p = quintic(zero, zero, zero, np.array([3.5]), length)
-    state = evaluate(p, np.array([25.0]), length)
-    back = quintic(*state, zero, np.array([60.0]))
-    for before, after in zip(state, evaluate(back, zero, np.array([60.0])), strict=True):
-        np.testing.assert_allclose(after, before, atol=1e-12)
-    rest = np.array([35.0])
-    again = evaluate(quintic(*state, np.array([3.5]), rest), np.array([10.0]), rest)[0]
-    np.testing.assert_allclose(again, evaluate(p, rest, length)[0], atol=1e-9)
+    curve = Polynomial(quintic(zero, zero, zero, np.array([3.5]), length)[0])
+    state = [curve.deriv(n)(np.array([25.0])) if n else curve(np.array([25.0]))
+             for n in range(3)]
+    again = Polynomial(quintic(*state, np.array([3.5]), np.array([35.0]))[0])
+    x = np.linspace(0.0, 35.0, 8)
+    np.testing.assert_allclose(again(x), curve(25.0 + x), atol=1e-9)
 
 
 def test_the_look_ahead_distance_grows_with_the_speed_and_stays_comfortable() -> None:
@@ -96,7 +85,7 @@ def test_the_look_ahead_distance_grows_with_the_speed_and_stays_comfortable() ->
     np.testing.assert_allclose(look_ahead(speed), [12.0, 12.0, 40.0, 80.0, 140.0])
     # Over two lanes 4 s would take 5.7735 * 7 / 16 = 2.5 m/s^2: it takes longer.
     wide = look_ahead(speed, shift=7.0)
-    assert (peak_lateral_acceleration(7.0, speed, wide) <= 2.0 + 1e-9).all()
+    assert (PEAK * 7.0 * speed**2 / wide**2 <= 2.0 + 1e-9).all()
     assert wide[4] / 35.0 == pytest.approx(math.sqrt(10.0 / math.sqrt(3.0) * 7.0 / 2.0))
 
 

@@ -1,0 +1,163 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who wants to change lanes, and to which side."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crgame_ros.traffic.agents import AgentTable, NOBODY
+from crgame_ros.traffic.compiled import bare, compiled, inlined
+from crgame_ros.traffic.lane_change import urgency
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.lane_table import LaneTable
+
+BoolArray = NDArray[np.bool_]
+
+# Where a lane ends, changes take no less than this: 2.5 m/s^2 to the side [s].
+SWERVE_TIME = 2.8
+# Agents think of changes for speed at the same tick up to so many, more of them spread over the
+# ticks.
+AT_ONCE = 50
+# Changes for speed are left alone where the route wants the lane within this distance [m].
+COMMITTED = 400.0
+SLOWEST = 3.0
+# The route's change begins this far before the last point where it is possible [m].
+PREPARE = 400.0
+# Nobody begins to change lanes this shortly before or in a junction [m].
+NO_CHANGE = 15.0
+# Who changes lanes before a junction can halt before it with this [m/s^2].
+BEFORE_JUNCTION = 2.0
+# Nor this near to an obstacle: the front would hit it [m].
+TOO_NEAR = 5.0
+# Below `SLOWEST` nobody swings out with less room to the one ahead in the own lane [m].
+OUT_OF_QUEUE = 7.0
+
+
+class Destinations(NamedTuple):
+    """
+    What `Routes` knows of lanes (L) and destinations (D), and which lanes are in junctions.
+
+    :param next, change, remaining, cost: (D, L)
+    :param drops: (L)
+    :param inside: (2, L) for narrow and for wide vehicles.
+    :param narrow: width of the widest that is narrow [m]
+    """
+
+    next: IntArray
+    change: IntArray
+    remaining: FloatArray
+    cost: FloatArray
+    drops: BoolArray
+    inside: BoolArray
+    narrow: float
+
+
+class Situations(NamedTuple):
+    """
+    What agents (A) see in their own lanes.
+
+    :param gap: to whatever is ahead, or inf [m]
+    :param blocked: gap to an obstacle that stands there, or inf [m]
+    :param halt: distance of the front from where it halts, or inf [m]
+    """
+
+    gap: FloatArray
+    blocked: FloatArray
+    halt: FloatArray
+
+
+class Wishes(NamedTuple):
+    """
+    Agents (N) that want into the lane beside them, those on the left first.
+
+    :param slots: of the agents.
+    :param side: 1 to the left, -1 to the right.
+    :param lane: beside.
+    :param urgency: 0 to 1; -1 for speed alone.
+    :param room: before an obstacle in the own lane, or inf [m]
+    """
+
+    slots: IntArray
+    side: IntArray
+    lane: IntArray
+    urgency: FloatArray
+    room: FloatArray
+
+
+@compiled
+def wishes(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots: IntArray,
+           at: Situations, allowed: BoolArray, thoughts: int) -> Wishes:
+    """
+    List who may want to change to which side.
+
+    :param allowed: who changes lanes, of all slots.
+    :param thoughts: ticks between two thoughts of changes for speed.
+    """
+    free = np.empty(len(slots), np.bool_)
+    room = 2 * len(slots)
+    found = Wishes(np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
+                   np.empty(room), np.empty(room))
+    for i, slot in enumerate(slots):
+        free[i] = allowed[slot] and _is_free(k, lanes, to, agents, slot, at, i)
+    left = _list(k, lanes, to, agents, slots, at, thoughts, free, 1, found, 0)
+    count = _list(k, lanes, to, agents, slots, at, thoughts, free, -1, found, left)
+    return Wishes(found.slots[:count], found.side[:count], found.lane[:count],
+                  found.urgency[:count], found.room[:count])
+
+
+@inlined
+def _no_change(speed: float) -> float:
+    """Give how far before a junction or a line nobody changes lanes any more [m]."""
+    return NO_CHANGE + speed**2 / (2.0 * BEFORE_JUNCTION)
+
+
+@bare
+def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slot: int,
+             at: Situations, i: int) -> bool:
+    """Tell whether an agent may change lanes at all, here and now."""
+    if agents.source[slot] != NOBODY or agents.calm_until[slot] > k or (
+            at.blocked[i] <= TOO_NEAR):
+        return False
+    speed, lane = agents.speed[slot], agents.lane[slot]
+    if speed <= SLOWEST and at.gap[i] <= OUT_OF_QUEUE and not math.isfinite(at.blocked[i]):
+        return False
+    rest = lanes.length[lane] - agents.s[slot]
+    if to.drops[lane]:
+        # Where a lane ends there is no other place. Nor is the road left: what is too fast for
+        # the rest brakes instead.
+        return bool(rest > SWERVE_TIME * speed)
+    wide = 1 if agents.width[slot] > to.narrow else 0
+    if to.inside[wide, lane] or at.halt[i] < _no_change(speed):
+        return False
+    onto = to.next[agents.destination[slot], lane]
+    return not (onto >= 0 and to.inside[wide, onto] and rest <= _no_change(speed))
+
+
+@bare
+def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots: IntArray,
+          at: Situations, thoughts: int, free: BoolArray, side: int, found: Wishes,
+          used: int) -> int:
+    """Write who may want to change to a side, from a row on; return where that ends."""
+    for i, slot in enumerate(slots):
+        lane, destination = agents.lane[slot], agents.destination[slot]
+        beside = lanes.left[lane] if side > 0 else lanes.right[lane]
+        if not free[i] or beside < 0 or not math.isfinite(to.cost[destination, beside]):
+            continue
+        speed, s = agents.speed[slot], agents.s[slot]
+        needs, remaining = to.change[destination, lane], to.remaining[destination, lane] - s
+        if at.blocked[i] < PREPARE or (needs == side and remaining < PREPARE):
+            found.urgency[used] = urgency(min(remaining, at.blocked[i]), speed)
+        elif needs == 0 and agents.content_until[slot] <= k and speed > SLOWEST and (
+                ((slot if len(slots) > AT_ONCE else 0) + k) % thoughts == 0) and (
+                to.change[destination, beside] == 0
+                or to.remaining[destination, beside] - s > COMMITTED):
+            found.urgency[used] = -1.0
+        else:
+            continue
+        found.slots[used], found.side[used], found.lane[used] = slot, side, beside
+        found.room[used] = at.blocked[i]
+        used += 1
+    return used
