@@ -37,7 +37,7 @@ JERK, RELEASE, EMERGENCY = 3.0, 4.0, 3.0
 
 
 @compiled
-def _envelope(lanes: LaneTable, speed: FloatArray) -> FloatArray:
+def envelope_of(lanes: LaneTable, speed: FloatArray) -> FloatArray:
     """Give the speeds from which one slows down in time for what the same lane allows ahead."""
     result = speed.copy()
     for lane in range(len(lanes.first)):
@@ -182,11 +182,11 @@ class Longitudinal:
         self._graph = graph
         self._following = routes.next
         self._followers = followers
-        self._envelope = _envelope(graph.table, graph.curve_speed)
+        self._envelope = envelope_of(graph.table, graph.curve_speed)
 
     def slow_for(self, speed: FloatArray) -> None:
         """Take over what else limits speeds, at each point of the lanes [m/s]: swerves."""
-        self._envelope = _envelope(self._graph.table, np.minimum(self._graph.curve_speed, speed))
+        self._envelope = envelope_of(self._graph.table, np.minimum(self._graph.curve_speed, speed))
 
     def speeds(self, way: Ways, agents: Agents,
                slots: IntArray) -> tuple[FloatArray, FloatArray]:

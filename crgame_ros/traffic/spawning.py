@@ -230,6 +230,10 @@ class Spawner:
         goal = self._lane_at(found.poses[-1])
         long = is_long(float(agents.length[slot]))
         towards = None if goal is None else self._routes.towards(lane, goal, long)
+        if towards is None and goal is not None and (
+                agents.length[slot] > TRUCK.length or not len(self._routes.reachable(lane, long))):
+            # No way is known to be wide enough: the one that it took.
+            towards = self._routes.towards(lane, goal)
         agents.destination[slot] = (self._routes.draw(lane, self._random, long)
                                     if towards is None else towards)
         if is_in_the_way(graph.table, self._routes.next, agents.table,

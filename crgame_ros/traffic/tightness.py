@@ -12,14 +12,15 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.traffic.agents import Agents
 from crgame_ros.traffic.lane_graph import IntArray, LaneGraph
+from crgame_ros.traffic.longitudinal import envelope_of
 from crgame_ros.traffic.motion import move
 
-# Beyond the road by so much is off it [m].
-SPARE = 0.15
+# Beyond the road by so much is off it: in traffic it becomes a decimetre more [m].
+SPARE = 0.08
 # Lanes that are wider than the vehicle by this, and straighter, are not tried [m, 1/m].
 EASY_WIDTH, EASY_BEND = 0.6, 0.02
-# How far before a lane a trial begins, and how often one looks [m, s].
-RUN_UP, STEP_S, SUBSTEPS = 20.0, 0.1, 10
+# How far before a lane a trial begins, how far behind it ends, and how often one looks [m, s].
+RUN_UP, RUN_OUT, STEP_S, SUBSTEPS = 20.0, 10.0, 0.1, 10
 # Slowest and fastest of a trial [m/s]; bends say what is in between.
 SLOW, QUICK = 2.0, 8.0
 
@@ -56,7 +57,7 @@ def _or_none(lanes: IntArray) -> list[int]:
 
 def _drive(graph: LaneGraph, shape: Shape,
            ways: IntArray) -> tuple[IntArray, NDArray[np.float64], NDArray[np.float64]]:
-    """Drive ways (N, 3) of lanes; give way, x and y of all corners while in the middle one."""
+    """Drive ways (N, 3) of lanes; give way, x and y of all corners in and around the middle."""
     count, half = len(ways), 0.5 * shape.length
     agents = Agents([ObjectDescription('trial', 'truck', Role.TRAFFIC, shape)] * count)
     following = np.full((count, len(graph)), -1, dtype=np.int64)
@@ -72,17 +73,19 @@ def _drive(graph: LaneGraph, shape: Shape,
                    (float(pose[0]), float(pose[1]), float(pose[2])), SLOW)
     agents.destination[:] = row
     reference = np.zeros(len(graph.x))
-    end = np.where(ways[:, 2] >= 0, np.inf, graph.length[ways[:, 1]])
+    end = np.where(ways[:, 2] >= 0, graph.length[ways].max(axis=1) + RUN_UP, graph.length[
+        ways[:, 1]])
     found: list[tuple[IntArray, NDArray[np.float64]]] = []
-    slots = row
+    slots, envelope = row, envelope_of(graph.table, graph.curve_speed)
     longest = float(graph.length[ways[:, 1]].max()) + RUN_UP
     for _ in range(int(longest / (SLOW * STEP_S))):
         points = graph.rows(agents.lane[slots], agents.s[slots])
-        agents.speed[slots] = np.clip(graph.curve_speed[points], SLOW, QUICK)
+        agents.speed[slots] = np.clip(envelope[points], SLOW, QUICK)
         move(graph.table, following, agents.table, slots, reference, SUBSTEPS, STEP_S / SUBSTEPS)
-        inside = slots[agents.lane[slots] == ways[slots, 1]]
-        found.append((np.repeat(inside, 4), _corners(agents, inside)))
-        past = (agents.lane[slots] == ways[slots, 2]) | (agents.s[slots] > end[slots])
+        lane, s = agents.lane[slots], agents.s[slots]
+        near = slots[(lane != ways[slots, 0]) | (s > graph.length[lane] - shape.length)]
+        found.append((np.repeat(near, 4), _corners(agents, near)))
+        past = ((lane == ways[slots, 2]) & (s > RUN_OUT)) | (s > end[slots])
         slots = slots[~past]
         if not len(slots):
             break
