@@ -20,6 +20,10 @@ FloatArray = NDArray[np.float64]
 _NOT_FOR_CARS = {LaneletType.SIDEWALK, LaneletType.CROSSWALK, LaneletType.BICYCLE_LANE,
                  LaneletType.BORDER, LaneletType.RESTRICTED_AREA, LaneletType.PARKING,
                  LaneletType.SHOULDER}
+_NO_ROAD = {LaneletType.SIDEWALK, LaneletType.CROSSWALK, LaneletType.BORDER,
+            LaneletType.RESTRICTED_AREA}
+# Half the width of slits between lanelets [m], and what is no island yet [m^2].
+_SLIT, _ISLAND = 0.5, 20.0
 _SLOW_USERS = {RoadUser.PEDESTRIAN, RoadUser.BICYCLE, RoadUser.TRAIN}
 # A lane that is not for cars loses against one that is, unless it fits the heading much better.
 _NOT_FOR_CARS_PENALTY = 0.2
@@ -208,10 +212,14 @@ class RoadNetwork:
         road = shapely.union_all(shapely.buffer(self._polygons[near], 0.01, join_style='mitre'))
         return bool(shapely.covers(road, footprint))
 
-    def area(self, room: float = 0.0) -> shapely.Geometry:
-        """Give all lanelets as one area, and some room around it [m]."""
-        road = shapely.union_all(shapely.buffer(self._polygons, 0.01, join_style='mitre'))
-        return shapely.buffer(road, room)
+    def road_area(self) -> shapely.Geometry:
+        """Give what vehicles may be on as one area; slits and small islands belong to it."""
+        on = [not x.lanelet_type & _NO_ROAD for x in self._lanelets]
+        road = shapely.buffer(shapely.buffer(shapely.union_all(self._polygons[on]), _SLIT), -_SLIT)
+        return shapely.union_all([
+            shapely.Polygon(part.exterior, [ring for ring in part.interiors
+                                            if shapely.Polygon(ring).area > _ISLAND])
+            for part in shapely.get_parts(road)])
 
     def _lanelet(self, lanelet_id: int) -> Lanelet:
         index = self._index.get(lanelet_id)

@@ -17,6 +17,8 @@ from crgame_ros.traffic.lane_table import LaneTable
 # A lane change counts as this detour [m], more where the lane is shorter than it wants to be.
 CHANGE_COST = 20.0
 CHANGE_LENGTH = 40.0
+# Long vehicles plan no changes in lanes that are shorter [m].
+SHORT = 60.0
 # Staying in a lane that reaches the destination by a longer way is fine up to this [m].
 DETOUR = 100.0
 MAX_LOOP_DESTINATIONS = 16
@@ -65,6 +67,9 @@ class Routes:
         self.groups += [group for group, _ in loops]
         costs += [cost for _, cost in loops]
         if tight is not None:
+            # In short lanes there is no time for a change: who misses it gets into tight ones.
+            short = diags_array((graph.length > SHORT).astype(np.float64)).tocsr()
+            both = (stay + short @ change).tocsr().T.tocsr()
             wide = diags_array((~tight).astype(np.float64)).tocsr()
             # Links from and to tight lanes are cut.
             without = (wide @ both @ wide).tocsr()

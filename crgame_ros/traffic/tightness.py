@@ -39,7 +39,7 @@ def tight_lanes(graph: LaneGraph, shape: Shape) -> NDArray[np.bool_]:
     result = np.zeros(len(graph), dtype=bool)
     if len(ways):
         way, x, y = _drive(graph, shape, ways)
-        area = graph.network.area(SPARE)
+        area = shapely.buffer(graph.network.road_area(), SPARE)
         shapely.prepare(area)
         result[ways[way[~shapely.contains_xy(area, x, y)], 1]] = True
     return result
@@ -73,8 +73,8 @@ def _drive(graph: LaneGraph, shape: Shape,
                    (float(pose[0]), float(pose[1]), float(pose[2])), SLOW)
     agents.destination[:] = row
     reference = np.zeros(len(graph.x))
-    end = np.where(ways[:, 2] >= 0, graph.length[ways].max(axis=1) + RUN_UP, graph.length[
-        ways[:, 1]])
+    # Nobody needs a road beyond the map's edge.
+    end = np.where(ways[:, 2] >= 0, np.inf, graph.length[ways[:, 1]] - half)
     found: list[tuple[IntArray, NDArray[np.float64]]] = []
     slots, envelope = row, envelope_of(graph.table, graph.curve_speed)
     longest = float(graph.length[ways[:, 1]].max()) + RUN_UP
@@ -85,7 +85,8 @@ def _drive(graph: LaneGraph, shape: Shape,
         lane, s = agents.lane[slots], agents.s[slots]
         near = slots[(lane != ways[slots, 0]) | (s > graph.length[lane] - shape.length)]
         found.append((np.repeat(near, 4), _corners(agents, near)))
-        past = ((lane == ways[slots, 2]) & (s > RUN_OUT)) | (s > end[slots])
+        past = np.where(lane == ways[slots, 2], s > RUN_OUT,
+                        (lane == ways[slots, 1]) & (s > end[slots]))
         slots = slots[~past]
         if not len(slots):
             break
