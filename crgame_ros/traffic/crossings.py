@@ -18,6 +18,8 @@ from crgame_ros.traffic.placement import Entries
 STANDING = 0.05
 # A leader that is faster drives on [m/s].
 DRIVES_ON = 3.0
+# Between those who queue [m].
+QUEUE_GAP = 2.0
 # Who can halt with this lets somebody go who has waited very long [m/s^2].
 MERCY = 1.5
 # A grant ends so far behind its junction [m].
@@ -62,23 +64,32 @@ class Crossings:
 
 
 @compiled
-def queues(agents: AgentTable, slots: IntArray, pairs: Pairs,
-           entries: Entries) -> tuple[FloatArray, FloatArray]:
+def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
+           passage: Passages) -> tuple[FloatArray, FloatArray]:
     """
     Look at who is ahead of agents (A), before a junction or behind it.
+
+    Whoever drives on makes room, but no farther than to where it waits before its next junction,
+    and those in between queue behind it.
 
     :return: `Situation.rear_stop` and `Situation.queued`
     """
     rear_stop, queued = np.full(len(slots), math.inf), np.full(len(slots), math.inf)
+    between = np.zeros(len(slots))
+    row = np.full(len(agents.x), -1, np.int64)
+    for i, slot in enumerate(slots):
+        row[slot] = i
     for p in range(len(pairs.agent)):
         i, n = pairs.agent[p], pairs.entry[p]
         speed, owner = max(entries.speed[n], 0.0), entries.owner[n]
-        # A leader that drives on makes room itself.
-        if speed <= DRIVES_ON:
-            rear_stop[i] = min(rear_stop[i], pairs.distance[p] + speed**2 / 6.0)
-        if not entries.crosses[n] and (
-                agents.grant[owner] < 0 if owner >= 0 else speed < DRIVES_ON):
-            queued[i] = min(queued[i], pairs.gap[p])
+        stops = pairs.distance[p] + speed**2 / 6.0 if speed <= DRIVES_ON else math.inf
+        if owner >= 0 and not entries.crosses[n]:
+            stops = min(stops, pairs.distance[p] + max(passage.hold[row[owner]], 0.0))
+        rear_stop[i] = min(rear_stop[i], stops - between[i])
+        if not entries.crosses[n]:
+            between[i] += entries.front[n] - entries.rear[n] + QUEUE_GAP
+            if agents.grant[owner] < 0 if owner >= 0 else speed < DRIVES_ON:
+                queued[i] = min(queued[i], pairs.gap[p])
     return rear_stop, queued
 
 

@@ -23,12 +23,12 @@ ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
 LONGEST_CYCLE = 20_000
 # Hardest braking for a light that is red, and for one that turns yellow [m/s^2].
 RED_BRAKING = 4.0
-YELLOW_BRAKING = 3.0
+YELLOW_BRAKING = 3.4
 # Who brakes already doesn't drive on because that has become harder than wanted: at a yellow, at
 # a red light [m/s^2].
 BRAKES, STILL_BRAKING, STILL_FOR_RED = -1.0, 4.0, 7.0
 # Time until braking has set in [s].
-REACTION = 0.2
+REACTION = 0.1
 
 
 class LightTable(NamedTuple):

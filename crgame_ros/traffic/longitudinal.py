@@ -146,7 +146,7 @@ def before_lines(speed: FloatArray, light: FloatArray) -> FloatArray:
     result = np.empty(len(speed))
     for i in range(len(speed)):
         # Nearer to the line before one brakes hard for that.
-        easily = min(speed[i] * speed[i] / (2.0 * FIRMEST), light[i] - 0.5 * AT_REST)
+        easily = min(speed[i] * speed[i] / (2.0 * FIRMEST), light[i] - AT_REST)
         result[i] = max(light[i] - LINE_GAP, easily)
     return result
 

@@ -21,8 +21,9 @@ SPARE = 0.08
 EASY_WIDTH, EASY_BEND = 0.6, 0.02
 # How far before a lane a trial begins, how far behind it ends, and how often one looks [m, s].
 RUN_UP, RUN_OUT, STEP_S, SUBSTEPS = 20.0, 10.0, 0.1, 10
-# Slowest and fastest of a trial [m/s]; bends say what is in between.
-SLOW, QUICK = 2.0, 8.0
+# Trials are driven at these speeds at most, or slower where the road bends, and at the slowest of
+# them at least [m/s]: who is slow follows a bend's shift to the inside in full, who is fast late.
+SPEEDS = (2.5, 8.0)
 
 
 def tight_lanes(graph: LaneGraph, shape: Shape) -> NDArray[np.bool_]:
@@ -38,10 +39,11 @@ def tight_lanes(graph: LaneGraph, shape: Shape) -> NDArray[np.bool_]:
                     dtype=np.int64).reshape(-1, 3)
     result = np.zeros(len(graph), dtype=bool)
     if len(ways):
-        way, x, y = _drive(graph, shape, ways)
         area = shapely.buffer(graph.network.road_area(), SPARE)
         shapely.prepare(area)
-        result[ways[way[~shapely.contains_xy(area, x, y)], 1]] = True
+        for speed in SPEEDS:
+            way, x, y = _drive(graph, shape, ways, speed)
+            result[ways[way[~shapely.contains_xy(area, x, y)], 1]] = True
     return result
 
 
@@ -55,8 +57,8 @@ def _or_none(lanes: IntArray) -> list[int]:
     return [int(i) for i in lanes if i >= 0] or [-1]
 
 
-def _drive(graph: LaneGraph, shape: Shape,
-           ways: IntArray) -> tuple[IntArray, NDArray[np.float64], NDArray[np.float64]]:
+def _drive(graph: LaneGraph, shape: Shape, ways: IntArray,
+           top: float) -> tuple[IntArray, NDArray[np.float64], NDArray[np.float64]]:
     """Drive ways (N, 3) of lanes; give way, x and y of all corners in and around the middle."""
     count, half = len(ways), 0.5 * shape.length
     agents = Agents([ObjectDescription('trial', 'truck', Role.TRAFFIC, shape)] * count)
@@ -70,7 +72,7 @@ def _drive(graph: LaneGraph, shape: Shape,
                      np.minimum(half, graph.length[first]))
     for i, pose in enumerate(graph.poses(first, start, np.zeros(count))):
         agents.put(i, int(first[i]), float(start[i]), 0.0,
-                   (float(pose[0]), float(pose[1]), float(pose[2])), SLOW)
+                   (float(pose[0]), float(pose[1]), float(pose[2])), SPEEDS[0])
     agents.destination[:] = row
     reference = np.zeros(len(graph.x))
     # Nobody needs a road beyond the map's edge.
@@ -78,9 +80,9 @@ def _drive(graph: LaneGraph, shape: Shape,
     found: list[tuple[IntArray, NDArray[np.float64]]] = []
     slots, envelope = row, envelope_of(graph.table, graph.curve_speed)
     longest = float(graph.length[ways[:, 1]].max()) + RUN_UP
-    for _ in range(int(longest / (SLOW * STEP_S))):
+    for _ in range(int(longest / (SPEEDS[0] * STEP_S))):
         points = graph.rows(agents.lane[slots], agents.s[slots])
-        agents.speed[slots] = np.clip(envelope[points], SLOW, QUICK)
+        agents.speed[slots] = np.clip(envelope[points], SPEEDS[0], top)
         move(graph.table, following, agents.table, slots, reference, SUBSTEPS, STEP_S / SUBSTEPS)
         lane, s = agents.lane[slots], agents.s[slots]
         near = slots[(lane != ways[slots, 0]) | (s > graph.length[lane] - shape.length)]

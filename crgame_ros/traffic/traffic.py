@@ -283,7 +283,7 @@ class Traffic:
         sign = self._lines.stop_sign[before] & (passage.first > 0)
         coming = arrivals(graph.table, conflicts.table, way, agents.table, slots, entries,
                           self._others.drives, self._others.widths)
-        rear_stop, queued = queues(agents.table, slots, pairs, entries)
+        rear_stop, queued = queues(agents.table, slots, pairs, entries, passage)
         halt = self._crossings.halts(k, agents, way, passage, coming, Situation(
             slots, desired, rear_stop, light, sign, queued), elapsed_s)
         behind = (agents.blocker[slots] == FREE) & (gap < QUEUE)
