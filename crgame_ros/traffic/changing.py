@@ -106,9 +106,13 @@ class LaneChanges:
             graph, lane = self._graph, agents.source[stuck]
             center, _ = centers_of(agents.table, stuck)
             guess = agents.s[stuck] * graph.length[lane] / graph.length[agents.lane[stuck]]
-            agents.s[stuck], agents.d[stuck], _ = graph.project(
-                lane, center[:, 0], center[:, 1], guess)
-            agents.lane[stuck], agents.source[stuck] = lane, NOBODY
+            s, d, _ = graph.project(lane, center[:, 0], center[:, 1], guess)
+            # Into the lane whose middle is nearer.
+            back = np.abs(d) < np.abs(agents.d[stuck])
+            returns = stuck[back]
+            agents.lane[returns], agents.s[returns], agents.d[returns] = (
+                lane[back], s[back], d[back])
+            agents.source[stuck] = NOBODY
             agents.calm_until[stuck] = k + self._give_up
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,

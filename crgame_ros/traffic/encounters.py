@@ -69,7 +69,7 @@ def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, entries:
         slot, behind = corridor.owner[i], wanted[p]
         if entries.crosses[n] and entries.owner[n] >= 0:
             needed = agents.speed[slot]**2 / (2.0 * max(pairs.gap[p] - 0.5, 0.05))
-            behind = -_braking(lanes, following, agents, slot, entries.owner[n]) \
+            behind = -needed_braking(lanes, following, agents, slot, entries.owner[n]) \
                 if needed > ALARM else math.inf
         elif entries.owner[n] < 0 and abs(entries.speed[n]) < ACROSS and _passes_before(
                 agents, slot, entries, n, pairs.gap[p], corridor.low[i], corridor.high[i]):
@@ -172,7 +172,7 @@ def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap:
 
 
 @bare
-def _braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+def needed_braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
              other: int) -> float:
     """Give the gentlest braking with which two agents miss each other, -inf if none is needed."""
     speed = agents.speed[slot]

@@ -37,6 +37,9 @@ CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
 TRIES = 40
 # Longer vehicles take wide ways [m].
 LONG = 6.5
+# Nobody arrives while more than this share of all have stood for so long [s]: more vehicles would
+# block the junctions behind each other, and fewer would leave.
+JAM_SHARE, JAM_TIME = 0.25, 20.0
 # Rounds in which those who are placed together get used to each other's speeds.
 CALMING = 3
 # Recorded vehicles take bends so much faster than agents do, by the square root of accelerations.
@@ -116,8 +119,11 @@ class Spawner:
                     break
 
     def arrive(self, k: int, agents: Agents, others: Bodies) -> None:
-        """Let agents in at the edges of the map, as soon as there is room."""
+        """Let agents in at the edges of the map, as soon as there is room, but not into a jam."""
         self._due -= self._time_step_s
+        waits = agents.waits[agents.active]
+        if np.count_nonzero(waits * self._time_step_s > JAM_TIME) > JAM_SHARE * len(waits):
+            return
         for number in np.flatnonzero(self._due <= 0.0).tolist():
             free = self._free(agents, k)
             if not len(free):

@@ -16,7 +16,7 @@ from crgame_ros.traffic.longitudinal import envelope_of
 from crgame_ros.traffic.motion import move
 
 # Beyond the road by so much is off it: in traffic it becomes a decimetre more [m].
-SPARE = 0.08
+SPARE = 0.05
 # Lanes that are wider than the vehicle by this, and straighter, are not tried [m, 1/m].
 EASY_WIDTH, EASY_BEND = 0.6, 0.02
 # How far before a lane a trial begins, how far behind it ends, and how often one looks [m, s].

@@ -20,6 +20,7 @@ import numpy as np
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.cache import marker
 from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
@@ -46,7 +47,7 @@ def ensure_compiled(say: Callable[[str], None]) -> None:
 
 
 def drive_everything() -> None:
-    """Drive where everything happens: a light, a crossing, a wreck, a parked car, people."""
+    """Drive where all happens: a light, a crossing, a wreck, a parked car, people, a recording."""
     scenario = crossroads()
     others = [ObjectDescription('wreck', 'parkedVehicle', Role.STATIC, Shape.rectangle(4.5, 1.8)),
               ObjectDescription('edge', 'parkedVehicle', Role.STATIC, Shape.rectangle(4.0, 1.0)),
@@ -60,9 +61,12 @@ def drive_everything() -> None:
                                [6.0, 0.0, 0.0]])
         return WorldView(k, poses, velocities, {LIGHT: 'red' if k < 60 else 'green'})
 
+    recorded = ObjectDescription('o1', 'car', Role.RECORDED, Shape.rectangle(4.5, 1.8))
+    track = np.array([[0.0, -60.0, 0.5 * np.pi], [0.0, 100.0, 0.5 * np.pi]])
+    adopted = Adopted(recorded, 5, track, np.array([[0.0, 9.0, 0.0]] * 2))
     traffic = Traffic(TrafficSpec(agents=14, flow=1800.0, capacity=40),
-                      RoadNetwork(scenario.lanelet_network), scenario, others, (), 0.1, 10, 0, 0,
-                      world(0))
+                      RoadNetwork(scenario.lanelet_network), scenario, others, (adopted,), 0.1,
+                      10, 0, 0, world(0))
     for k in range(TICKS):
         traffic.advance(world(k))
     drive_where_a_lane_ends()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from commonroad.scenario.scenario import Scenario
 import numpy as np
+import pytest
 import traffic_support as support
 
 from crgame_ros.geometry.shape import Shape
@@ -174,3 +175,18 @@ def test_who_has_stood_long_goes_when_the_lane_is_free() -> None:
     # Its rear is 2.25 m behind that: room enough to begin.
     assert speeds[passed - 2] == 0.0 and poses[passed - 2, 1] < -3.0
     assert poses[passed + 60, 1] > -1.0
+
+
+@pytest.mark.parametrize(('y', 'lane'), [(-0.4, 1), (-3.1, 2)])
+def test_a_change_that_comes_to_nothing_ends_in_the_nearer_lane(y: float, lane: int) -> None:
+    # Whoever got into the new lane and stood there for long was taken for one in the old lane, and
+    # drove on beside who had come into that.
+    traffic = support.Run(two_lanes(), TrafficSpec(), 0, [], [agent(1, 50.0, y, 0.0)]).traffic
+    agents, index = traffic._agents, traffic._graph.index
+    agents.put(0, index[1], 50.0, y, (50.0, y, 0.0), 0.0)
+    agents.source[0], agents.from_s[0], agents.span[0] = index[2], 35.0, 20.0
+    agents.waits[0] = 10_000
+    traffic._changes.finish(0, agents)
+    assert traffic._graph.ids[agents.lane[0]] == lane
+    assert agents.source[0] < 0
+    assert abs(agents.d[0]) < 0.5

@@ -177,3 +177,23 @@ def test_a_busy_junction_never_locks_up(maps: Path, name: str) -> None:
     speeds = np.array(run.speeds)
     for begin in range(0, 1800, 300):
         assert np.nanmean(speeds[begin:begin + 300]) > 3.0
+
+
+def test_nobody_stops_on_a_crossing_behind_who_will_stop_before_the_next() -> None:
+    """Whoever is ahead still drives when one asks, but halts before a junction that is taken."""
+    roads = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 112.0, successor=[4]),
+        support.straight_lane(4, 0.0, 112.0, 200.0, predecessor=[1]),
+        support.lane_strip(2, [(100.0, -60.0), (100.0, 60.0)]),
+        support.lane_strip(3, [(125.0, -60.0), (125.0, 60.0)]))
+    # Stands across the second crossing.
+    human = support.human(125.0, 0.0, np.pi / 2.0)
+    run = support.Run(roads, TrafficSpec(), 0, [human], [
+        support.driving(i, [(15.0 + 16.0 * i, 0.0, 0.0), (190.0, 0.0, 0.0)], 8.0)
+        for i in range(5)]).ticks(400)
+    last = run.poses[-1]
+    assert (run.speeds[-1][np.isfinite(last[:, 0])] < 0.05).all()
+    # Who fits in between is there, the others wait before the first crossing.
+    inside = np.abs(last[:, 0] - 100.0) < 0.5 * (4.5 + 1.8)
+    assert not inside.any()
+    assert (last[:, 0] > 104.0).any()

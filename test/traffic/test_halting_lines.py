@@ -204,8 +204,9 @@ def test_a_green_arrow_frees_only_who_would_wait_for_ever(
     ('red', 8.0, 0.0, True), ('redYellow', 8.0, 0.0, True), ('yellow', 8.0, 0.0, True),
     ('green', 8.0, 0.0, False), ('inactive', 8.0, 0.0, False),
     # v^2 / (2 d) over 48 m: 3.3 m/s^2 is hard for yellow unless one brakes already, 6.5 for red.
-    ('yellow', 17.7, 0.0, False), ('yellow', 17.7, -2.5, True), ('yellow', 20.0, -2.5, False),
-    ('red', 20.0, 0.0, True), ('red', 25.0, 0.0, False),
+    ('yellow', 18.0, 0.0, False), ('yellow', 18.0, -2.5, True), ('yellow', 20.0, -2.5, False),
+    ('red', 19.5, 0.0, True), ('red', 20.5, 0.0, False), ('red', 20.5, -2.5, True),
+    ('red', 27.0, -2.5, False),
 ])
 def test_a_light_without_arrows_is_for_everybody(shown: str, speed: float, acceleration: float,
                                                  halts: bool) -> None:

@@ -30,7 +30,7 @@ def scattered(graph: LaneGraph, count: int) -> Bodies:
                            np.zeros(count)), axis=-1)
     return Bodies(poses, velocities, np.zeros(count), rng.uniform(0.3, 18.0, count),
                   rng.uniform(0.3, 2.6, count), np.arange(count),
-                  rng.choice([0.0, 0.7, 2.0], count), np.where(rng.random(count) < 0.1, lane, -1))
+                  rng.choice([0.0, 0.7, 4.0], count), np.where(rng.random(count) < 0.1, lane, -1))
 
 
 @pytest.mark.parametrize('name', MAPS)

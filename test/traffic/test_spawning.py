@@ -164,3 +164,13 @@ def test_a_restart_goes_on_from_what_was_seen(maps: Path) -> None:
     assert fresh.overlaps() == []
     steps = np.hypot(*np.diff(np.array(fresh.poses), axis=0)[:, :, :2].transpose(2, 0, 1))
     assert np.nanmax(steps) < 3.0
+
+
+def test_nobody_arrives_into_a_jam() -> None:
+    """Behind a wreck at the road's end the queue doesn't reach back to its beginning."""
+    wreck = support.human(LANE - 10.0, 0.0, 0.0, kind='parkedVehicle')
+    run = support.Run(one_lane(), TrafficSpec(flow=1800.0, truck_share=0.0), 3, [wreck])
+    poses = run.ticks(2400).poses[-1]
+    here = poses[np.isfinite(poses[:, 0]), 0]
+    assert len(here) > 5
+    assert here.min() > 60.0

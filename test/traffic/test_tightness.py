@@ -1,0 +1,55 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which lanes are too tight for whom; what is on the road is checked by the judge's own area."""
+
+from pathlib import Path
+
+from judge.motion import off_road
+from judge.roads import JudgedRoads
+import numpy as np
+import pytest
+from traffic_drive import drive
+import traffic_support as support
+
+from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.traffic.lane_graph import LaneGraph
+from crgame_ros.traffic.spawning import CAR, TRUCK
+from crgame_ros.traffic.spec import TrafficSpec
+from crgame_ros.traffic.tightness import tight_lanes
+
+
+def bend(radius: float) -> LaneGraph:
+    """Make a straight lane, a bend of 90 degrees to the left and a straight lane behind it."""
+    angle = np.linspace(0.0, np.pi / 2.0, 30)
+    curve = [(40.0 + radius * np.sin(a), radius * (1.0 - np.cos(a))) for a in angle]
+    end = curve[-1]
+    return LaneGraph(RoadNetwork(support.roads(
+        support.lane_strip(1, [(0.0, 0.0), (40.0, 0.0)], successor=[2]),
+        support.lane_strip(2, curve, predecessor=[1], successor=[3]),
+        support.lane_strip(3, [end, (end[0], end[1] + 40.0)], predecessor=[2])).lanelet_network))
+
+
+@pytest.mark.parametrize(('radius', 'truck', 'car'), [(3.0, True, True), (9.0, True, False),
+                                                      (25.0, False, False)])
+def test_a_bend_is_too_tight_where_the_swept_width_is_more_than_the_lane(
+        radius: float, truck: bool, car: bool) -> None:
+    # f^2 / (2 R) wider than the vehicle, f from rear axle to front: at 9 m a truck of 8 m takes
+    # 4.5 m of a lane of 3.5 m, at 25 m 3.2 m; a car of 4.5 m takes 2.5 m at 9 m and
+    # more than the lane has at 3 m.
+    graph = bend(radius)
+    assert tight_lanes(graph, TRUCK)[1] == truck
+    assert tight_lanes(graph, CAR)[1] == car
+    assert not tight_lanes(graph, CAR)[0]
+
+
+@pytest.mark.parametrize('name', ['more/DEU_Moelln-10_2_T-1', 'more/BEL_Putte-8_2_T-1',
+                                  'OSC_PedestrianCollision-1_1_T-1'])
+def test_trucks_stay_on_published_roads(name: str, shared_scenarios: Path) -> None:
+    driven = drive(shared_scenarios / f'{name}.xml', TrafficSpec(
+        agents=25, flow=300.0, truck_share=0.5), 40.0, 3, False)
+    roads = JudgedRoads(driven.scenario.scenario.lanelet_network)
+    trucks = [i for i, kind in enumerate(driven.history.kinds) if kind == 'truck']
+    assert len(trucks) >= 2
+    events, away = off_road(driven.history, roads)
+    assert [x for x in events if x.what == 'off road'] == []
+    assert away[:, trucks].max() < 0.25
