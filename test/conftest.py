@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from worker_roles import (  # noqa: E402 - importable from here on
     ALONE,
-    beside_graphs,
     group_of,
+    in_company,
     keeps_to_the_clock,
     order_of,
     own_domain_id,
@@ -75,16 +75,17 @@ def _company(request: pytest.FixtureRequest,
     """Keep from each other, and from what computes, those that keep to the clock."""
     first = next(item for item in request.session.items if item.path == request.path)
     group = group_of(first, ROOT / 'test')
+    file = tmp_path_factory.getbasetemp().parent / 'company.lock'
     if not keeps_to_the_clock(group):
         step_back()
-        yield
+        with in_company(file):
+            yield
         return
     # A collection in the heap that all other tests have left stops this process for half a
     # second: whoever drives a vehicle from here would fall silent, and be braked.
     gc.collect()
     gc.freeze()
-    with beside_graphs(tmp_path_factory.getbasetemp().parent / 'graphs.lock',
-                       alone=group == ALONE):
+    with in_company(file, alone=group == ALONE):
         yield
     gc.unfreeze()
 

@@ -16,7 +16,7 @@ from crgame_ros.ros.environment import free_domain_id
 
 # Of tests that keep to the clock: they speak with running graphs and servers.
 REAL_TIME_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
-# The group of those that no other graph may run beside: they assert what clocks show.
+# The group of those that nothing may run beside: they assert what clocks show.
 ALONE = 'alone'
 GRAPH_WORKERS = 2
 MAX_WORKERS = 4
@@ -95,9 +95,11 @@ def step_back() -> None:
 
 
 @contextmanager
-def beside_graphs(file: Path, *, alone: bool) -> Iterator[None]:
+def in_company(file: Path, *, alone: bool = False) -> Iterator[None]:
     """
-    Wait until the graphs of other workers have ended, or only until nobody wants to be alone.
+    Wait until no other worker runs anything, or only until nobody is alone.
+
+    Who wants to be alone gets there last: others don't wait for it while some of them work.
 
     :param file: that all workers lock.
     """
