@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 How often each planner answers with a plan of its own, in our games and published scenarios.
 
@@ -10,18 +22,17 @@ import argparse
 from pathlib import Path
 import time
 
-from lxml import etree
-import numpy as np
-
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.export import export_scenario
 from crgame_ros.recording.run_log import run_log_of
-from crgame_ros.scenario.export import export_scenario
 from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
+from lxml import etree
+import numpy as np
 
 
 def report(name: str, request: RunRequest, planner: str) -> None:

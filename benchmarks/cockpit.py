@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 The cockpit in a real browser: key to odometry, key to picture, script time, and what it costs.
 
@@ -21,14 +33,13 @@ import time
 from typing import Any
 from urllib.parse import urlsplit
 
+from crgame_ros.paths import scenarios_directory
 from live_graph import LiveGraph, RemoteControl
 import numpy as np
 from odometry_probe import OdometryProbe
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 import websocket
-
-from crgame_ros.paths import scenarios_directory
 
 FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
          '--disable-background-networking', '--disable-component-update', '--disable-sync',

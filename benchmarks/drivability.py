@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Measure the drivability check: one human and one AV among 57 recorded cars.
 
@@ -16,17 +28,16 @@ import time
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.scenario.obstacle import DynamicObstacle
 from commonroad.scenario.scenario import Scenario
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.drivability.monitor import DrivabilityMonitor
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.game import DrivabilitySpec
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory, share_directory
-from crgame_ros.scenario.game import DrivabilitySpec
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
+import numpy as np
+from numpy.typing import NDArray
 
 CARS = 57
 SUBSTEPS = 10
@@ -129,7 +140,7 @@ def measure(scenario: Scenario, tracks: NDArray[np.float64], shapes: list[Shape]
     times, hits = [], 0
     for _ in range(rounds):
         for k in range(len(velocities)):
-            monitor.set_objects(SUBSTEPS * k, ObjectStates(tracks[k, 2:], velocities[k, 2:]))
+            monitor.set_objects(ObjectStates(tracks[k, 2:], velocities[k, 2:]))
             for step in range(SUBSTEPS):
                 seconds = step * scenario.dt / SUBSTEPS
                 states = rear_axles(tracks[k, :2] + seconds * velocities[k, :2],

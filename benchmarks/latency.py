@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """From a driver's input to the odometry that shows it, and from a plan request to its plan."""
 
 import argparse
@@ -8,11 +20,10 @@ import random
 import tempfile
 import time
 
+from crgame_ros.paths import scenarios_directory
 from live_graph import LiveGraph, RemoteControl
 import numpy as np
 from odometry_probe import OdometryProbe
-
-from crgame_ros.paths import scenarios_directory
 
 PLANNERS = {'idm': 'p99 <= 5', 'constant-velocity': '', 'idm-package': '',
             'reactive': 'p99 <= 100'}

@@ -1,63 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scenario files broken in one or two places: each is refused at once, or runs and is written."""
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Scenario files broken in one or two places, element by element."""
 
-import argparse
-from collections import Counter
 from copy import deepcopy
-from dataclasses import dataclass
-from multiprocessing import Pool
-from pathlib import Path
 import random
-import signal
-import sys
-import tempfile
-import traceback
 
 from lxml import etree
 
-from crgame_ros.errors import InputError
-from crgame_ros.recording.run_log import run_log_of
-from crgame_ros.scenario.export import export_scenario
-from crgame_ros.scenario.export_network import schema_errors
-from crgame_ros.scenario.game import Game, HumanSpec
-from crgame_ros.simulation.offline import run_offline
-from crgame_ros.simulation.setup import build_setup
-
-NUMBERS = ('NaN', 'inf', '-inf', '1e300', '-1', '0', '-0.0', '', 'abc', '1e8', '0.5', '7', '1e-9',
-           '100000', '-3.5', '99999999999999999999', '3.2e5')
+NUMBERS = ('NaN', 'inf', '-inf', '1e300', '1e308', '-1', '0', '-0.0', '', 'abc', '1e6', '1e8',
+           '1e9', '0.5', '7', '1e-9', '100000', '-3.5', '99999999999999999999', '3.2e5', '5.5e6',
+           '\u0661',           '1_0', '0x10', '9' * 5000)
 IDS = ('0', '-1', '-7', '1', '2', '99999999999999999999', 'x', '', ' 3 ', '1.5', '123456789')
 HEADER = {
     'commonRoadVersion': ('2017a', '2018b', '2020a', '2021a', ''), 'date': ('', '27-Mar-2017'),
     'timeStepSize': ('0', '-0.1', '0.04', '0.2', 'NaN', '1', '0.123456789012', '100', '1e-3'),
     'benchmarkID': ('', 'a b', '../x', 'C-DEU_A-1_1_T-1', 'ZAM_Urban-3_3_Repair', 'é-1')}
-SECONDS = 60
+OFFSETS = ((6.9e5, 5.5e6), (0.0, 5.5e6), (-1e8, 3e8))
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """
-    What became of a mutated file.
-
-    :param kind: `refused` at once, `valid` after its run; all else is a defect: `late` (refused
-        at the end of its run), `invalid`, `crash`, `several lines`, `hang`.
-    :param mutation: what was done to the file.
-    :param detail: the message or traceback.
-    """
-
-    kind: str
-    mutation: str
-    detail: str = ''
-
-    @property
-    def is_good(self) -> bool:
-        """Tell whether a user would be served."""
-        return self.kind in ('refused', 'valid')
-
-
-def mutate(text: bytes, seed: object) -> tuple[bytes, str]:
-    """Break a scenario in one or two places; the same seed gives the same file."""
-    dice = random.Random(str(seed))
+def mutate(text: bytes, dice: random.Random) -> tuple[bytes, str]:
+    """Break a scenario in one or two places; what was done is given too."""
     if dice.random() < 0.01:
         end = dice.randrange(len(text))
         return text[:end], f'cut after {end} bytes'
@@ -65,7 +39,7 @@ def mutate(text: bytes, seed: object) -> tuple[bytes, str]:
     done = []
     for _ in range(dice.choice((1, 1, 2))):
         step = dice.choice((_delete, _duplicate, _move, _attribute, _leaf, _leaf, _rename, _empty,
-                            _time, _header, _same_id))
+                            _time, _header, _same_id, _move_all, _stretch, _many))
         done.append(step(root, dice))
     return etree.tostring(root), ' and '.join(done)
 
@@ -176,65 +150,62 @@ def _header(root: etree._Element, dice: random.Random) -> str:
     return f'@{name} = {value[:20]!r}'
 
 
-def outcome_of(text: bytes, mutation: str, folder: Path) -> Outcome:
-    """Load a file, drive it for two scenario steps and export the run."""
-    file = folder / 'mutated.xml'
-    file.write_bytes(text)
-    signal.signal(signal.SIGALRM, _give_up)
-    signal.alarm(SECONDS)
+def _coordinates(root: etree._Element, dice: random.Random) -> tuple[list[etree._Element], str]:
+    """Choose coordinates of positions: of everything, of the roads, of one element or one kind."""
+    tags = sorted({str(node.tag) for node in root if node.tag != 'commonRoad'})
+    tag = dice.choice(tags)
+    scopes = {'everything': [root], 'the roads': root.findall('lanelet'),
+              f'each {tag}': root.findall(tag), f'one {tag}': [dice.choice(root.findall(tag))]}
+    name = dice.choice(sorted(scopes))
+    found = [node for scope in scopes[name] for node in scope.iter('x', 'y')
+             if not any(above.tag == 'shape' for above in node.iterancestors())]
+    return found, name
+
+
+def _move_all(root: etree._Element, dice: random.Random) -> str:
+    nodes, name = _coordinates(root, dice)
+    offset = dice.choice(OFFSETS)
+    for node in nodes:
+        node.text = _shifted(node.text, 1.0, offset[node.tag == 'y'])
+    return f'move {name} by {offset}'
+
+
+def _stretch(root: etree._Element, dice: random.Random) -> str:
+    nodes, name = _coordinates(root, dice)
+    factor = dice.choice((0.0, 1e-6, 0.1, -1.0, 10.0, 1e3, 1e6))
+    for node in nodes:
+        node.text = _shifted(node.text, factor, 0.0)
+    return f'scale {name} by {factor:g}'
+
+
+def _shifted(text: str | None, factor: float, offset: float) -> str:
     try:
-        try:
-            setup = build_setup(Game(file, humans=(HumanSpec('hv0', 'idle'),)))
-        except InputError as error:
-            return Outcome('several lines' if '\n' in str(error) else 'refused', mutation,
-                           str(error))
-        result = run_offline(setup, duration_s=2.0 * setup.scheduler.time_step_s)
-        try:
-            exported = export_scenario(run_log_of(result))
-        except Exception as error:  # the kind that matters most: it comes after the whole run
-            return Outcome('late', mutation, f'{type(error).__name__}: {error}')
-        errors = schema_errors(etree.fromstring(exported.xml_text.encode()))
-        return Outcome('invalid' if errors else 'valid', mutation, '; '.join(errors[:1]))
-    except TimeoutError:
-        return Outcome('hang', mutation, traceback.format_exc(limit=-2))
-    except Exception:  # whatever escapes is the finding
-        return Outcome('crash', mutation, traceback.format_exc(limit=-3))
-    finally:
-        signal.alarm(0)
+        return repr(factor * float(text or '') + offset)
+    except ValueError:
+        return text or ''
 
 
-def _give_up(*_: object) -> None:
-    raise TimeoutError(f'more than {SECONDS} s')
-
-
-def _try(job: tuple[Path, int]) -> tuple[str, Outcome]:
-    path, seed = job
-    text, mutation = mutate(path.read_bytes(), f'{path.stem} {seed}')
-    with tempfile.TemporaryDirectory() as folder:
-        return f'{path.stem} {seed}', outcome_of(text, mutation, Path(folder))
-
-
-def main() -> int:
-    """Run the benchmark."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('scenarios', nargs='+', type=Path, help='CommonRoad files to break')
-    parser.add_argument('--count', type=int, default=56, help='mutations of each file')
-    parser.add_argument('--first', type=int, default=0, help='seed of the first')
-    parser.add_argument('--jobs', type=int, default=2)
-    values = parser.parse_args()
-    jobs = [(path, seed) for seed in range(values.first, values.first + values.count)
-            for path in values.scenarios]
-    counts: Counter[str] = Counter()
-    with Pool(values.jobs, maxtasksperchild=100) as pool:
-        for name, outcome in pool.imap_unordered(_try, jobs):
-            counts[outcome.kind] += 1
-            if not outcome.is_good:
-                print(f'{outcome.kind}: {name}: {outcome.mutation}\n    {outcome.detail}',
-                      flush=True)
-    print(f'{counts.total()} files: '
-          + ', '.join(f'{count} {kind}' for kind, count in counts.most_common()))
-    return 0 if set(counts) <= {'refused', 'valid'} else 1
-
-
-if __name__ == '__main__':
-    sys.exit(main())
+def _many(root: etree._Element, dice: random.Random) -> str:
+    """Repeat an element hundreds of times; give a lanelet 20,000 points."""
+    lanelets = root.findall('lanelet')
+    if lanelets and dice.random() < 0.5:
+        lanelet = dice.choice(lanelets)
+        for bound in lanelet.findall('leftBound') + lanelet.findall('rightBound'):
+            points = bound.findall('point')
+            if not points:
+                continue
+            for number in range(20_000 - len(points)):
+                points[-1].addprevious(deepcopy(points[number % len(points)]))
+        return f'lanelet {lanelet.get("id")} has 20,000 points'
+    node, count = _pick(root, dice), dice.choice((50, 500))
+    if sum(1 for _ in node.iter()) * count > 100_000:
+        return 'nothing'
+    ids = 10 ** 6
+    for _ in range(count):
+        copy = deepcopy(node)
+        for named in copy.iter():
+            if named.get('id') is not None:
+                ids += 1
+                named.set('id', str(ids))
+        node.addnext(copy)
+    return f'{count} times {_name(node)}'

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The naive baseline of CRG section IV-C: mechanisms off, planner, checks and recording inline."""
 
 from dataclasses import replace
@@ -7,18 +19,17 @@ import json
 from pathlib import Path
 import time
 
-import numpy as np
-
-from crgame_ros.drivability.monitor import DrivabilityMonitor
+from crgame_ros.game.game import TimingSpec
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.writer import BagWriter
-from crgame_ros.scenario.game import TimingSpec
-from crgame_ros.simulation.drivers import offline_driver
 from crgame_ros.simulation.engine import Simulation
-from crgame_ros.simulation.offline import PlannerSeat
+from crgame_ros.simulation.observer import drivability_monitor
+from crgame_ros.simulation.offline import observed_run, PlannerSeat
+from crgame_ros.simulation.offline_driver import offline_driver
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.time_controller import TimeController
 from crgame_ros.timing.timing_metrics import TimingMetrics, TimingSummary
+import numpy as np
 
 OFF = {'pacing': False, 'frame_skipping': False, 'drift_reset': False, 'measured_interval': False}
 
@@ -40,14 +51,10 @@ class NaiveLoop:
         spec: TimingSpec = replace(setup.game.timing, **OFF)
         self._controller = TimeController(spec, self._dt_s)
         self.metrics = TimingMetrics(self._dt_s)
-        self._monitor = DrivabilityMonitor(
-            setup.vehicle_descriptions, setup.obstacles.descriptions,
-            setup.loaded.scenario.lanelet_network, setup.game.drivability)
-        self._monitor.prepare(np.array(self._simulation.states))
+        self._monitor = drivability_monitor(observed_run(setup))
         self._writer = BagWriter(folder, now_ns=time.monotonic_ns)
         self._channel = self._writer.add_topic('/state', 'std_msgs/msg/String', TopicQos())
         self._result = self._simulation.begin()
-        self._tick_n = 0
         self._started = False
 
     def run(self, duration_s: float) -> None:
@@ -75,11 +82,9 @@ class NaiveLoop:
             seat.deliver()
         commands = [driver.command(simulation.n, self._dt_s) for driver in self._drivers]
         self._result = simulation.step(cycle.dt_eff_s, commands)
-        if self._result.objects is not None:
-            self._monitor.set_objects(simulation.n, self._result.objects)
-            self._tick_n = simulation.n
         states = np.array(simulation.states)
-        self._monitor.check(simulation.n, (simulation.n - self._tick_n) * self._dt_s, states)
+        self._monitor.observe(simulation.n, simulation.scheduler.since_tick_s(simulation.n),
+                              states, self._result.objects)
         text = json.dumps({'n': simulation.n, 'states': states.tolist()}).encode()
         data = b'\0\1\0\0' + (len(text) + 1).to_bytes(4, 'little') + text + b'\0'
         self._writer.write(self._channel, data, time.time_ns())

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What perception costs: scans of 4 sensors x 360 rays x 60 objects, a step, and a request."""
 
 import argparse
@@ -9,19 +21,18 @@ import statistics
 import time
 from typing import Any
 
-import numpy as np
-
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.perception_spec import LocalisationSpec, PerceptionSpec, SensorSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.perception.bodies import Bodies
+from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.perception import Perception
 from crgame_ros.perception.sensors import create_sensor
-from crgame_ros.perception.spec import LocalisationSpec, PerceptionSpec, SensorSpec
-from crgame_ros.planner.joints import JointSeries, object_joint_names, vehicle_joint_names
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.occupancy import OccupancyGrid
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
 
 OBJECTS = 60
 # Further slots of traffic, absent.
@@ -53,7 +64,7 @@ class Scene:
 
     def scans(self, count: int, grid: OccupancyGrid | None = None) -> Callable[[int], None]:
         """Give the work of a number of sensors that scan at once."""
-        bodies = Bodies(self.objects)
+        bodies = SensedBodies(self.objects)
         bodies.place(self.poses)
         sensors = [create_sensor(spec) for spec in self.sensors[:count]]
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 CRG table I: our graph beside the naive loop and the paper's numbers, on this machine.
 
@@ -16,13 +28,12 @@ import time
 from typing import Any
 
 from bare_loop import BareLoop
-from live_graph import LiveGraph, RemoteControl
-from naive_loop import NaiveLoop
-
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
+from live_graph import LiveGraph, RemoteControl
+from naive_loop import NaiveLoop
 
 ROWS = (
     # name, key in timing.json, paper's proposed, paper's naive, wanted

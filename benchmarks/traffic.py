@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 What traffic costs: time for a scenario time step against the number of agents.
 
@@ -40,16 +52,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'scripts'))
 
+from crgame_ros.game.objects import ObjectDescription, Role  # noqa: E402, I100
+from crgame_ros.game.traffic_spec import TrafficSpec  # noqa: E402
+from crgame_ros.geometry.shape import Shape  # noqa: E402
+from crgame_ros.roads.road_network import RoadNetwork  # noqa: E402
+from crgame_ros.traffic.adoption import Adopted  # noqa: E402
+from crgame_ros.traffic.traffic import Traffic  # noqa: E402
+from crgame_ros.traffic.world_view import WorldView  # noqa: E402
 from scenario_traffic import BLOCK, LANE_WIDTH, loaded, motorway, town  # noqa: E402
 from traffic_others import timed  # noqa: E402
-
-from crgame_ros.geometry.shape import Shape  # noqa: E402
-from crgame_ros.scenario.objects import ObjectDescription, Role  # noqa: E402
-from crgame_ros.scenario.road_network import RoadNetwork  # noqa: E402
-from crgame_ros.traffic.adoption import Adopted  # noqa: E402
-from crgame_ros.traffic.spec import TrafficSpec  # noqa: E402
-from crgame_ros.traffic.traffic import Traffic  # noqa: E402
-from crgame_ros.traffic.world import WorldView  # noqa: E402
 
 COUNTS = (10, 100, 1000, 10000)
 # Wanted at most, by agents [ms].

@@ -1,24 +1,38 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Driving a scenario with dense traffic and writing down what can be seen of it."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from judge.history import FloatArray, History, rectangle
-import numpy as np
-
-from crgame_ros.geometry.shape import Shape
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.outline import outline
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.traffic_setup import adopted_columns, MOTION_RATE
 from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
+from crgame_ros.traffic.world_view import WorldView
+from judge.history import FloatArray, History
+import numpy as np
+
+# Of the polygon that stands for a circle: its corners lie on it.
+CIRCLE_CORNERS = 16
 
 
 @dataclass(frozen=True)
@@ -83,7 +97,7 @@ def _history(dt_s: float, descriptions: tuple[ObjectDescription, ...], agents: i
              poses: FloatArray, velocities: FloatArray) -> History:
     return History(dt_s, tuple(x.id for x in descriptions), tuple(
         'human' if x.role.is_ego else x.type for x in descriptions), agents,
-        tuple(outline(x.shape) for x in descriptions), poses, velocities)
+        tuple(outline(x.shape, CIRCLE_CORNERS, False) for x in descriptions), poses, velocities)
 
 
 def _trimmed(history: History) -> History:
@@ -94,13 +108,3 @@ def _trimmed(history: History) -> History:
         kinds=tuple(history.kinds[i] for i in came), agents=int((came < history.agents).sum()),
         outlines=tuple(history.outlines[i] for i in came), poses=history.poses[:, came],
         velocities=history.velocities[:, came])
-
-
-def outline(shape: Shape) -> FloatArray:
-    """Give the corners (n, 2) of a shape around its centre [m]."""
-    if shape.kind == 'polygon':
-        return np.array(shape.vertices)
-    if shape.kind == 'circle':
-        angle = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
-        return shape.radius * np.stack((np.cos(angle), np.sin(angle)), axis=-1)
-    return rectangle(shape.length, shape.width)

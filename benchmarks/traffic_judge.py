@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Dense traffic on anybody's maps, judged from outside.
 
@@ -27,11 +39,10 @@ from pathlib import Path
 import sys
 import time
 
+from crgame_ros.game.traffic_spec import TrafficSpec
 from judge.roads import JudgedRoads
 from judge.verdict import judge, Verdict
 from traffic_drive import drive
-
-from crgame_ros.traffic.spec import TrafficSpec
 
 ROOT = Path(__file__).resolve().parents[1]
 HEADER = (f'{"map":34}{"seed":>5}{"overlaps":>14}{"red":>8}{"lat p99":>9}{"max":>6}'

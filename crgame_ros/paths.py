@@ -1,9 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the package's data files (config, scenarios, contract) are."""
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where the package's data files (config, scenarios, contract) are; what files are good for."""
 
+import errno
+import os
 from pathlib import Path
+import stat
 import sys
+import tempfile
 
 from crgame_ros.errors import CrgameError
 
@@ -25,6 +41,29 @@ def share_directory() -> Path:
             return candidate
     raise CrgameError(f'{package}: the data files of {PACKAGE} are missing; '
                       'install with colcon or `pip install .`, or run from the source tree')
+
+
+def irregular(mode: int) -> str | None:
+    """Say what a file is, by its mode, that is nothing to read from: a pipe may never end."""
+    if stat.S_ISDIR(mode):
+        return 'a directory'
+    return None if stat.S_ISREG(mode) else 'no regular file'
+
+
+def check_room(folder: Path, size: int = 1 << 20) -> None:
+    """
+    See that something can be stored in a folder, before the work that makes it.
+
+    :param size: of what is tried [bytes]
+    :raises OSError: if the disk is full, a quota is used up or the folder cannot be written.
+    """
+    with tempfile.TemporaryFile(dir=folder) as stream:
+        try:
+            os.posix_fallocate(stream.fileno(), 0, size)
+        except OSError as error:
+            # Some file systems cannot promise room.
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
+                raise
 
 
 def config_directory() -> Path:

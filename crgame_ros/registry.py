@@ -1,8 +1,20 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Finding exchangeable classes by name, entry point, module or file; checking their options."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import importlib
 from importlib.metadata import entry_points
 import importlib.util
@@ -11,9 +23,14 @@ import math
 from pathlib import Path
 import sys
 import types
-from typing import Any, get_args, get_origin, get_type_hints, Literal, Union
+from typing import Any, ClassVar, get_args, get_origin, get_type_hints, Literal, Union
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, short
+from crgame_ros.paths import share_directory
+
+# They declare Python < 3.12, so that pip does not bring them there; they work all the same.
+PACKAGES = {'commonroad_idm_planner': 'commonroad-idm-planner',
+            'commonroad_rp': 'commonroad-reactive-planner'}
 
 
 class ModelRegistry:
@@ -30,6 +47,10 @@ class ModelRegistry:
     :param base: the class that all of them derive from
     :param document: the page of the documentation that tells how to write one
     """
+
+    # Who decide whether this process may run code that is not registered, given its name as
+    # `module:Class` or `path/to/file.py:Class`; nobody does in programs that people start.
+    judges: ClassVar[list[Callable[[str], bool]]] = []
 
     def __init__(self, group: str, kind: str, built_in: Mapping[str, str], base: type,
                  document: str | None = None) -> None:
@@ -84,6 +105,9 @@ class ModelRegistry:
         if name in self.built_in:
             found = _from_module(self.built_in[name], label)
         elif ':' in name:
+            if self.judges and not all(judge(name) for judge in self.judges):
+                raise InputError('is code that only a message names: it is not run', label,
+                                 'name it in the game file, or to the node that runs it')
             source, _, attribute = name.rpartition(':')
             found = (self._from_file(Path(source), attribute, label) if source.endswith('.py')
                      else _from_module(name, label))
@@ -134,6 +158,12 @@ def _from_module(target: str, label: str) -> Any:
             # The packages behind two planners import it; it has no wheels.
             raise InputError('needs the package polygon3, which did not compile', label,
                              'apt install gcc python3-dev, then delete .venv') from error
+        package = isinstance(error, ImportError) and PACKAGES.get((error.name or '').split('.')[0])
+        if package:
+            pins = share_directory() / 'requirements.txt'
+            raise InputError(f'needs the package {package}, which pip leaves out on Python 3.12',
+                             label, 'pip install --no-deps --ignore-requires-python -r '
+                             f'{pins}') from error
         raise InputError(f'cannot import {module_name} ({type(error).__name__}: {error})',
                          label, 'check the name and what it imports') from error
     return _attribute(module, attribute, label)
@@ -188,7 +218,7 @@ def _checked(value: Any, hint: Any, key: str, where: str, allowed: str) -> Any:
         if isinstance(plain, type) and plain is not types.NoneType and isinstance(value, plain):
             return value
     wanted = ' or '.join(_name(choice) for choice in choices)
-    raise InputError(f'"{key}" is {value!r}', where,
+    raise InputError(f'"{key}" is {short(value)}', where,
                      f'give {wanted}; allowed options are: {allowed}')
 
 

@@ -5,7 +5,9 @@
 # The environment of every command: `source scripts/env.sh` from bash, as run.sh and test.sh do.
 #
 # The first call makes .venv from requirements.txt; later calls only set variables. Where a ROS 2
-# Jazzy installation is sourced it is used; elsewhere ROS comes into .venv as wheels.
+# Jazzy installation is sourced it is used; elsewhere ROS comes into .venv as wheels. A terminal with
+# another Python or ROS gets an environment of its own beside it, .venv-<python>-<ros>; one that a
+# process uses is never changed.
 #
 #   PYTHON=python3.12      the interpreter to make .venv with (3.11 or 3.12). Without it an existing
 #                          .venv stays as it is and a new one takes the first of python3,
@@ -105,6 +107,35 @@ _crgame_watch() {
     wait "$1"
 }
 
+# Whether an environment is that of this Python and ROS: complete, or in the making.
+_crgame_fits() {
+    local key
+    [[ -r $1/key ]] || return 1
+    read -r key <"$1/key"
+    [[ $key == "$version $ros" ]]
+}
+
+# Whether a process has loaded libraries of an environment.
+_crgame_in_use() {
+    grep -qsF " $1/" /proc/[0-9]*/maps
+}
+
+# Set venv to where the environment of this Python and ROS is, or is to be made.
+_crgame_place() {
+    local tag=${ros##*/}
+    venv=$root/.venv
+    # One that was made before there were others has no key.
+    if [[ -r $venv/stamp && ! -e $venv/key ]]; then
+        sed -n '4,5p' "$venv/stamp" | paste -sd ' ' >"$venv/key" 2>/dev/null || true
+    fi
+    if [[ -e $venv/key ]] && ! _crgame_fits "$venv"; then
+        venv=$root/.venv-$version-$tag
+    fi
+    if [[ -r $venv/stamp ]] && ! _crgame_same && _crgame_in_use "$venv"; then
+        venv=$root/.venv-$version-$tag-${wanted:0:8}
+    fi
+}
+
 # Every step that fills .venv; its output is the log.
 _crgame_fill() {
     local pip=("$venv/bin/python" -m pip --disable-pip-version-check --no-input install --no-deps
@@ -115,7 +146,7 @@ _crgame_fill() {
     local site=()
     [[ $ros == wheels ]] || site=(--system-site-packages)
     "$python" -m venv "${site[@]}" "$venv" &&
-        # First, because the two source distributions are built with it.
+        # First, because the source distributions are built with it.
         "${pip[@]}" "$(grep '^setuptools==' "$root/requirements.txt")" &&
         "${pip[@]}" -r "$venv/requirements.txt" || return 1
     # The one package that compiles: without it the rest works.
@@ -156,10 +187,13 @@ _crgame_make() {
         _crgame_stamp
         return
     fi
-    _crgame_say "making .venv with Python $version, ROS 2 Jazzy from $ros;" \
+    # Another terminal has made one of its own here meanwhile.
+    [[ ! -e $venv/key ]] || _crgame_fits "$venv" || return 3
+    _crgame_say "making ${venv##*/} with Python $version, ROS 2 Jazzy from $ros;" \
         'this happens once and takes about two minutes'
     find "$venv" -mindepth 1 -maxdepth 1 ! -name .lock ! -name COLCON_IGNORE -exec rm -rf {} + ||
         return 1
+    printf '%s\n' "$version $ros" >"$venv/key"
     grep -vE "^(polygon3==|setuptools==|$skip)" "$root/requirements.txt" \
         >"$venv/requirements.txt"
     # Ctrl-C does not reach a background job: a group of its own lets us end it with its children.
@@ -233,13 +267,22 @@ _crgame_export_network() {
 }
 
 _crgame_main() {
-    local root venv wanted python version ros
+    local root venv wanted python version ros made
     root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P) || return 1
-    venv=$root/.venv
     wanted=$(sha256sum <"$root/requirements.txt") || return 1
-    if ! _crgame_ready; then
+    for venv in "$root"/.venv "$root"/.venv-*; do
+        ! _crgame_ready || break
+        venv=''
+    done
+    if [[ -z $venv ]]; then
         _crgame_choose || return
-        (_crgame_make) || return
+        made=3
+        while ((made == 3)); do
+            _crgame_place
+            made=0
+            (_crgame_make) || made=$?
+        done
+        ((made == 0)) || return "$made"
     fi
     if [[ $ros == wheels ]]; then
         _crgame_export_wheels

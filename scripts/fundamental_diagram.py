@@ -1,22 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Speed, flow and density of traffic on circular roads, measured by virtual detectors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.traffic.spawning import Adopted
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 from numpy.typing import NDArray
 from scenario_traffic import loaded, rings
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.spawning import Adopted
-from crgame_ros.traffic.spec import TrafficSpec
-from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
 
 FloatArray = NDArray[np.float64]
 

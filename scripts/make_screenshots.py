@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Make the pictures of the cockpit for the documentation: real runs, seen in a real browser.
 
@@ -21,9 +33,8 @@ import time
 from typing import NamedTuple
 
 from cockpit_person import Browser, open_browser, Person
-from PIL import Image, ImageOps
-
 from crgame_ros.paths import scenarios_directory, share_directory
+from PIL import Image, ImageOps
 
 FOLDER = share_directory() / 'docs' / 'images'
 START_LIMIT_S, END_LIMIT_S = 60.0, 30.0

@@ -1,10 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Make the pictures of traffic: the fundamental diagram, and space and time at a merge."""
 
 import argparse
 from pathlib import Path
 
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.paths import scenarios_directory, share_directory
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world_view import WorldView
 from fundamental_diagram import equilibrium_density, Flow, measure
 import matplotlib
 from matplotlib.axes import Axes
@@ -12,13 +30,6 @@ from matplotlib.collections import LineCollection
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.paths import scenarios_directory, share_directory
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.spec import TrafficSpec
-from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
 
 CIRCUMFERENCE, LIMIT = 1000.0, 100.0 / 3.6
 COUNTS = (3, 6, 9, 12, 15, 18, 20, 22, 25, 30, 35, 40, 50, 60, 70, 80, 90, 100, 110, 120, 130)

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The parts of a CommonRoad scenario and a builder of lanelet networks."""
 
 from collections.abc import Sequence
@@ -28,7 +40,7 @@ class Lanelet:
     :param stop_line: its marking and the ids of the signs that it belongs to.
     """
 
-    id: int
+    id: int  # noqa: A003
     left: NDArray[np.float64]
     right: NDArray[np.float64]
     markings: tuple[str, str]
@@ -62,7 +74,7 @@ class Lanelet:
 class Sign:
     """A traffic sign: its number in the German catalogue, which Zamunda shares, and where."""
 
-    id: int
+    id: int  # noqa: A003
     number: str
     position: tuple[float, float]
     value: str = ''
@@ -72,7 +84,7 @@ class Sign:
 class Incoming:
     """One incoming road of an intersection; successors by turn: right, straight, left."""
 
-    id: int
+    id: int  # noqa: A003
     lanelets: tuple[int, ...]
     successors: dict[str, tuple[int, ...]]
     left_of: int | None = None
@@ -82,7 +94,7 @@ class Incoming:
 class Intersection:
     """An intersection and its incoming roads."""
 
-    id: int
+    id: int  # noqa: A003
     incomings: tuple[Incoming, ...]
 
 
@@ -96,8 +108,8 @@ class Obstacle:
         one row for a static obstacle.
     """
 
-    id: int
-    type: str
+    id: int  # noqa: A003
+    type: str  # noqa: A003
     size: tuple[float, ...]
     states: NDArray[np.float64]
 
@@ -111,7 +123,7 @@ class Obstacle:
 class Problem:
     """A planning problem: initial centre pose, speed [m/s] and goal lanelets, goal times [s]."""
 
-    id: int
+    id: int  # noqa: A003
     pose: Pose
     speed: float
     goal: tuple[int, ...]

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Roads of any size to measure traffic on: a motorway, a town, circular roads."""
 
 from collections.abc import Sequence
@@ -8,13 +20,12 @@ import math
 from pathlib import Path
 import tempfile
 
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 import numpy as np
 from scenario_curves import arc, clothoids
 from scenario_junctions import Arm, junction
 from scenario_maps import carriageway, Incoming, KMH, Lanelet, RoadMap, ScenarioFile, SIGN_ID
 from scenario_xml import write
-
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 
 LANE_WIDTH = 3.75
 STREET_WIDTH = 3.5

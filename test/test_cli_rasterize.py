@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """`crgame rasterize`: what it makes, what it says, and what it does not overwrite."""
 
 from pathlib import Path
@@ -8,11 +20,10 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
-import pytest
-
 from crgame_ros.cli import main
-from crgame_ros.scenario import occupancy_command
-from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy import occupancy_command
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+import pytest
 
 
 @pytest.fixture
@@ -122,6 +133,6 @@ def test_long_work_is_reported(scenario: Path, tmp_path: Path, monkeypatch: pyte
 
 def test_other_commands_do_not_wait_for_it() -> None:
     """Naming the arguments imports none of the libraries that drawing needs."""
-    code = ("import sys; from crgame_ros.cli import _build_parser; _build_parser(); "
+    code = ('import sys; from crgame_ros.cli import _build_parser; _build_parser(); '
             "sys.exit(any(name in sys.modules for name in ('shapely', 'commonroad', 'numpy')))")
     assert subprocess.run([sys.executable, '-c', code], check=False).returncode == 0

@@ -1,16 +1,27 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """`crgame roads`: what it makes, what it says, and what it does not overwrite."""
 
 from pathlib import Path
 import subprocess
 import sys
 
-import pytest
-
 from crgame_ros.cli import main
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.waypoint_roads import LaneLinks, WaypointRoads
+from crgame_ros.waypoints.waypoint_roads import LaneLinks, WaypointRoads
+import pytest
 
 TABLE = """\
 lane,x,y,width,speed_limit,successors
@@ -188,7 +199,7 @@ def test_places_that_cannot_be_written(folder: str, table: Path,
 
 def test_other_commands_do_not_wait_for_it() -> None:
     """Naming the arguments imports none of the libraries that the work needs."""
-    code = ("import sys; from crgame_ros.cli import _build_parser; _build_parser(); "
+    code = ('import sys; from crgame_ros.cli import _build_parser; _build_parser(); '
             "sys.exit(any(name in sys.modules for name in ('scipy', 'shapely', 'commonroad', "
             "'numpy', 'lxml')))")
     assert subprocess.run([sys.executable, '-c', code], check=False).returncode == 0

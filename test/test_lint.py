@@ -1,11 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Style, types, licence headers, sizes, and that the core needs no ROS."""
 
 import ast
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -13,7 +26,26 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / 'crgame_ros'
-HEADER = ('# Copyright 2026 The crgame_ros authors', '# SPDX-License-Identifier: Apache-2.0')
+# By its text ament_copyright knows a licence; the identifier alone it does not take.
+HEADER = """\
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+""".splitlines()
+FOLDERS = ('crgame_ros', 'test', 'launch', 'scripts', 'benchmarks', 'examples')
+# Where npm puts the tools that check the page.
+FOREIGN = ROOT / 'test' / 'page' / 'node_modules'
 MAX_FILE_LINES = 350
 MAX_FUNCTION_LINES = 60
 # These may import ROS; everything else is the core.
@@ -43,8 +75,8 @@ sys.exit(failed)
 
 def _sources() -> list[Path]:
     """List every Python file that is ours."""
-    folders = ('crgame_ros', 'test', 'launch', 'scripts', 'benchmarks', 'examples')
-    files = [file for folder in folders for file in (ROOT / folder).rglob('*.py')]
+    files = [file for folder in FOLDERS for file in (ROOT / folder).rglob('*.py')
+             if FOREIGN not in file.parents]
     return sorted([*files, ROOT / 'setup.py'])
 
 
@@ -71,23 +103,36 @@ def test_mypy() -> None:
     _run('-m', 'mypy', '--cache-dir', str(ROOT / 'build' / '.mypy_cache'))
 
 
-@pytest.mark.parametrize('linter', ['ament_flake8', 'ament_pep257'])
+@pytest.mark.parametrize('linter', ['ament_copyright', 'ament_flake8', 'ament_pep257'])
 def test_ament_linter(linter: str) -> None:
-    """Keep the rules of ROS 2 where its linters are installed; ruff has them elsewhere."""
+    """
+    Keep the rules of ROS 2 by its own linters.
+
+    Two of them are among the wheels; ament_copyright is where ROS is installed.
+    """
     if find_spec(linter) is None:
         pytest.skip(f'{linter} is not installed')
-    _run('-m', f'{linter}.main', 'crgame_ros', 'test', 'setup.py')
+    _run('-m', f'{linter}.main', *FOLDERS, 'setup.py', '--exclude', str(FOREIGN))
 
 
 def test_every_file_starts_with_the_licence_header() -> None:
-    """Copyright and licence are the first two lines, after `#!` where there is one."""
+    """Copyright and licence come first, after `#!` where there is one, as the licence has them."""
     wrong = []
     for file in _sources():
         lines = file.read_text(encoding='utf-8').splitlines()
         start = 1 if lines and lines[0].startswith('#!') else 0
-        if tuple(lines[start:start + 2]) != HEADER:
+        if lines[start:start + len(HEADER)] != HEADER:
             wrong.append(str(file.relative_to(ROOT)))
     assert not wrong
+    licence = ' '.join((ROOT / 'LICENSE').read_text(encoding='utf-8').split())
+    text = ' '.join(' '.join(line.lstrip('#') for line in HEADER[3:]).split())
+    # In its appendix, which says what to put into each file.
+    assert text in licence
+    # What ament_copyright asks of the page for contributors of a repository under this licence.
+    contributing = (ROOT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+    clause = re.search(r'5\. Submission of Contributions\..*?with Licensor regarding such '
+                       r'Contributions\.', licence)
+    assert clause is not None and clause.group() in ' '.join(contributing.split())
 
 
 def test_core_imports_no_ros() -> None:
@@ -114,7 +159,7 @@ def test_files_and_functions_are_short() -> None:
     wrong = []
     for file in sorted(PACKAGE.rglob('*.py')):
         name = str(file.relative_to(ROOT))
-        lines = len(file.read_text(encoding='utf-8').splitlines())
+        lines = len(file.read_text(encoding='utf-8').splitlines()) - len(HEADER)
         if lines > MAX_FILE_LINES:
             wrong.append(f'{name}: {lines} lines')
         for function in _functions(file):

@@ -1,11 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What is installed and where, the pins, and scripts/env.sh."""
 
 import ast
 from collections.abc import Iterator
 from configparser import ConfigParser
 from importlib import import_module
+import mmap
 import os
 from pathlib import Path
 import re
@@ -15,13 +28,12 @@ import subprocess
 import sys
 from zipfile import ZipFile
 
+from crgame_ros import __version__
+from crgame_ros.cli import _build_parser
 from lxml import etree
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 import pytest
-
-from crgame_ros import __version__
-from crgame_ros.cli import _build_parser
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'timesync_node',
@@ -58,6 +70,10 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
                    'msg_defs', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
                    'requirements.txt', 'LICENSE',
                    *(name for name in ('launch', 'scenarios') if (ROOT / name).is_dir()))
+    # As it is where the page has been checked.
+    foreign = source / 'test' / 'page' / 'node_modules' / 'somebody'
+    foreign.mkdir(parents=True)
+    (foreign / 'index.js').touch()
     target = tmp_path_factory.mktemp('wheel')
     _pip('wheel', '--no-deps', '--no-build-isolation', '--wheel-dir', str(target), str(source))
     return next(target.glob('*.whl'))
@@ -126,7 +142,7 @@ def test_only_traffic_waits_for_the_compiler() -> None:
 import sys
 from importlib import import_module
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game_file import load_game
+from crgame_ros.game.game_file import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 for name in {others}:
@@ -138,6 +154,17 @@ print('numba' in sys.modules)
 """
     done = subprocess.run([sys.executable, '-c', script], cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, 'False\n'), done.stderr
+
+
+def test_the_page_is_installed_without_what_checks_it(wheel: Path) -> None:
+    """Users get the files of the page as they are; Node and its packages are for tests."""
+    with ZipFile(wheel) as archive:
+        names = archive.namelist()
+    page = ROOT / 'crgame_ros' / 'cockpit' / 'page'
+    expected = {str(file.relative_to(ROOT)) for file in page.rglob('*') if file.is_file()}
+    assert {name for name in names if name.startswith('crgame_ros/cockpit/page/')} == expected
+    assert {Path(name).suffix for name in expected} == {'.html', '.css', '.js'}
+    assert not [name for name in names if 'node_modules' in name or name.startswith('test')]
 
 
 def test_every_entry_point_resolves(wheel: Path) -> None:
@@ -292,6 +319,47 @@ def test_env_leaves_a_foreign_venv_alone(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert 'move it away' in done.stderr
     assert (tree / '.venv' / 'precious').exists()
+
+
+def test_env_makes_another_one_beside_an_environment_of_another_python(tmp_path: Path) -> None:
+    """The first, which may be in use, stays as it is; so it does where the second one fails."""
+    tree = _stamped(tmp_path / 'tree')
+    other = tmp_path / 'python3.12'
+    # A Python that is there, and cannot make a venv after all.
+    other.write_text('#!/bin/sh\ncase "$*" in *_base_executable*) echo "$0 3.12";; '
+                     '*"-m venv"*) exit 1;; esac\n')
+    other.chmod(0o755)
+    before = (tree / '.venv' / 'stamp').read_text()
+    done = _source(tree, PYTHON=str(other))
+    assert done.returncode == 1
+    assert 'making .venv-3.12-wheels with Python 3.12' in done.stderr
+    assert (tree / '.venv' / 'stamp').read_text() == before
+    assert (tree / '.venv' / 'bin' / 'python').exists()
+    assert (tree / '.venv-3.12-wheels' / 'key').read_text() == '3.12 wheels\n'
+    # Complete, it is taken by whoever asks for that Python, and the first by whoever does not.
+    (tree / '.venv-3.12-wheels' / 'bin').mkdir()
+    (tree / '.venv-3.12-wheels' / 'bin' / 'python').symlink_to(sys.executable)
+    lines = before.splitlines()
+    (tree / '.venv-3.12-wheels' / 'stamp').write_text('\n'.join(
+        (*lines[:2], str(other), '3.12', 'wheels', str(other), 'none', '')))
+    for variables, name in (({'PYTHON': str(other)}, '.venv-3.12-wheels'), ({}, '.venv')):
+        done = _source(tree, 'echo "$CRGAME_PYTHON"', **variables)
+        assert done.stdout == f'{tree}/{name}/bin/python\n', done.stderr
+
+
+def test_env_leaves_one_that_is_in_use_as_it_is(tmp_path: Path) -> None:
+    """Its requirements have changed: the new one is made elsewhere while a process runs in it."""
+    tree = _stamped(tmp_path / 'tree')
+    library = tree / '.venv' / 'lib' / 'loaded.so'
+    library.write_bytes(bytes(4096))
+    with (tree / 'requirements.txt').open('a') as file:
+        file.write('# changed\n')
+    with library.open('rb') as file, mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ):
+        done = _source(tree, PYTHON=sys.executable, PIP_CONFIG_FILE=os.devnull,
+                       PIP_INDEX_URL='http://127.0.0.1:9/simple', PIP_NO_CACHE_DIR='1')
+        assert done.returncode == 1
+        assert library.exists() and (tree / '.venv' / 'stamp').exists()
+    assert re.search(r'making \.venv-3\.11-wheels-[0-9a-f]{8} ', done.stderr)
 
 
 def test_env_says_that_the_index_is_out_of_reach(tmp_path: Path) -> None:

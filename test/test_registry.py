@@ -1,19 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The registry behind every kind of model that a game may name."""
 
 from importlib.metadata import EntryPoint
 from pathlib import Path
 import re
-
-import pytest
+import subprocess
+import sys
 
 from crgame_ros.control.lqr import LqrTracker
 from crgame_ros.control.tracker import Tracker
 from crgame_ros.errors import InputError
 from crgame_ros.registry import ModelRegistry
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
+import pytest
 
+ROOT = Path(__file__).resolve().parents[1]
 GIVEN = {'vehicle': load_vehicle_parameters(), 'dt_s': 0.01}
 LQR = 'crgame_ros.control.lqr:LqrTracker'
 CODE = """
@@ -120,3 +134,20 @@ def test_errors_of_a_constructor_name_the_place(registry: ModelRegistry, file: s
     with pytest.raises(InputError) as caught:
         registry.create(f'{file}:Straight', {'push': 9.0}, 'avs[0].tracker', **GIVEN)
     assert str(caught.value) == 'avs[0].tracker: options of straight: "push" is 9.0; give less'
+
+
+@pytest.mark.parametrize(('planner', 'module', 'package'), [
+    ('reactive', 'commonroad_rp', 'commonroad-reactive-planner'),
+    ('reactive-package', 'commonroad_rp', 'commonroad-reactive-planner'),
+    ('idm-package', 'commonroad_idm_planner', 'commonroad-idm-planner')])
+def test_planners_without_their_package_say_how_to_get_it(
+        planner: str, module: str, package: str) -> None:
+    """On Python 3.12 pip leaves these out: one line, with the command that brings them."""
+    done = subprocess.run(
+        [sys.executable, '-c', f'import sys; sys.modules["{module}"] = None\n'
+         'from crgame_ros.cli import main\n'
+         f'sys.exit(main(["offline", "--planner", "{planner}"]))'],
+        capture_output=True, text=True, cwd=ROOT, timeout=120)
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1 and package in done.stderr
+    assert f'--ignore-requires-python -r {ROOT / "requirements.txt"}' in done.stderr

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 What runs on a machine without a compiler.
 
@@ -22,8 +34,8 @@ MONITOR = """
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 import numpy as np
 from crgame_ros.drivability.monitor import DrivabilityMonitor
-from crgame_ros.scenario.game import DrivabilitySpec
-from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.game.game import DrivabilitySpec
+from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 
 left, right = np.array([(0.0, 4.0), (100.0, 4.0)]), np.array([(0.0, 0.0), (100.0, 0.0)])
@@ -42,7 +54,7 @@ print(json.dumps([verdicts, car.width]))
 """
 RUN = """
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game_file import load_game
+from crgame_ros.game.game_file import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 

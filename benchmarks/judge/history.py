@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What was seen of a run: where everybody was at each time step, and what lights showed."""
 
 from dataclasses import dataclass
@@ -128,7 +140,7 @@ class History:
         return result
 
     def corners(self, row: int, column: int) -> FloatArray:
-        """Give the corners (n, 2) of one object at one time [m]."""
+        """Give the (n, 2) corners of one object at one time [m]."""
         x, y, yaw = self.poses[row, column]
         turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
         return np.asarray(self.outlines[column] @ turn + (x, y))
@@ -139,12 +151,6 @@ class History:
         x, y = self.poses[row, columns[0], :2].tolist()
         return Event(what, row * self.time_step_s, tuple(self.ids[i] for i in columns), (x, y),
                      float(value), note)
-
-
-def rectangle(length: float, width: float) -> FloatArray:
-    """Give the outline of a rectangle [m]."""
-    return 0.5 * np.array([(length, width), (-length, width), (-length, -width),
-                           (length, -width)])
 
 
 def wrapped(angle: FloatArray) -> FloatArray:

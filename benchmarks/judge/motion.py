@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 How agents move: in curves, beyond the road, braking, jerk.
 
@@ -8,11 +20,10 @@ steps, of agents that drive (faster than 0.5 m/s). Braking is the forward differ
 speed along the body; jerk that of the acceleration, over 0.1 s or a time step if that is longer.
 """
 
-import numpy as np
-import shapely
-
 from judge.history import Event, FloatArray, History, wrapped
 from judge.roads import JudgedRoads
+import numpy as np
+import shapely
 
 DRIVES = 0.5
 MOVES = 0.1
@@ -36,14 +47,14 @@ def lateral(history: History) -> FloatArray:
 
 
 def accelerations(history: History) -> FloatArray:
-    """Give the accelerations (T - 1, A) along the bodies; NaN where absent [m/s^2]."""
+    """Give the (T - 1, A) accelerations along the bodies; NaN where absent [m/s^2]."""
     speed = history.speed[:, :history.agents]
     same = (history.born[1:] == history.born[:-1])[:, :history.agents]
     return np.where(same, np.diff(speed, axis=0) / history.time_step_s, np.nan)
 
 
 def jerks(history: History) -> FloatArray:
-    """Give the jerks (T - 1 - n, A); NaN where absent [m/s^3]."""
+    """Give the (T - 1 - n, A) jerks; NaN where absent [m/s^3]."""
     stride = max(1, round(0.1 / history.time_step_s))
     a = accelerations(history)
     same = (history.born[stride:-1] == history.born[:-1 - stride])[:, :history.agents]

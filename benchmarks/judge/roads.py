@@ -1,15 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The lanes of a CommonRoad file as an outsider sees them."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LaneletType
+from judge.history import FloatArray, IntArray, wrapped
 import numpy as np
 import shapely
-
-from judge.history import FloatArray, IntArray, wrapped
 
 # A car on these is off the road; on the others (shoulder, cycle lane…) it is not.
 NO_ROAD = {LaneletType.SIDEWALK, LaneletType.CROSSWALK, LaneletType.BORDER,

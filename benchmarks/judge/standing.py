@@ -1,23 +1,38 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Who stands for long, and whether anything explains it.
 
 Once a second: whoever has not got away by 3 m from a place stands there. A stand is explained at
 that moment by a light that is not green within 25 m ahead, by a human nearby (on foot, or
-driving), or by a queue: what stands right ahead is explained itself, or has not stood for long
-itself. The first of a queue counts for all of it; a circle of waiting explains nobody. Behind
-something that is no agent and stands, one is `blocked`, which is told apart.
+driving), or by a queue: what stands right ahead, or leaves no room behind the junction ahead, is
+explained itself, or has not stood for long itself. The first of a queue counts for all of it; a
+circle of waiting explains nobody. Behind something that is no agent and stands, one is `blocked`,
+which is told apart.
 """
-
-import numpy as np
 
 from judge.history import BoolArray, Event, FloatArray, History, IntArray
 from judge.lights import Stop, stops
 from judge.roads import JudgedRoads
+from judge.spillback import Spillback
+import numpy as np
 
 LONG_S = 90.0
 AWAY = 3.0
+# Who has stood unexplained for so long: is there room behind the junction?
+ASKED_S = 30.0
 LIGHT_AHEAD = 25.0
 QUEUE_GAP = 12.0
 QUEUE_ASIDE = 0.5
@@ -48,7 +63,7 @@ def stands(history: History, roads: JudgedRoads) -> list[Event]:
             counter[moved] = 0.0
         stood[~moved] += tick_s
         waiting = np.flatnonzero(history.present[row, :count] & (stood > 0.0))
-        reasons = _reasons(history, lines, row, waiting, unexplained)
+        reasons = _reasons(history, roads, lines, row, waiting, unexplained)
         for agent, (reason, ahead) in reasons.items():
             unexplained[agent] = 0.0 if reason == EXPLAINED else (
                 unexplained[agent] + (tick_s if reason == FREE else 0.0))
@@ -62,12 +77,17 @@ def stands(history: History, roads: JudgedRoads) -> list[Event]:
             for (what, agent, _, _), (row, seconds, ahead) in worst.items()]
 
 
-def _reasons(history: History, lines: list[Stop], row: int, waiting: IntArray,
-             unexplained: FloatArray) -> dict[int, tuple[str, str]]:
+def _reasons(history: History, roads: JudgedRoads, lines: list[Stop], row: int,
+             waiting: IntArray, unexplained: FloatArray) -> dict[int, tuple[str, str]]:
     """Give the state of everybody who stands at a time, and who is ahead."""
     ahead = dict(zip(waiting.tolist(), _ahead(history, row, waiting).tolist(), strict=True))
     lit = dict(zip(waiting.tolist(), (_at_light(history, lines, row, waiting) | _human(
         history, row, waiting)).tolist(), strict=True))
+    first = [i for i in waiting.tolist()
+             if ahead[i] < 0 and not lit[i] and unexplained[i] > ASKED_S]
+    if first:
+        behind = Spillback(history, roads, row, _stand(history, row))
+        ahead.update((i, behind.before(i)) for i in first)
     result = {}
     for agent in waiting.tolist():
         path = [agent]
@@ -95,10 +115,14 @@ def _reasons(history: History, lines: list[Stop], row: int, waiting: IntArray,
     return result
 
 
+def _stand(history: History, row: int) -> IntArray:
+    """List who stands at a time."""
+    return np.flatnonzero(history.present[row] & (np.abs(history.speed[row]) < SLOW))
+
+
 def _ahead(history: History, row: int, agents: IntArray) -> IntArray:
     """Find who stands right ahead of agents (A), or -1."""
-    poses, here = history.poses[row], np.flatnonzero(
-        history.present[row] & (np.abs(history.speed[row]) < SLOW))
+    poses, here = history.poses[row], _stand(history, row)
     along, aside = _seen(poses[agents], poses[here])
     turn = poses[here, 2] - poses[agents, 2, None]
     cos, sin = np.abs(np.cos(turn)), np.abs(np.sin(turn))

@@ -1,11 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """All that an outsider finds in a run."""
 
 from collections import Counter
 from dataclasses import dataclass
-
-import numpy as np
 
 from judge.braking import hard_brakings
 from judge.changes import changes, lanes_of
@@ -15,6 +25,7 @@ from judge.motion import accelerations, HARD, jerks, jumps, lateral, MOVES, off_
 from judge.overlaps import overlaps
 from judge.roads import JudgedRoads
 from judge.standing import stands
+import numpy as np
 
 # What must not happen at all.
 FORBIDDEN = ('overlap', 'red', 'off road', 'unexplained', 'jump', 'vanished')

@@ -1,19 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Pictures of a run: snapshots from above and profiles over time (as CRG figures 8 and 9)."""
 
 from collections.abc import Sequence
 import math
 
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.roads.road_surface import lanelet_ring
+from crgame_ros.simulation.offline import OfflineResult
+from crgame_ros.vehicle.state import StateColumn
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.simulation.offline import OfflineResult
-from crgame_ros.vehicle.state import StateColumn
 
 Array = NDArray[np.float64]
 # Okabe and Ito's palette, told apart by the colour-blind: humans vermilion, AVs blue.
@@ -73,7 +87,7 @@ def _snapshot(axes: Axes, result: OfflineResult, time_s: float,
     setup = result.setup
     n, states, view = _at(result, time_s)
     for lanelet in setup.loaded.scenario.lanelet_network.lanelets:
-        axes.add_patch(Polygon(view.of(lanelet.polygon.vertices), facecolor=ROAD_COLOUR,
+        axes.add_patch(Polygon(view.of(lanelet_ring(lanelet)), facecolor=ROAD_COLOUR,
                                edgecolor='white', linewidth=0.8))
     tick = n // setup.scheduler.steps_per_tick
     for description, pose in zip(setup.obstacles.descriptions, result.object_poses[tick],
@@ -81,9 +95,7 @@ def _snapshot(axes: Axes, result: OfflineResult, time_s: float,
         if math.isfinite(pose[0]):
             _footprint(axes, view, description, pose, OBJECT_COLOUR)
     for description, state in zip(setup.vehicle_descriptions, states, strict=True):
-        x, y, yaw = state[:3]
-        offset = description.rear_to_center
-        center = np.array((x + offset * math.cos(yaw), y + offset * math.sin(yaw), yaw))
+        center = shifted(state[:3], description.rear_to_center)
         _footprint(axes, view, description, center, colour_of(description.id))
     axes.set_xlim(*window)
     half_height = 0.065 * (window[1] - window[0])
@@ -110,16 +122,8 @@ class _View:
 
 def _footprint(axes: Axes, view: _View, description: ObjectDescription, center: Array,
                colour: str) -> None:
-    shape = description.shape
-    if shape.kind == 'polygon':
-        corners = np.array(shape.vertices)
-    else:
-        half_length, half_width = 0.5 * shape.length, 0.5 * shape.width
-        corners = np.array(((half_length, half_width), (half_length, -half_width),
-                            (-half_length, -half_width), (-half_length, half_width)))
-    cos, sin = math.cos(center[2]), math.sin(center[2])
-    turned = corners @ np.array(((cos, sin), (-sin, cos))) + center[:2]
-    axes.add_patch(Polygon(view.of(turned), facecolor=colour, edgecolor='black', linewidth=0.6,
+    corners = placed(outline(description.shape), center)
+    axes.add_patch(Polygon(view.of(corners), facecolor=colour, edgecolor='black', linewidth=0.6,
                            zorder=3))
 
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What stands behind the page: a live run or a recording."""
 
 from collections.abc import Mapping
@@ -34,8 +46,10 @@ class Backend(Protocol):
 
     async def command(self, client: 'Client', message: Mapping[str, Any]) -> str:
         """
-        Do what a client asks. An `input` is awaited before the client's next message is read and
-        must not wait for anything; all others are awaited one after the other for each client.
+        Do what a client asks.
+
+        An `input` is awaited before the client's next message is read and must not wait for
+        anything; all others are awaited one after the other for each client.
 
         :param client: who asks.
         :param message: a checked message as `messages.parse_message` gives it.
@@ -59,7 +73,7 @@ class Backend(Protocol):
         """
 
 
-class ReplayBackend(Backend, Protocol):
+class ReplayControls(Backend, Protocol):
     """A recording behind the page: it answers requests of its own."""
 
     def routes(self) -> list[web.RouteDef]:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The scenarios and games that the page offers: folders of this machine, and uploads."""
 
 import asyncio
@@ -13,14 +25,12 @@ import re
 import secrets
 from typing import Any, Literal
 
-import yaml
-
-from crgame_ros.cockpit.messages import clean_text
+from crgame_ros.cockpit.page_messages import clean_text
 from crgame_ros.cockpit.scenario_reader import ScenarioReader
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.planner.registry import planner_names
+from crgame_ros.planner.planner_registry import planner_names
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.game_file import read_yaml
+from crgame_ros.yaml_text import read_yaml
 
 DRIVERS = ('auto', 'cockpit', 'idle')
 UPLOADS = 'Uploads'
@@ -45,7 +55,7 @@ class Entry:
     :param path: never shown.
     """
 
-    id: str
+    id: str  # noqa: A003
     kind: Literal['game', 'scenario', 'upload']
     name: str
     title: str
@@ -62,7 +72,7 @@ class Choice:
     :param planners: by AV.
     """
 
-    id: str
+    id: str  # noqa: A003
     drivers: Mapping[str, str]
     planners: Mapping[str, str]
 
@@ -222,7 +232,7 @@ def _game_title(path: Path) -> str:
     """Give the title of a game file, empty if the file is no game."""
     try:
         values = read_yaml(path, 'game file')
-    except (InputError, yaml.YAMLError):
+    except InputError:
         return ''
     if not isinstance(values, dict) or not isinstance(values.get('scenario'), str):
         return ''

@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What AVs perceive and the map of permanent obstacles as frames, live and from recordings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 import math
 from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.cockpit import frames
 from crgame_ros.cockpit.sensor_mounts import SensorMounts
 from crgame_ros.errors import InputError
+import numpy as np
+from numpy.typing import NDArray
 
 # As many as a sensor of a game can have.
 MAX_RAYS = 10_000
@@ -89,23 +100,6 @@ def estimate_frame(place: Place, column: int, message: Any) -> bytes:
     if not np.isfinite(row).all():
         raise InputError('holds numbers that are not finite', 'localization')
     return frames.encode_estimate(*place, column, row)
-
-
-def seen_columns(names: Sequence[str], positions: Sequence[float],
-                 columns: Mapping[str, int]) -> list[int]:
-    """
-    Give the columns of everybody in point 0 of a plan request.
-
-    :param names: of its joints, `<id>/x` …
-    :param positions: of point 0; NaN is nobody's.
-    :param columns: of everything that can appear, by id.
-    :raises InputError: if there are not as many positions as joints.
-    """
-    if len(positions) != len(names):
-        raise InputError(f'has {len(positions)} positions for {len(names)} joints',
-                         'plan request')
-    return sorted(columns[name[:-2]] for name, value in zip(names, positions, strict=True)
-                  if name.endswith('/x') and name[:-2] in columns and math.isfinite(value))
 
 
 def occupancy_frame(place: Place, message: Any) -> bytes:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Reading scenarios for the page, in a process of its own.
 
@@ -24,12 +36,13 @@ from typing import Any, BinaryIO
 
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.planner.registry import create_planner
+from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.game.game_file import dump_game, load_game
+from crgame_ros.planner.planner_registry import create_planner
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
-from crgame_ros.scenario.game_file import dump_game, load_game
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
-from crgame_ros.simulation.documents import game_document, parse_game_document
+from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup, Setup
 
 HEADER = struct.Struct('<?Q')

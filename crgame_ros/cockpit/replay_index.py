@@ -1,29 +1,53 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where in a recording the messages of one run are, by simulation step: the index of a replay."""
 
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from crgame_ros.cockpit.replay_outline import Outline
+from crgame_ros.cockpit.replay_tracks import RunTracks, TrackCollector
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import GameDocument
+from crgame_ros.messages.cdr import header_stamp_ns
+from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
+from crgame_ros.recording.epochs import Epoch
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_cycles import CYCLE_TOPIC
+from crgame_ros.recording.run_points import TRAJECTORY
+from crgame_ros.recording.storage import BagMessage
+from crgame_ros.timing.cycle_rows import CycleTable
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.cockpit.replay_outline import Outline
-from crgame_ros.cockpit.replay_perception import OCCUPANCY_TOPIC, perception_topics
-from crgame_ros.cockpit.replay_tracks import RunTracks, TrackCollector
-from crgame_ros.errors import InputError
-from crgame_ros.recording.epochs import Epoch
-from crgame_ros.recording.reader import BagReader, header_stamp_ns
-from crgame_ros.recording.run_log import CYCLE_TOPIC, OBJECT_STATES_TOPIC, VEHICLES_TOPIC
-from crgame_ros.recording.storage import BagMessage
-from crgame_ros.timing.cycle_rows import CycleTable
-
-_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+OCCUPANCY_TOPIC = '/occupancy'
 # Between two reports of progress, so that reporting costs nothing.
 _REPORT_EVERY = 500
 
 IntArray = NDArray[np.int64]
+
+
+def perception_topics(game: GameDocument) -> dict[str, str]:
+    """Give the topics of perception by name, with their types, and the map's."""
+    topics = {OCCUPANCY_TOPIC: 'nav_msgs/msg/OccupancyGrid'}
+    for av in game.avs:
+        if av.perception is not None:
+            topics[f'/{av.id}/localization'] = 'nav_msgs/msg/Odometry'
+            topics[f'/{av.id}/scan'] = 'sensor_msgs/msg/LaserScan'
+    return topics
 
 
 class Places:
@@ -106,12 +130,16 @@ def index_run(reader: BagReader, run: Epoch,
     Go through a recording once, without keeping its states.
 
     :param progress: told now and then which share is done, 0 to 1.
-    :raises InputError: if no state of the run is in it, or a message is malformed.
+    :raises InputError: if no state of the run is in it.
     """
     indexer = _Indexer(reader, run)
     span_ns = max(reader.end_ns - reader.start_ns, 1)
     for count, message in enumerate(reader.messages(indexer.topics)):
-        indexer.take(message)
+        try:
+            indexer.take(message)
+        except InputError:
+            # Whatever somebody else sent costs that message, not the replay.
+            reader.foreign[message.topic] += 1
         if progress is not None and count % _REPORT_EVERY == 0:
             progress((message.log_time_ns - reader.start_ns) / span_ns)
     return indexer.finish()
@@ -123,7 +151,7 @@ class _Indexer:
     def __init__(self, reader: BagReader, run: Epoch) -> None:
         self._reader = reader
         self._run = run
-        avs = [str(entry['id']) for entry in run.game.avs]
+        avs = [av.id for av in run.game.avs]
         perceived = perception_topics(run.game)
         self._stamped = {OBJECT_STATES_TOPIC, *(f'/{av}/plan_request' for av in avs), *perceived}
         self._plans = {f'/{av}/plan' for av in avs}
@@ -144,9 +172,8 @@ class _Indexer:
             if not self._after:
                 self._collector.take(self._reader.decode(message),
                                      self._states.newest if self._inside else None)
-        elif type_name != self._types.get(topic, _TRAJECTORY):
-            raise InputError(f'{topic} is a {type_name}', str(self._reader.path),
-                             'give a recording of crgame_ros')
+        elif type_name != self._types.get(topic, TRAJECTORY):
+            self._reader.foreign[topic] += 1
         elif topic == OCCUPANCY_TOPIC:
             # Its stamp is none of simulation time: it is seen from when it came.
             from_ns = self._run.from_log_ns
@@ -168,7 +195,7 @@ class _Indexer:
             if n > places.newest:
                 places.add(log_ns, n)
                 if self._outline.wants(n):
-                    self._outline.add_state(n, self._reader.decode(message).message, self._reader)
+                    self._outline.add_state(n, self._reader.decode(message).message)
         elif topic in self._plans:
             # A plan is seen from the step at which it arrived.
             places.add(log_ns, max(n, self._states.newest))

@@ -1,22 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The motion of all vehicles over a whole recorded run, thinned out for plots."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 import math
 import struct
 from typing import Any
 
+from crgame_ros.cockpit import frames
+from crgame_ros.cockpit.message_frames import state_rows
+from crgame_ros.messages.world_messages import WorldMessages
+from crgame_ros.recording.epochs import Epoch
+from crgame_ros.timing.cycle_rows import CycleTable
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.cockpit import frames
-from crgame_ros.planner.joints import vehicle_joint_names, vehicles_from_joints
-from crgame_ros.recording.epochs import Epoch
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import first_point, VEHICLES_TOPIC
-from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CycleTable
-from crgame_ros.vehicle.state import STATE_WIDTH
 
 # As the page keeps them of a live run: 0.05 s apart, and further where the recording is long.
 SPACING_S = 0.05
@@ -40,25 +49,27 @@ class Outline:
         dt_s = run.game.scheduler.dt_s
         self.stride = max(1, round(SPACING_S / dt_s),
                           math.ceil(duration_s / dt_s / MOST_SAMPLES))
-        self._vehicles = [item.id for item in run.descriptions if item.role.is_ego]
-        self._names = [name for item in self._vehicles for name in vehicle_joint_names(item)]
-        self._orders: dict[tuple[str, ...], list[int]] = {}
-        self._points: dict[int, FloatArray] = {}
+        self._world = WorldMessages(run.descriptions)
+        self._states: dict[int, FloatArray] = {}
         self._commands: dict[int, FloatArray] = {}
 
     def wants(self, n: int) -> bool:
         """Tell whether the state of a step is a sample."""
         return n % self.stride == 0
 
-    def add_state(self, n: int, content: Any, reader: BagReader) -> None:
-        """Add a decoded message of `/vehicles/state`."""
-        self._points[n] = first_point(content, self._names, VEHICLES_TOPIC, reader, self._orders)
+    def add_state(self, n: int, content: Any) -> None:
+        """
+        Add a decoded message of `/vehicles/state`.
+
+        :raises InputError: if it is another run's.
+        """
+        self._states[n] = self._world.vehicle_states(content)
 
     def add_commands(self, table: CycleTable) -> None:
         """Add what was consumed in some cycles."""
         steps = table.column('n').astype(int)
         if (steps % self.stride == 0).any():
-            for n, commands in zip(steps.tolist(), commands_of(table, self._vehicles),
+            for n, commands in zip(steps.tolist(), table.commands_of(self._world.vehicles),
                                    strict=True):
                 if self.wants(n):
                     self._commands[n] = commands
@@ -68,32 +79,7 @@ class Outline:
         game = self._run.game
         return pack(frames.encode_state(
             game.epoch, n, game.scheduler.k(n), n * game.scheduler.dt_s,
-            state_rows(point, self._commands.get(n))) for n, point in self._points.items())
-
-
-def commands_of(table: CycleTable, vehicles: Sequence[str]) -> FloatArray:
-    """Give (R, V, 4) throttle, brake, steering, reverse consumed; NaN where there was none."""
-    values = np.full((len(table.rows), len(vehicles), len(COMMAND_COLUMNS)), np.nan)
-    for place, vehicle in enumerate(vehicles):
-        if f'{vehicle}/{COMMAND_COLUMNS[0]}' in table.columns:
-            values[:, place] = table.commands(vehicle)
-    return values
-
-
-def state_rows(point: FloatArray, commands: FloatArray | None) -> FloatArray:
-    """
-    Give the rows of a STATE frame.
-
-    :param point: (3, 4 V) joint positions, velocities, accelerations.
-    :param commands: (V, 4), None where no cycle tells them.
-    :return: (V, 12)
-    """
-    joints = point.reshape(3, -1, 4)
-    rows = np.full((joints.shape[1], frames.STATE_COLUMNS), np.nan)
-    rows[:, :STATE_WIDTH] = vehicles_from_joints(joints[0], joints[1], joints[2])
-    if commands is not None:
-        rows[:, STATE_WIDTH:] = commands
-    return rows
+            state_rows(states, self._commands.get(n))) for n, states in self._states.items())
 
 
 def pack(frames_in_order: Iterable[bytes]) -> bytes:

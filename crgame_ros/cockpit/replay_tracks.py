@@ -1,20 +1,39 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What happened in a recorded run over time: documents, alarms and marks for the time line."""
 
+from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass
-import json
+from dataclasses import asdict, dataclass
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.cockpit.replay_marks import Mark, MarkList
 from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import (
+    GameDocument,
+    parse_events_document,
+    parse_seats_document,
+    parse_signals_document,
+)
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.messages.cdr import stamp_of
+from crgame_ros.messages.status_values import read_status, Status
 from crgame_ros.recording.reader import DecodedMessage
-from crgame_ros.recording.run_log import stamp_of
-from crgame_ros.simulation.documents import GameDocument, MALFORMED
+import numpy as np
+from numpy.typing import NDArray
 
 _DIAGNOSTICS = '/diagnostics'
 _LATCHED = {'/scenario/signals': 'signals', '/scenario/events': 'events', '/seats': 'seats'}
@@ -46,8 +65,8 @@ class TrackCollector:
     def __init__(self, game: GameDocument) -> None:
         self._game = game
         self._scheduler = game.scheduler
-        vehicles = [str(entry['id']) for entry in (*game.humans, *game.avs)]
-        self._planners = {str(entry['id']): str(entry['planner']) for entry in game.avs}
+        vehicles = [item.id for item in game.vehicles]
+        self._planners = {av.id: av.planner for av in game.avs}
         self._verdict_topics = {f'/{vehicle}/drivability' for vehicle in vehicles}
         self.topics = (_DIAGNOSTICS, _FRAME_SKIP, *_LATCHED, *self._verdict_topics)
         self._status = RunStatus()
@@ -114,9 +133,8 @@ class TrackCollector:
         track.append((n, deepcopy(content)))
 
     def _take_status(self, status: Any, n: int) -> None:
-        name, text = str(status.name), str(status.message)
-        values = {str(entry.key): str(entry.value) for entry in status.values}
-        self._status.take(name, int(status.level), text, values, n * self._scheduler.dt_s)
+        taken = read_status(status)
+        self._status.take(taken, n * self._scheduler.dt_s)
         content = self._status.document()
         for av, entry in content['planners'].items():
             entry['planner'] = entry['planner'] or self._planners.get(av, '')
@@ -130,11 +148,11 @@ class TrackCollector:
         self._known_alarms = frozenset(alarm.id for alarm in alarms)
         if alarms or 'alarms' in self._tracks:
             self._put('alarms', n, self._status.alarms_document())
-        self._mark_status(name, text, values, bool(status.level), n)
+        self._mark_status(taken, n)
 
-    def _mark_status(self, name: str, text: str, values: dict[str, str], bad: bool,
-                     n: int) -> None:
+    def _mark_status(self, status: Status, n: int) -> None:
         """Mark what is told once and is no alarm."""
+        name, level, text, values = status
         node, _, subject = name.partition(': ')
         vehicle = subject.partition(' ')[0]
         if name == 'sim_node: stop':
@@ -142,34 +160,30 @@ class TrackCollector:
         elif node == 'sim_node' and subject.endswith(' plan refused'):
             at = values.get('n', '')
             self._marks.add(int(at) if at.isdecimal() else n, 'refused_plan', vehicle, text)
-        elif node == 'planner_node' and bad and vehicle in self._planners:
+        elif node == 'planner_node' and level and vehicle in self._planners:
             self._marks.add(n, 'fallback', vehicle, text)
 
     def _take_latched(self, kind: str, text: str, newest: int | None) -> None:
         try:
-            content = json.loads(text, parse_constant=_refuse)
             if kind == 'signals':
-                k = int(content['k'])
+                k, states = parse_signals_document(text)
                 n = (k - self._scheduler.k0) * self._scheduler.steps_per_tick
-                self._put(kind, max(n, 0), {'k': k, 'states': dict(content['states'])})
+                self._put(kind, max(n, 0), {'k': k, 'states': states})
             elif kind == 'seats':
-                self._put(kind, newest or 0, {'seats': dict(content)})
-            elif int(content['epoch']) == self._game.epoch:
-                self._take_fired(content['fired'], newest or 0)
-        except MALFORMED:
+                self._put(kind, newest or 0, {'seats': parse_seats_document(text)})
+            else:
+                epoch, fired = parse_events_document(text)
+                if epoch == self._game.epoch:
+                    self._take_fired(fired, newest or 0)
+        except InputError:
             # Anybody may publish on a topic; what is no such document is passed over.
             return
 
-    def _take_fired(self, fired: list[dict[str, Any]], newest: int) -> None:
-        for entry in fired:
-            key = (str(entry['name']), int(entry['n']))
+    def _take_fired(self, fired: Sequence[FiredEvent], newest: int) -> None:
+        for event in fired:
+            key = (event.name, event.n)
             if key not in self._fired:
                 self._fired.add(key)
-                self._marks.add(key[1], 'trigger', key[0], f'by {entry.get("by", "trigger")}')
-        self._put('events', max((int(entry['n']) for entry in fired), default=newest),
-                  {'fired': list(fired)})
-
-
-def _refuse(name: str) -> float:
-    """Refuse NaN and infinities: a browser reads none."""
-    raise ValueError(name)
+                self._marks.add(event.n, 'trigger', event.name, f'by {event.by}')
+        self._put('events', max((event.n for event in fired), default=newest),
+                  {'fired': [asdict(event) for event in fired]})

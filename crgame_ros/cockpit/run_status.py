@@ -1,11 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How a run is doing, gathered from what the nodes tell: the page's status and alarms."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
+
+from crgame_ros.messages.status_values import Status, status_truth
 
 OK, ERROR = 0, 2
 # Late traffic is told at each late tick, and never that it is in time again [s].
@@ -31,7 +45,7 @@ class Alarm:
     since_t: float
 
     @property
-    def id(self) -> str:
+    def id(self) -> str:  # noqa: A003
         """Key of the alarm while it lasts."""
         return f'{self.kind}:{self.subject}'
 
@@ -79,17 +93,14 @@ class RunStatus:
         """Give what is wrong now, the oldest first."""
         return tuple(self._alarms.values())
 
-    def take(self, name: str, level: int, text: str, values: Mapping[str, str],
-             t: float) -> None:
+    def take(self, status: Status, t: float) -> None:
         """
         Take a status.
 
-        :param name: node and subject, or `<v>/drivability`.
-        :param level: 0 OK, 1 WARN, 2 ERROR.
-        :param text: its message.
-        :param values: of its keys.
+        :param status: its name is node and subject, or `<v>/drivability`.
         :param t: time of the run [s]
         """
+        name, level, text, values = status
         if t > self._traffic_late_t + LATE_TRAFFIC_S:
             self._alarm('late_traffic', 'traffic', False, '', t)
         for known, rule in self._rules:
@@ -155,7 +166,7 @@ class RunStatus:
 
     def _take_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
         self.run, self.reason = text, values.get('reason', '')
-        self.stays = values.get('stays') == 'True'
+        self.stays = status_truth(values, 'stays')
         if text == 'ended':
             self._calm()
         self.awaited = [item for item in values.get('awaited', '').split(',') if item]
@@ -169,7 +180,7 @@ class RunStatus:
     def _take_timing(self, _: int, __: str, values: Mapping[str, str], t: float) -> None:
         self.timing = {key: _number(value) for key, value in values.items()
                        if key != 'frame_skipping'}
-        skipping = values.get('frame_skipping') == 'True'
+        skipping = status_truth(values, 'frame_skipping')
         self.timing['frame_skipping'] = skipping
         self._alarm('late', 'simulation', skipping, 'late: frames are skipped', t)
 
@@ -179,12 +190,12 @@ class RunStatus:
         megabytes = (_number(values.get('bytes')) or 0.0) / 1e6
         self.recording = {
             'state': 'failed' if failed else
-            'recorded' if values.get('closed') == 'True' else 'recording', 'text': text,
+            'recorded' if status_truth(values, 'closed') else 'recording', 'text': text,
             'messages': int(_number(values.get('messages')) or 0), 'megabytes': megabytes}
         self._alarm('recording', 'recorder', failed, text, t)
 
     def _take_drivability(self, vehicle: str, values: Mapping[str, str], t: float) -> None:
-        collision = values.get('collision') == 'true'
+        collision = status_truth(values, 'collision')
         off_road = values.get('road_compliance') == 'false'
         hit = [item for item in values.get('hit', '').split(',') if item]
         self._note_violations(vehicle, hit, off_road, t)
@@ -208,7 +219,7 @@ class RunStatus:
     def _take_plans(self, vehicle: str, level: int, text: str, values: Mapping[str, str],
                     t: float) -> None:
         self._planner(vehicle).update(
-            running=values.get('running', 'True') == 'True', stale=level == ERROR,
+            running=status_truth(values, 'running', True), stale=level == ERROR,
             latency_ms=_number(values.get('latency_ms')), age_ms=_number(values.get('age_ms')),
             accepted=int(_number(values.get('accepted')) or 0),
             refused=int(_number(values.get('refused')) or 0),

@@ -1,10 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The scene document: all that the page draws and lists and that stays as it is during a run."""
 
 from collections.abc import Iterable, Sequence
 import math
-from pathlib import Path
 from typing import Any
 
 from commonroad.geometry.shape import Circle, ShapeGroup
@@ -12,16 +23,18 @@ from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
 from commonroad.scenario.traffic_light import TrafficLight
+from crgame_ros.game.documents import GameDocument
+from crgame_ros.game.driven_vehicle import DrivenVehicle
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.road_surface import lanelet_areas
+from crgame_ros.roads.signs import stop_line_ends
+from crgame_ros.scenario.loading import group_outline, LoadedScenario
 import numpy as np
 from numpy.typing import NDArray
 import shapely
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.perception.spec import parse_perception
-from crgame_ros.scenario.loading import group_outline, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.simulation.documents import GameDocument
 
 Document = dict[str, Any]
 Points = NDArray[np.float64]
@@ -47,16 +60,15 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
     :return: lengths in m, angles in rad, polylines as flat lists x0, y0, x1, y1, …
     """
     network = loaded.scenario.lanelet_network
-    content = game.content
     document = {
         'id': game.scenario_sha256[:16], 'benchmark_id': loaded.benchmark_id,
-        'title': str(content.get('title') or loaded.benchmark_id),
+        'title': game.title or loaded.benchmark_id,
         'bounds': _bounds(network, game),
         'lanelets': _lanelets(network), 'gaps': _gaps(network),
         'stop_lines': _stop_lines(network), 'lights': _lights(network),
         'signs': _signs(network),
-        'vehicles': [*(_vehicle(entry, 'human') for entry in game.humans),
-                     *(_vehicle(entry, 'autonomous') for entry in game.avs)],
+        'vehicles': [*(_vehicle(human, 'human', None) for human in game.humans),
+                     *(_vehicle(av, 'autonomous', av.perception) for av in game.avs)],
         'objects': [
             {'id': item.id, 'type': item.type, 'role': item.role.value,
              'shape': _shape(item.shape)} for item in objects if not item.role.is_ego],
@@ -65,11 +77,11 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
             'epoch': game.epoch, 'dt_s': game.scheduler.dt_s,
             'dt_c_s': game.scheduler.time_step_s, 'k0': game.scheduler.k0,
             'clock_offset_s': game.scheduler.clock_offset_ns / 1e9,
-            'duration_s': content.get('duration')},
-        'drivers': {entry['id']: str(entry['driver']) for entry in game.humans},
-        'planners': {entry['id']: str(entry['planner']) for entry in game.avs},
-        'occupancy': content.get('occupancy') is not None,
-        'events': list(content.get('events', ()))}
+            'duration_s': game.duration_s},
+        'drivers': {human.id: human.driver for human in game.humans},
+        'planners': {av.id: av.planner for av in game.avs},
+        'occupancy': game.occupancy is not None,
+        'events': list(game.event_entries)}
     finite: Document = _finite(document)
     return finite
 
@@ -108,10 +120,7 @@ def _gaps(network: LaneletNetwork) -> list[list[float]]:
 
     They are for display alone: whether a vehicle is on the road is not decided with them.
     """
-    surfaces = [shapely.make_valid(shapely.Polygon(np.concatenate(
-        (lanelet.left_vertices[:, :2], lanelet.right_vertices[::-1, :2]))))
-        for lanelet in network.lanelets]
-    road = shapely.union_all(surfaces)
+    road = shapely.union_all(lanelet_areas(network.lanelets))
     holes = [shapely.Polygon(ring) for part in getattr(road, 'geoms', [road])
              if part.geom_type == 'Polygon' for ring in part.interiors]
     return [_flat(np.asarray(hole.exterior.coords)[:-1, :2]) for hole in holes
@@ -121,14 +130,9 @@ def _gaps(network: LaneletNetwork) -> list[list[float]]:
 def _stop_lines(network: LaneletNetwork) -> list[Document]:
     lines = []
     for lanelet in network.lanelets:
-        line = lanelet.stop_line
-        if line is None:
-            continue
-        # A stop line without points lies across the end of its lanelet.
-        start = lanelet.left_vertices[-1] if line.start is None else line.start
-        end = lanelet.right_vertices[-1] if line.end is None else line.end
-        lines.append({'points': _flat(np.array([start[:2], end[:2]])),
-                      'lanelet': int(lanelet.lanelet_id)})
+        if lanelet.stop_line is not None:
+            lines.append({'points': _flat(stop_line_ends(lanelet)),
+                          'lanelet': int(lanelet.lanelet_id)})
     return lines
 
 
@@ -165,19 +169,16 @@ def _signs(network: LaneletNetwork) -> list[Document]:
         for element in sign.traffic_sign_elements]
 
 
-def _vehicle(entry: Document, role: str) -> Document:
-    vehicle = entry['vehicle']
-    perception = entry.get('perception')
-    return {'id': str(entry['id']), 'role': role,
-            'shape': _shape(Shape.rectangle(vehicle['length'], vehicle['width'])),
-            'rear_to_center': vehicle['rear_to_center'], 'wheelbase': vehicle['wheelbase'],
-            'max_steering_angle': vehicle['max_steering_angle'],
+def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) -> Document:
+    vehicle = item.vehicle
+    return {'id': item.id, 'role': role, 'shape': _shape(vehicle.shape),
+            'rear_to_center': vehicle.rear_to_center, 'wheelbase': vehicle.wheelbase,
+            'max_steering_angle': vehicle.max_steering_angle,
             'perception': None if perception is None else _perception(perception)}
 
 
-def _perception(values: Document) -> Document:
+def _perception(spec: PerceptionSpec) -> Document:
     """Name the sensors of an AV, and say how far the farthest reaches [m]; null sees all."""
-    spec = parse_perception(values, '/scenario/game: perception', Path())
     return {'localisation': spec.localisation is not None,
             'sensors': [sensor.name for sensor in spec.sensors],
             'range': max((sensor.horizon for sensor in spec.sensors), default=None)}
@@ -191,11 +192,11 @@ def _shape(shape: Shape) -> Document:
 def _goals(loaded: LoadedScenario, game: GameDocument) -> list[Document]:
     problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
     goals = []
-    for entry in game.avs:
-        problem = problems.get(entry['planning_problem'])
+    for av in game.avs:
+        problem = problems.get(av.planning_problem)
         polygons = [] if problem is None else _goal_polygons(problem)
         if polygons:
-            goals.append({'av': str(entry['id']), 'polygons': polygons})
+            goals.append({'av': av.id, 'polygons': polygons})
     return goals
 
 
@@ -224,7 +225,7 @@ def _parts(outline: shapely.Geometry) -> list[shapely.Polygon]:
 
 
 def _bounds(network: LaneletNetwork, game: GameDocument) -> list[float]:
-    vehicles = np.array([entry['state'][:2] for entry in (*game.humans, *game.avs)], dtype=float)
+    vehicles = np.array([item.state[:2] for item in game.vehicles], dtype=float)
     points = [vertices[:, :2] for lanelet in network.lanelets
               for vertices in (lanelet.left_vertices, lanelet.right_vertices)]
     if not points:

@@ -1,18 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where the sensors of the AVs were in the map when they looked, for the fans of their rays."""
 
 from collections import OrderedDict
 import math
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from crgame_ros.game.driven_vehicle import DrivenAv
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.perception.spec import parse_perception
-from crgame_ros.vehicle.state import StateColumn
 
 FloatArray = NDArray[np.float64]
 
@@ -35,22 +45,24 @@ class SensorMounts:
     """
     The mounting poses of all sensors of a game, and the recent true states of the vehicles.
 
-    :param avs: entries of the game document.
+    :param avs: of the game.
     :param columns: of the driven vehicles in the states, by id.
     :param dt_s: simulation step [s].
     """
 
-    def __init__(self, avs: tuple[dict[str, Any], ...], columns: dict[str, int],
+    def __init__(self, avs: tuple[DrivenAv, ...], columns: dict[str, int],
                  dt_s: float) -> None:
         self._dt_s = dt_s
         self._columns = columns
         self._states: OrderedDict[int, FloatArray] = OrderedDict()
-        self._mounts = {str(entry['id']): _mounts(entry) for entry in avs
-                        if entry.get('perception') is not None}
+        self._mounts = {av.id: {
+            sensor.name: Mount(index, *sensor.mount(av.vehicle.rear_to_center, av.vehicle.length))
+            for index, sensor in enumerate(av.perception.sensors)}
+            for av in avs if av.perception is not None}
 
     @property
     def avs(self) -> tuple[str, ...]:
-        """The AVs with perception."""
+        """Give the AVs with perception."""
         return tuple(self._mounts)
 
     def add_states(self, n: int, states: FloatArray) -> None:
@@ -92,13 +104,3 @@ class SensorMounts:
         cos, sin = math.cos(yaw), math.sin(yaw)
         return (x + cos * mount.x - sin * mount.y, y + sin * mount.x + cos * mount.y,
                 wrap_pi(yaw + mount.yaw))
-
-
-def _mounts(entry: dict[str, Any]) -> dict[str, Mount]:
-    """Read the sensors of an AV; one without a place of its own is in the front bumper."""
-    vehicle = entry['vehicle']
-    front = vehicle['rear_to_center'] + 0.5 * vehicle['length']
-    sensors = parse_perception(entry['perception'], '/scenario/game: perception', Path()).sensors
-    return {sensor.name: Mount(index, front if sensor.x is None else sensor.x, sensor.y,
-                               sensor.yaw)
-            for index, sensor in enumerate(sensors)}

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The web server of the cockpit: routes, who is let in, headers, ports."""
 
 import asyncio
@@ -11,10 +23,9 @@ from typing import cast
 
 from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
-
 from crgame_ros.cockpit import library_routes, page_files
 from crgame_ros.cockpit.access import Access, is_own_origin
-from crgame_ros.cockpit.backend import Backend, ReplayBackend
+from crgame_ros.cockpit.backend import Backend, ReplayControls
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_files import PageFile
@@ -72,7 +83,7 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     _add_page(app, page_files.read_page(page))
     library_routes.add_routes(app, library, backend)
     if backend.mode == 'replay':
-        app.add_routes(cast(ReplayBackend, backend).routes())
+        app.add_routes(cast(ReplayControls, backend).routes())
     return app
 
 

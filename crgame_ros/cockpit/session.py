@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """One WebSocket connection from its first message to its end."""
 
 import asyncio
@@ -10,8 +22,7 @@ import socket
 from typing import Any
 
 from aiohttp import web, WSCloseCode, WSMsgType
-
-from crgame_ros.cockpit import messages
+from crgame_ros.cockpit import page_messages
 from crgame_ros.cockpit.backend import Backend
 from crgame_ros.cockpit.client import Client, TokenBucket
 from crgame_ros.cockpit.hub import Hub
@@ -45,7 +56,7 @@ class Session:
         # because they count as messages; so are closes, because the backend comes first.
         self.socket = web.WebSocketResponse(
             timeout=CLOSE_S, heartbeat=HEARTBEAT_S, compress=False, autoping=False,
-            autoclose=False, max_msg_size=messages.MAX_BYTES + 1, writer_limit=0)
+            autoclose=False, max_msg_size=page_messages.MAX_BYTES + 1, writer_limit=0)
         self._bucket = TokenBucket(MESSAGES_PER_S, MESSAGE_BURST)
         self._requests: asyncio.Queue[Mapping[str, Any] | None] = asyncio.Queue(MAX_REQUESTS)
         self._malformed = 0
@@ -138,7 +149,7 @@ class Session:
 
     async def _take(self, client: Client, text: str) -> None:
         try:
-            message = messages.parse_message(text)
+            message = page_messages.parse_message(text)
         except InputError as error:
             self._blame(client, error)
             return

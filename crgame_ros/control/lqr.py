@@ -1,27 +1,39 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Optimal lateral control with curvature feed-forward (Snider 2009, chapter 4), for FS 2."""
 
 from bisect import bisect_right
 import functools
 from math import atan
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_are
-
-from crgame_ros.control.settings import (
+from crgame_ros.control.speed import make_speed_controller
+from crgame_ros.control.tracker import Control, Reference, Tracker
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.vehicle.control_settings import (
     control_settings,
     DynamicBicycleSettings,
     LqrSettings,
     with_options,
 )
-from crgame_ros.control.speed import make_speed_controller
-from crgame_ros.control.tracker import Control, Reference, Tracker
-from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.vehicle.models import clipped
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.standstill import REST
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, solve_discrete_are
 
 Array = NDArray[np.float64]
 WHERE = 'options of tracker lqr'
@@ -30,8 +42,6 @@ TABLE_SPEEDS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.5, 15.0, 1
                 30.0, 35.0, 40.0, 45.0, 50.0, 60.0)
 # However large the offset, the vehicle approaches its path under no larger angle [rad].
 LARGEST_APPROACH = 0.3
-# Slower, a vehicle whose plan is over does not turn its wheels [m/s].
-REST_SPEED = 0.05
 
 
 class LqrTracker(Tracker):
@@ -99,7 +109,8 @@ class LqrTracker(Tracker):
         track = reference.track
         position = track.position(pose, reference.since_s)
         acceleration = self._speed.command(pose, reference, position.s)
-        if abs(pose.speed) < REST_SPEED and not track.moves_after(reference.since_s):
+        # Whose plan is over does not turn the wheels of a vehicle that stands.
+        if abs(pose.speed) < REST and not track.moves_after(reference.since_s):
             return Control(pose.steering_angle, acceleration)
         forward = deviation_from = 0.0
         if self.settings.feed_forward:

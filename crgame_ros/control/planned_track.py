@@ -1,20 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A plan between its states: what is planned for a time, and where beside it a vehicle is."""
 
 from bisect import bisect_left
 from math import cos, sin
 from typing import NamedTuple
 
+from crgame_ros.errors import InputError
+from crgame_ros.vehicle.standstill import PLANNED_REST
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.errors import InputError
-from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
-
 Array = NDArray[np.float64]
-# Slower is at rest: planners end a stop with a rounding error [m/s].
-REST_SPEED = 0.02
 # A plan that ends faster than this has not stopped, and goes on in its curve [m/s].
 BENDING_SPEED = 1.0
 # Displacements shorter than this between two states say nothing about curvature [m].
@@ -94,7 +104,8 @@ class PlannedTrack:
         self._ways: list[float] = np.concatenate(((0.0,), np.cumsum(lengths))).tolist()
         self._signs: list[float] = signs.tolist()
         self._curvatures: list[float] = _curvatures(yaws, signs * lengths).tolist()
-        self._stops = [i + 1 for i in range(len(signs)) if abs(self._speeds[i + 1]) <= REST_SPEED]
+        self._stops = [i for i, speed in enumerate(self._speeds[1:], 1)
+                       if abs(speed) <= PLANNED_REST]
 
     def at(self, time_s: float) -> TrackPoint:
         """Give what is planned for a time from the first state [s], held beyond both ends."""
@@ -103,7 +114,7 @@ class PlannedTrack:
         x, y = self._point(i, f)
         # The share of the segment's way that linear speeds cover in the share f of its time.
         both = v + w
-        share = f * (2.0 * v + f * (w - v)) / both if abs(both) > REST_SPEED else f
+        share = f * (2.0 * v + f * (w - v)) / both if abs(both) > PLANNED_REST else f
         return TrackPoint(x, y, self._yaws[i] + f * (self._yaws[i + 1] - self._yaws[i]),
                           v + f * (w - v), self._accelerations[i],
                           self._ways[i] + min(1.0, max(0.0, share)) * self._lengths[i])
@@ -129,7 +140,7 @@ class PlannedTrack:
         :return: time [s] and way [m] from the first state; None where the plan ends in motion.
         """
         i, _ = self._locate(time_s)
-        if abs(self._speeds[i]) <= REST_SPEED and abs(self._speeds[i + 1]) <= REST_SPEED:
+        if abs(self._speeds[i]) <= PLANNED_REST and abs(self._speeds[i + 1]) <= PLANNED_REST:
             return i * self.time_step_s, self._ways[i]
         index = bisect_left(self._stops, i + 1)
         if index == len(self._stops):
@@ -236,7 +247,7 @@ class PlannedTrack:
 def _signs(speeds: Array) -> Array:
     """Give each segment's direction of travel; rest belongs to the motion that follows it."""
     mean = 0.5 * (speeds[1:] + speeds[:-1])
-    moving = np.flatnonzero(np.abs(mean) > REST_SPEED)
+    moving = np.flatnonzero(np.abs(mean) > PLANNED_REST)
     if not len(moving):
         return np.ones(len(mean))
     following = np.searchsorted(moving, np.arange(len(mean)))

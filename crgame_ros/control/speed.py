@@ -1,21 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Speed along a plan: feed-forward and PI between stops, a law of its own into each stop."""
 
 from math import exp
 
-from crgame_ros.control.settings import control_settings, SpeedSettings, with_options
 from crgame_ros.control.tracker import Reference
+from crgame_ros.vehicle.control_settings import control_settings, SpeedSettings, with_options
 from crgame_ros.vehicle.models import clipped
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.standstill import STANDING
 from crgame_ros.vehicle.state import VehicleState
 
 # The stop's own law takes over so many acceleration lags before it.
 STOPPING_LAGS = 2.0
 # Nearer to its place than this, a stop is reached [m].
 STOP_TOLERANCE = 0.005
-# Slower than this a vehicle that should stop is held by its brakes [m/s, m/s^2].
-CREEP_SPEED = 0.1
+# With which a vehicle that should stop and nearly does is held by its brakes [m/s^2].
 HOLDING_DECELERATION = 1.0
 # Faster than this backwards is a motion to brake, slower the noise of an estimate [m/s].
 ROLLING_BACK = 0.15
@@ -113,7 +125,7 @@ class SpeedController:
         self._rolls_back = speed < -ROLLING_BACK or (self._rolls_back and speed < 0.0)
         if self._rolls_back:
             return FIRM_DECELERATION
-        if speed <= CREEP_SPEED:
+        if speed <= STANDING:
             return -HOLDING_DECELERATION if speed > 0.0 else 0.0
         needed = _needed(speed, way)
         if way <= STOP_TOLERANCE:

@@ -1,9 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """An AV that tracks its plan with a controller and a vehicle instead of being on it (FS II-C)."""
 
 from collections import deque
-from math import copysign, cos, sin, sqrt
+from math import cos, sin, sqrt
 from typing import NamedTuple
 
 from crgame_ros.control.planned_track import PlannedTrack
@@ -12,9 +24,8 @@ from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.vehicle.models import VehicleModel
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.stopping import braking_acceleration
 
-# Braking where there is no plan [m/s^2]: firm, well within a dry road's friction.
-EXHAUSTED_DECELERATION = 4.0
 # Age of the plan against which errors are measured [s]. The newest one starts at the vehicle ten
 # times a second, so that nobody is ever far from it.
 ERROR_PLAN_AGE_S = 1.0
@@ -117,8 +128,7 @@ class TrackedExecution:
     def _braking(self, state: VehicleState) -> Control:
         # What the tracker expected of the vehicle ends here.
         self.tracker.reset()
-        deceleration = copysign(EXHAUSTED_DECELERATION, state.speed) if state.speed else 0.0
-        return Control(state.steering_angle, -deceleration)
+        return Control(state.steering_angle, braking_acceleration(state.speed))
 
     def _moved(self, state: VehicleState, control: Control) -> VehicleState:
         return self.model.step(state, control.steering_angle, control.acceleration, self.dt_s)

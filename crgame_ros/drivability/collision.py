@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Which objects every driven vehicle touches (CRG III-D a).
 
@@ -10,12 +22,11 @@ exact on maps whose coordinates are large.
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from crgame_ros.drivability.footprint import Footprint, Primitive
 from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.footprint import Footprint, Primitive
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.objects import ObjectStates
+import numpy as np
 
 # Enclosing circles of objects that only just touch may miss each other by rounding.
 CIRCLE_SLACK = 1e-6

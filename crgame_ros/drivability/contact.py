@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 What a contact of two bodies was: where it touched, of which kind, and who could have avoided it.
 
@@ -12,19 +24,17 @@ from dataclasses import dataclass
 import math
 from typing import Literal, TypeAlias
 
+from crgame_ros.geometry.outline import placed_polygon
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.vehicle.standstill import REST
 import numpy as np
 from numpy.typing import NDArray
 import shapely
-
-from crgame_ros.drivability.footprint import Footprint
-from crgame_ros.geometry.shape import Shape
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Side: TypeAlias = Literal['front', 'rear', 'left', 'right']
 Kind: TypeAlias = Literal['stopped ego', 'stopped track', 'active front', 'rear', 'lateral']
 
-# nuPlan's: slower than this is standing [m/s].
-_STANDING = 0.05
 # How far before and behind the contact is looked at [s], and how finely.
 _BEFORE_S, _AFTER_S, _STRIDE_S = 10.0, 3.0, 0.02
 # The way of a body reaches so far beyond its last footprint [m].
@@ -81,9 +91,9 @@ def kind_of(speed: float, other_speed: float, side: Side) -> Kind:
     :param other_speed: of what it touches (the track) [m/s]
     :param side: of the vehicle that is judged.
     """
-    if abs(speed) <= _STANDING:
+    if abs(speed) <= REST:
         return 'stopped ego'
-    if abs(other_speed) <= _STANDING:
+    if abs(other_speed) <= REST:
         return 'stopped track'
     return 'active front' if side == 'front' else 'rear' if side == 'rear' else 'lateral'
 
@@ -152,4 +162,4 @@ def _touch(mine: Course, other: Course, index: int) -> bool:
 
 
 def _placed(course: Course, index: int) -> shapely.Polygon:
-    return Footprint(course.shape).polygon(*course.poses[index].tolist())
+    return placed_polygon(course.shape, *course.poses[index].tolist())

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 The drivability of every driven vehicle at one simulation step (CRG III-D).
 
@@ -13,18 +25,18 @@ from dataclasses import dataclass
 import math
 
 from commonroad.scenario.lanelet import LaneletNetwork
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.drivability.collision import CollisionDetector
 from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
-from crgame_ros.drivability.road_boundary import RoadBoundary
 from crgame_ros.errors import InputError
+from crgame_ros.game.game import DrivabilitySpec
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
-from crgame_ros.scenario.game import DrivabilitySpec
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.scenario.occupancy import OccupancyMap
+from crgame_ros.occupancy.occupancy import OccupancyMap
+from crgame_ros.roads.road_boundary import RoadBoundary
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +94,24 @@ class DrivabilityMonitor:
             if spec.collision and occupancy is not None else None
         self._road = RoadBoundary(lanelet_network) \
             if spec.road and lanelet_network is not None else None
-        self._objects_n: int | None = None
+        self._verdicts: tuple[VehicleDrivability, ...] = ()
+        self._changed: tuple[VehicleDrivability, ...] = ()
+        self._violations: list[VehicleDrivability] = []
 
     @property
-    def objects_n(self) -> int | None:
-        """Simulation step of the other objects' states in use; None before the first."""
-        return self._objects_n
+    def verdicts(self) -> tuple[VehicleDrivability, ...]:
+        """Give all verdicts on the state that was observed last; none before the first."""
+        return self._verdicts
+
+    @property
+    def changed(self) -> tuple[VehicleDrivability, ...]:
+        """Give those of them that say something new (`changes`)."""
+        return self._changed
+
+    @property
+    def stop(self) -> VehicleDrivability | None:
+        """Give the violation in the state observed last that ends the run, if there is one."""
+        return next((item for item in self._verdicts if item.stop_requested), None)
 
     def prepare(self, vehicle_states: NDArray[np.float64]) -> None:
         """
@@ -103,17 +127,28 @@ class DrivabilityMonitor:
             for index, center in enumerate(centers):
                 self._permanent.is_hit(index, center)
 
-    def set_objects(self, n: int, states: ObjectStates) -> None:
+    def observe(self, n: int, since_tick_s: float, vehicle_states: NDArray[np.float64],
+                objects: ObjectStates | None) -> None:
+        """Judge a published state (`RunObserver`)."""
+        if objects is not None:
+            self.set_objects(objects)
+        before, self._verdicts = self._verdicts, self.check(n, since_tick_s, vehicle_states)
+        self._changed = changes(before, self._verdicts)
+        self._violations.extend(self._changed)
+
+    def report(self) -> tuple[VehicleDrivability, ...]:
+        """Give every verdict that said something new, in order."""
+        return tuple(self._violations)
+
+    def set_objects(self, states: ObjectStates) -> None:
         """
         Take the other objects' states at a scenario tick.
 
-        :param n: simulation step of the tick.
         :param states: (M) poses and velocities in the order of `others`.
         :raises InputError: if their number is not that of `others`.
         """
         if self._detector is not None:
             self._detector.set_objects(states)
-        self._objects_n = n
 
     def check(self, n: int, seconds_since_tick: float, vehicle_states: NDArray[np.float64]
               ) -> tuple[VehicleDrivability, ...]:
@@ -150,8 +185,8 @@ class DrivabilityMonitor:
         centers = []
         for row, offset in zip(vehicle_states.tolist(), self._rear_to_center, strict=True):
             x, y, yaw = row[StateColumn.X], row[StateColumn.Y], row[StateColumn.YAW]
-            centers.append((x + offset * math.cos(yaw), y + offset * math.sin(yaw), yaw)
-                           if math.isfinite(x + y + yaw) else (math.nan,) * 3)
+            centers.append((*ahead(x, y, yaw, offset), yaw) if math.isfinite(x + y + yaw)
+                           else (math.nan,) * 3)
         return centers
 
     def _hits(self, centers: list[tuple[float, float, float]], seconds_since_tick: float

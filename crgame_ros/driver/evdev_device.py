@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A wheel, gamepad or keyboard read through evdev, which may be unplugged and come back."""
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -8,8 +20,6 @@ import math
 from pathlib import Path
 import re
 from typing import Any
-
-from evdev import AbsInfo, ecodes, InputDevice, InputEvent
 
 from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
 from crgame_ros.driver.keyboard import KeyState
@@ -22,6 +32,7 @@ from crgame_ros.driver.wheel import (
     reported,
 )
 from crgame_ros.errors import InputError
+from evdev import AbsInfo, ecodes, InputDevice, InputEvent
 
 RESCAN_PERIOD_S = 1.0
 
@@ -120,7 +131,7 @@ class EvdevDevice:
 
     @property
     def name(self) -> str:
-        """The device's name; empty while none is open."""
+        """Give the device's name; empty while none is open."""
         return str(self._device.name) if self._device is not None else ''
 
     @property
@@ -130,14 +141,14 @@ class EvdevDevice:
 
     @property
     def keys(self) -> KeyState:
-        """The driving keys held on a keyboard; none held on other devices."""
+        """Give the driving keys held on a keyboard; none held on other devices."""
         if self.device_map is None or self.device_map.keys is None:
             return KeyState()
         return self.device_map.keys.held(self.decoder.pressed, self.decoder.reverse)
 
     @property
     def joy(self) -> JoyState:
-        """What the `joy` node would publish; for a keyboard, its driving keys as buttons."""
+        """Give what the `joy` node would publish; for a keyboard, its driving keys as buttons."""
         if self.device_map is not None and self.device_map.keys is not None:
             return JoyState((), tuple(map(int, self.keys)))
         rests = {axis.code: axis.rest for axis in self.layout.ranges} if self.layout else {}

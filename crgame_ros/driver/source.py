@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The sources of a human's command: idle, scripted, an external joy node, or a device."""
 
 from abc import ABC, abstractmethod
@@ -9,18 +21,12 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyboardParameters
-from crgame_ros.driver.timeline import (
-    JoyTimeline,
-    KeyTimeline,
-    parse_timeline,
-    read_timeline,
-    SCRIPTED_LAYOUT,
-    Timeline,
-)
+from crgame_ros.driver.timeline import JoyTimeline, KeyTimeline, SCRIPTED_LAYOUT, Timeline
+from crgame_ros.driver.timeline_file import parse_timeline, read_timeline
 from crgame_ros.driver.wheel import JoyState, normalize, RawInput, reported
 from crgame_ros.errors import InputError
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
 if TYPE_CHECKING:
     from crgame_ros.driver.device_map import DeviceMap

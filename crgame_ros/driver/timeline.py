@@ -1,26 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Scripted humans: timelines of held keys and of device axes, written by hand in YAML."""
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
-import reprlib
-from typing import Any
-
-import yaml
+from typing import Literal
 
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import AxisRange, ControlLayout, GearButtons, RawInput
-from crgame_ros.errors import InputError
 
-MAX_BYTES = 1 << 20
-MAX_TIME_S = 1e6
-REMEDY = 'see docs/driving.md, section "Scripted drivers"'
-
-JOY_AXES = ('throttle', 'brake', 'steering')
+AxisName = Literal['throttle', 'brake', 'steering']
+JOY_AXES: tuple[AxisName, ...] = ('throttle', 'brake', 'steering')
 REVERSE_BUTTON = 0
 
 # The device that a joy timeline plays: its raw axes are CRG 17's ratios themselves.
@@ -42,10 +45,6 @@ class KeyInterval:
     start_ns: int
     end_ns: int
     keys: tuple[str, ...]
-
-    def as_mapping(self) -> dict[str, Any]:
-        """Give the interval as a line of a timeline file."""
-        return {'from': self.start_ns / 1e9, 'to': self.end_ns / 1e9, 'hold': list(self.keys)}
 
 
 @dataclass(frozen=True)
@@ -94,10 +93,6 @@ class KeyTimeline:
         index = bisect_right(self._changes_ns, round(t_s * 1e9))
         return self._states[index - 1] if index else KeyState()
 
-    def to_text(self) -> str:
-        """Give the timeline as the text of a file; `parse_timeline` reads the same again."""
-        return _dump({'keys': [interval.as_mapping() for interval in self.intervals]})
-
 
 @dataclass(frozen=True)
 class JoyTimeline:
@@ -144,150 +139,5 @@ class JoyTimeline:
         pressed = {REVERSE_BUTTON} if self.reverse.keys_at(t_s).reverse else ()
         return RawInput(dict(enumerate(values)), frozenset(pressed))
 
-    def to_text(self) -> str:
-        """Give the timeline as the text of a file; `parse_timeline` reads the same again."""
-        points = [[t, *values] for t, values in zip(self.times_s, self.values, strict=True)]
-        joy: dict[str, Any] = {'axes': list(JOY_AXES), 'points': points}
-        if self.reverse.intervals:
-            joy['reverse'] = [{'from': i.start_ns / 1e9, 'to': i.end_ns / 1e9}
-                              for i in self.reverse.intervals]
-        return _dump({'joy': joy})
-
 
 Timeline = KeyTimeline | JoyTimeline
-
-
-def read_timeline(path: Path) -> Timeline:
-    """
-    Read a timeline file.
-
-    :raises InputError: if it cannot be read or is no timeline.
-    """
-    try:
-        with path.open('rb') as file:
-            text = file.read(MAX_BYTES + 1).decode('utf-8')
-    except OSError as error:
-        raise InputError(f'cannot read the timeline ({error.strerror})', str(path),
-                         'name an existing file') from error
-    except UnicodeDecodeError as error:
-        raise InputError('is no text', str(path), REMEDY) from error
-    return parse_timeline(text, str(path))
-
-
-def parse_timeline(text: str, where: str) -> Timeline:
-    """
-    Read the text of a timeline (YAML, or JSON, which is YAML too).
-
-    :param text: what `KeyTimeline` or `JoyTimeline` describes.
-    :param where: the file's name, for messages.
-    :raises InputError: naming the file and the line of the timeline that is wrong.
-    """
-    document = load_mapping(text, where, REMEDY)
-    if document.keys() == {'keys'}:
-        entries = _list(document['keys'], f'{where}: keys')
-        return KeyTimeline(_intervals(entries, f'{where}: keys', _hold))
-    if document.keys() == {'joy'}:
-        return _joy(document['joy'], f'{where}: joy')
-    raise InputError(f'has {reprlib.repr(sorted(map(str, document)))} at its top', where,
-                     f'give one of "keys" and "joy"; {REMEDY}')
-
-
-def load_mapping(text: str, where: str, remedy: str) -> dict[Any, Any]:
-    """
-    Read YAML text whose top is a mapping, without aliases, which can expand without bound.
-
-    :raises InputError: if it is too long, nested too deeply, no YAML or no mapping.
-    """
-    if len(text) > MAX_BYTES:
-        raise InputError(f'is longer than {MAX_BYTES} characters', where, remedy)
-    try:
-        if '*' in text and any(isinstance(event, yaml.AliasEvent)
-                               for event in yaml.parse(text, Loader=yaml.SafeLoader)):
-            raise InputError('uses a YAML alias (*name)', where, 'write the value out')
-        document = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError) as error:
-        raise InputError(f'is no YAML ({error})', where, remedy) from error
-    except RecursionError as error:
-        raise InputError('is nested too deeply', where, remedy) from error
-    if not isinstance(document, dict):
-        raise InputError('is no mapping', where, remedy)
-    return document
-
-
-def _dump(document: dict[str, Any]) -> str:
-    return str(yaml.safe_dump(document, default_flow_style=None, sort_keys=False, width=1000))
-
-
-def _list(value: Any, where: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise InputError(f'is {reprlib.repr(value)}, no list', where, REMEDY)
-    return value
-
-
-def _number(value: Any, where: str, lower: float, upper: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) \
-            or not lower <= value <= upper:
-        raise InputError(f'is {reprlib.repr(value)}', where,
-                         f'give a number from {lower:g} to {upper:g} (YAML: 1.0e-3, not 1e-3)')
-    return float(value)
-
-
-def _hold(entry: dict[Any, Any], where: str) -> tuple[str, ...]:
-    hold = entry.get('hold')
-    names = hold if isinstance(hold, list) else [hold]
-    for name in names:
-        if name not in KeyState._fields:
-            raise InputError(f'knows no key {reprlib.repr(name)}', f'{where}: hold',
-                             f'the keys are {", ".join(KeyState._fields)}')
-    return tuple(names)
-
-
-def _intervals(entries: Iterable[Any], where: str,
-               hold: Callable[[dict[Any, Any], str], tuple[str, ...]] | None,
-               ) -> tuple[KeyInterval, ...]:
-    wanted = {'from', 'to', 'hold'} if hold else {'from', 'to'}
-    intervals = []
-    for number, entry in enumerate(entries, start=1):
-        here = f'{where}: entry {number}'
-        if not isinstance(entry, dict) or entry.keys() != wanted:
-            raise InputError(f'is {reprlib.repr(entry)}', here,
-                             f'give exactly {", ".join(sorted(wanted))}; {REMEDY}')
-        start, end = (round(_number(entry[key], f'{here}: {key}', 0.0, MAX_TIME_S) * 1e9)
-                      for key in ('from', 'to'))
-        if start >= end:
-            raise InputError(f'ends at {entry["to"]} s, not after its start at {entry["from"]} s',
-                             here, 'let "from" be less than "to"')
-        intervals.append(KeyInterval(start, end, hold(entry, here) if hold else ('reverse',)))
-    return tuple(intervals)
-
-
-def _joy(joy: Any, where: str) -> JoyTimeline:
-    if not isinstance(joy, dict) or not {'points'} <= joy.keys() <= {'axes', 'points', 'reverse'}:
-        raise InputError(f'is {reprlib.repr(joy)}', where,
-                         f'give points, and axes and reverse if needed; {REMEDY}')
-    axes = _list(joy.get('axes', list(JOY_AXES)), f'{where}: axes')
-    for axis in axes:
-        if axis not in JOY_AXES or axes.count(axis) > 1:
-            raise InputError(f'{reprlib.repr(axis)} is unknown or doubled', f'{where}: axes',
-                             f'the axes are {", ".join(JOY_AXES)}')
-    times: list[float] = []
-    values: list[tuple[float, float, float]] = []
-    for number, point in enumerate(_list(joy['points'], f'{where}: points'), start=1):
-        here = f'{where}: point {number}'
-        if not isinstance(point, list) or len(point) != 1 + len(axes):
-            raise InputError(f'is {reprlib.repr(point)}', here,
-                             f'give [{", ".join(["t", *axes])}]')
-        times.append(_number(point[0], f'{here}: t', 0.0, MAX_TIME_S))
-        if len(times) > 1 and times[-1] <= times[-2]:
-            raise InputError(f'is at {times[-1]} s, not after {times[-2]} s', here,
-                             'let the times rise')
-        at = {axis: _number(value, f'{here}: {axis}', -1.0 if axis == 'steering' else 0.0, 1.0)
-              for axis, value in zip(axes, point[1:], strict=True)}
-        values.append((at.get('throttle', 0.0), at.get('brake', 0.0), at.get('steering', 0.0)))
-    if not times:
-        raise InputError('is empty', f'{where}: points', 'give at least one point')
-    entries = _list(joy.get('reverse', []), f'{where}: reverse')
-    reverse = KeyTimeline(_intervals(entries, f'{where}: reverse', None))
-    return JoyTimeline(tuple(times), tuple(values), reverse)
-
-

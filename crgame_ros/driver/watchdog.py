@@ -1,13 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What a seat does while its driver is silent: let go, then brake gently to a standstill."""
 
 from dataclasses import dataclass, fields
 import math
 
-from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.driver.keyboard import KeyboardParameters
 from crgame_ros.errors import InputError
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.vehicle.standstill import REST
 
 _RATES = KeyboardParameters()
 
@@ -32,7 +45,7 @@ class WatchdogParameters:
     brake_rate: float = _RATES.brake_rate
     pedal_release_rate: float = _RATES.pedal_release_rate
     steering_release_rate: float = _RATES.steering_release_rate
-    standstill_speed: float = 0.05
+    standstill_speed: float = REST
 
     def __post_init__(self) -> None:
         """Refuse values with which no vehicle would stop."""
@@ -68,7 +81,7 @@ class SeatWatchdog:
         self._returning = False
         self._output = RELEASED
 
-    def filter(self, last_command: DriverCommand, age_s: float, dt_s: float,
+    def filter(self, last_command: DriverCommand, age_s: float, dt_s: float,  # noqa: A003
                speed: float) -> DriverCommand:
         """
         Give the command that the vehicle is to obey in this step.

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The command line of `run.sh`."""
 
 import argparse
@@ -7,6 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
+import re
 
 from crgame_ros.errors import InputError
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
@@ -55,6 +68,7 @@ class RunRequest:
     :param listen: address on which the page is served beyond this machine, with a token.
     :param replay: recording to show in the page; nothing is simulated then.
     :param realtime_priority: SCHED_FIFO for the simulation.
+    :param namespace: of all nodes, topics and services.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
@@ -72,9 +86,11 @@ class RunRequest:
     realtime_priority: bool = False
     out: Path | None = None
     problems: tuple[int, ...] = ()
+    namespace: str = '/'
 
 
 class _Parser(argparse.ArgumentParser):
+
     def error(self, message: str) -> None:  # type: ignore[override]
         raise InputError(message, 'command line', 'see --help')
 
@@ -108,6 +124,9 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         help='show a recording in the page instead of running a game; goes with --port, --listen')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
+    add('--namespace', type=_namespace, default='/', metavar='/NAME',
+        help='put every node, topic and service of this run there, beside other runs in one ROS '
+        'domain')
     add('--out', type=Path, metavar='DIR',
         help="folder for this run's files (default: runs/<time>_<scenario>)")
     return parser
@@ -135,6 +154,14 @@ def _positive(text: str) -> float:
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is not above 0')
     return value
+
+
+def _namespace(text: str) -> str:
+    if text != '/' and not re.fullmatch(
+            r'/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*', text):
+        raise argparse.ArgumentTypeError(
+            f'{text} is no namespace: letters, digits and _ between /')
+    return '/' + text.removeprefix('/')
 
 
 def _port(text: str) -> int:

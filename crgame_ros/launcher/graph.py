@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The whole graph: nodes started, watched, restarted where that is safe, and ended in order."""
 
 from collections.abc import Callable, Sequence
@@ -10,14 +22,19 @@ import time
 from types import FrameType
 
 from crgame_ros.launcher.finisher import Finisher
+from crgame_ros.launcher.interruption import ENDING
 from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
 from crgame_ros.launcher.node_specs import Roster
 
-# The time that a node gets to end in good order [s].
-GRACE_S = 5.0
+# The time that a node gets to end in good order, on a machine that others keep busy [s].
+GRACE_S = 10.0
+# It then gets so long to say what it is at [s].
+WORD_S = 0.3
 # The recorder takes in what the others said last [s].
 DRAIN_S = 0.3
 MAX_RESTARTS = 5
+# Within such a time [s].
+RESTARTS_S = 60.0
 
 
 class Graph:
@@ -28,16 +45,20 @@ class Graph:
     :param say: prints one line.
     :param roster: tells of further vehicles, which get their nodes.
     :param finisher: finishes the recordings of runs that are over.
+    :param namespace: of all nodes.
     """
 
     def __init__(self, specs: Sequence[NodeSpec], say: Callable[[str], None],
-                 roster: Roster | None = None, finisher: Finisher | None = None) -> None:
+                 roster: Roster | None = None, finisher: Finisher | None = None,
+                 namespace: str = '/') -> None:
         self._say = say
         self._roster = roster
         self._finisher = finisher
+        self._namespace = namespace
         self._selector = selectors.DefaultSelector()
         self._signal: int | None = None
         self._restarts: dict[str, int] = {}
+        self._died_s: dict[str, list[float]] = {}
         self._specs = list(specs)
         self._nodes: dict[str, NodeProcess] = {}
         self._width = max(len(spec.name) for spec in specs)
@@ -49,7 +70,7 @@ class Graph:
         :return: the simulation's exit code; 0 after Ctrl-C in good order.
         """
         before = {number: signal.signal(number, self._on_signal)
-                  for number in (signal.SIGINT, signal.SIGTERM)}
+                  for number in ENDING}
         first = self._specs[0].name
         try:
             for spec in self._specs:
@@ -72,7 +93,7 @@ class Graph:
         self._signal = number
 
     def _start(self, spec: NodeSpec) -> None:
-        node = NodeProcess(spec)
+        node = NodeProcess(spec, self._namespace)
         self._nodes[spec.name] = node
         self._say(f'{spec.name}: process {node.pid}')
         self._selector.register(node.output, selectors.EVENT_READ, node)
@@ -100,7 +121,10 @@ class Graph:
             cause = cause_of_death(code)
             count = self._restarts.get(name, 0) + 1
             # Bad input stays bad: exit code 2 is not tried again.
-            if not node.spec.restart or code == 2 or count > MAX_RESTARTS:
+            now_s = time.monotonic()
+            died_s = [at for at in self._died_s.get(name, []) if now_s - at < RESTARTS_S] + [now_s]
+            self._died_s[name] = died_s
+            if not node.spec.restart or code == 2 or len(died_s) > MAX_RESTARTS:
                 self._say(f'{name} died ({cause}); the others go on')
                 self._restarts[name] = -1
                 continue
@@ -149,6 +173,8 @@ class Graph:
             self._relay(0.02)
         for node in nodes:
             if node.exit_code() is None:
+                node.tell_where()
+                self._relay(WORD_S)
                 self._say(f'{node.spec.name} does not end: killed')
                 node.kill()
         self._relay(0.0)

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The command behind `run.sh`: check, run, and turn the recording into a scenario."""
 
 from collections.abc import Sequence
@@ -9,16 +21,20 @@ import sys
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.finisher import Finisher
+from crgame_ros.launcher.forked_node import load
 from crgame_ros.launcher.graph import Graph
-from crgame_ros.launcher.node_specs import node_specs, Roster
+from crgame_ros.launcher.interruption import say, writing
+from crgame_ros.launcher.node_specs import node_specs, Roster, shared_modules
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
-from crgame_ros.ros.environment import free_domain_id, network_is_open, prepare_environment
+from crgame_ros.ros.environment import (
+    free_domain_id,
+    network_is_open,
+    prepare_environment,
+    require_ros,
+)
+from crgame_ros.ros.place import held
+from crgame_ros.ros.shared_memory import remove_stale
 from crgame_ros.traffic.cache import compile_now
-
-
-def say(text: str) -> None:
-    """Print one line at once."""
-    print(text, flush=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,13 +49,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from crgame_ros.cockpit.replay_server import serve_replay
             return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
                                 say=say)
+        require_ros()
         plan = plan_run(request)
         compile_now()
         announce(plan)
+        # Killed processes leave 4 MB each.
+        remove_stale()
         finisher = Finisher(plan.folder, say)
-        code = Graph(node_specs(plan), say, Roster(plan.roster), finisher).run()
-        plan.roster.unlink(missing_ok=True)
-        return max(code, finisher.finish_all())
+        try:
+            with held(os.environ['ROS_DOMAIN_ID'], request.namespace):
+                specs = node_specs(plan)
+                load(shared_modules(specs, plan))
+                code = Graph(specs, say, Roster(plan.roster), finisher, request.namespace).run()
+        finally:
+            plan.roster.unlink(missing_ok=True)
+            plan.claim.unlink(missing_ok=True)
+        with writing(say):
+            code = max(code, finisher.finish_all())
+        say(f'again: ./run.sh {plan.game_file}; tools: ./crgame --help')
+        return code
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)
         return error.exit_code

@@ -1,15 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """One node of the graph as a child process."""
 
 from dataclasses import dataclass, field
 import os
 import signal
-import subprocess
-import sys
-import time
 
-from crgame_ros.ros.node_main import NICE_VARIABLE, PARENT_VARIABLE
+from crgame_ros.launcher.forked_node import fork_node
+from crgame_ros.ros.node_main import TELL_WHERE
 
 MAX_LINE = 10_000
 
@@ -32,39 +42,39 @@ class NodeSpec:
     nice: int = 0
     restart: bool = False
 
-    def command(self) -> list[str]:
-        """Give the command line."""
-        ros = ['--ros-args', '-r', f'__node:={self.name}']
+    @property
+    def module(self) -> str:
+        """Name of the Python module that is run."""
+        return f'crgame_ros.nodes.{self.executable}'
+
+    def arguments(self, namespace: str = '/') -> list[str]:
+        """Give the arguments of the command line, for a graph in a namespace."""
+        ros = ['--ros-args', '-r', f'__node:={self.name}', '-r', f'__ns:={namespace}']
         for key, value in self.parameters.items():
             ros += ['-p', f'{key}:={value}']
-        return [sys.executable, '-u', '-m', f'crgame_ros.nodes.{self.executable}', *ros]
+        return ros
 
 
 class NodeProcess:
     """
     A running node whose output is read line by line.
 
-    It gets a session of its own, so that Ctrl-C reaches the launcher only, which ends the nodes
-    in good order; should the launcher be killed, the kernel ends the node (`die_with_parent`).
+    :ivar pid: process id.
+    :ivar output: what it prints.
+
+    It gets a process group of its own, so that Ctrl-C reaches the launcher only, which ends the
+    nodes in good order; should the launcher be killed, the kernel ends the node
+    (`die_with_parent`), and wakes it for that where it was stopped, for its group has lost its
+    session's parent.
     """
 
-    def __init__(self, spec: NodeSpec) -> None:
+    def __init__(self, spec: NodeSpec, namespace: str = '/') -> None:
         self.spec = spec
-        self.started_s = time.monotonic()
-        environment = os.environ | {PARENT_VARIABLE: str(os.getpid()),
-                                    NICE_VARIABLE: str(spec.nice)}
-        self._process = subprocess.Popen(
-            spec.command(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, env=environment, start_new_session=True)
-        assert self._process.stdout is not None
-        self.output = self._process.stdout
-        os.set_blocking(self.output.fileno(), False)
+        self.pid, reading = fork_node(spec.module, spec.arguments(namespace), spec.nice)
+        self.output = os.fdopen(reading, 'rb', buffering=0)
+        os.set_blocking(reading, False)
+        self._code: int | None = None
         self._rest = b''
-
-    @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._process.pid
 
     def read_lines(self) -> list[str]:
         """Give the complete lines that have come since the last call."""
@@ -84,19 +94,27 @@ class NodeProcess:
 
     def exit_code(self) -> int | None:
         """Give the exit code, negative for a signal; None while it runs."""
-        return self._process.poll()
+        if self._code is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            self._code = os.waitstatus_to_exitcode(status) if pid else None
+        return self._code
 
     def interrupt(self) -> None:
         """Ask the node to end."""
         if self.exit_code() is None:
-            # To a process that is still importing, SIGINT would mean a traceback.
-            self._process.send_signal(signal.SIGTERM)
+            # To a process that is still loading, SIGINT would mean a traceback.
+            os.kill(self.pid, signal.SIGTERM)
+
+    def tell_where(self) -> None:
+        """Have the node print what each of its threads is at."""
+        if self.exit_code() is None:
+            os.kill(self.pid, TELL_WHERE)
 
     def kill(self) -> None:
         """End the node at once."""
         if self.exit_code() is None:
-            self._process.kill()
-            self._process.wait()
+            os.kill(self.pid, signal.SIGKILL)
+            self._code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
     def close(self) -> None:
         """Release the pipe."""

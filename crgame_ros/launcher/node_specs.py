@@ -1,7 +1,20 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Which nodes a run has, and which ones a game that is chosen later adds."""
 
+from collections.abc import Sequence
 import json
 from pathlib import Path
 
@@ -9,7 +22,7 @@ from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.node_process import NodeSpec
 from crgame_ros.launcher.run_plan import RunPlan
-from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.planner.planner_registry import BUILT_IN, EXTERNAL
 from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.simulation.roster import Participants
 
@@ -22,7 +35,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     """List the nodes of a run: sim_node first, which waits for its companions, viewers last."""
     setup, request = plan.setup, plan.request
     companions = [
-        *participant_specs(Participants.of(setup)),
+        *participant_specs(Participants.of(setup), plan.roster),
         NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
                  nice=COMPANION_NICE, restart=True),
         NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
@@ -47,6 +60,17 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     return [simulation, *companions, *viewers]
 
 
+def shared_modules(specs: Sequence[NodeSpec], plan: RunPlan) -> list[str]:
+    """List what the nodes of a run load; the package's own alone: users' code is theirs."""
+    modules = {spec.module: None for spec in specs}
+    for av in plan.setup.avs:
+        if av.spec.planner in BUILT_IN:
+            modules[BUILT_IN[av.spec.planner].partition(':')[0]] = None
+    if any(spec.executable == 'traffic_node' for spec in specs):
+        modules['crgame_ros.traffic.warm_up:drive_everything'] = None
+    return list(modules)
+
+
 def at_end(request: RunRequest) -> str:
     """Say what follows the end of a run: who can begin another one wants to see how it went."""
     if request.headless:
@@ -54,18 +78,25 @@ def at_end(request: RunRequest) -> str:
     return STAY if request.duration_s is None else STAY_IF_CHOSEN
 
 
-def participant_specs(who: Participants) -> list[NodeSpec]:
-    """List the nodes that a game's vehicles, perception, traffic and map need."""
+def participant_specs(who: Participants, roster: Path) -> list[NodeSpec]:
+    """
+    List the nodes that a game's vehicles, perception, traffic and map need.
+
+    :param roster: file in which sim_node names the code that they may run.
+    """
+    code = {'roster': f'"{roster}"'}
     specs = [
-        *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av}, nice=COMPANION_NICE,
-                   restart=True) for av, planner in who.avs.items() if planner != EXTERNAL),
+        *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av, **code},
+                   nice=COMPANION_NICE, restart=True)
+          for av, planner in who.avs.items() if planner != EXTERNAL),
         *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human}, restart=True)
           for human, driver in who.humans.items()
           if driver != COCKPIT and not is_replay(driver)),
-        *(NodeSpec('perception_node', f'perception_node_{av}', {'vehicle': av},
+        *(NodeSpec('perception_node', f'perception_node_{av}', {'vehicle': av, **code},
                    nice=COMPANION_NICE, restart=True) for av in who.perceiving)]
     if who.traffic:
-        specs.append(NodeSpec('traffic_node', 'traffic_node', nice=COMPANION_NICE, restart=True))
+        specs.append(NodeSpec('traffic_node', 'traffic_node', code, nice=COMPANION_NICE,
+                              restart=True))
     if who.occupancy:
         specs.append(NodeSpec('map_node', 'map_node', nice=COMPANION_NICE, restart=True))
     return specs
@@ -107,4 +138,4 @@ class Roster:
             return []
         self._seen = (stat.st_mtime_ns, stat.st_ino)
         content = json.loads(self._path.read_text(encoding='utf-8'))
-        return participant_specs(Participants.read(content))
+        return participant_specs(Participants.read(content), self._path)

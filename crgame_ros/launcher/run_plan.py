@@ -1,32 +1,49 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """From a request to a checked plan of the run: game, vehicles and folder."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+import contextlib
 from dataclasses import dataclass, replace
 from datetime import datetime
+from errno import ENOTDIR
+import os
 from pathlib import Path
 
 from crgame_ros.cockpit.access import check_address
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
+from crgame_ros.game.events import PlannerSwap
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
+from crgame_ros.game.game_file import dump_game, load_game
 from crgame_ros.launcher.arguments import RunRequest
-from crgame_ros.paths import default_game
-from crgame_ros.planner.registry import create_planner, EXTERNAL
+from crgame_ros.paths import check_room, default_game
+from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
 from crgame_ros.recording.recorded_game import read_recorded_game
-from crgame_ros.scenario import guard
-from crgame_ros.scenario.checked_values import build
-from crgame_ros.scenario.events import PlannerSwap
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, TimingSpec
-from crgame_ros.scenario.game_file import dump_game, load_game
-from crgame_ros.scenario.recorded_humans import plays_its_humans
-from crgame_ros.simulation.event_check import check_swap
-from crgame_ros.simulation.replay import (
+from crgame_ros.recording.recorded_inputs import (
     recorded_inputs,
     replay_notices,
     with_replayed_events,
 )
+from crgame_ros.scenario import guard
+from crgame_ros.scenario.recorded_humans import plays_its_humans
+from crgame_ros.schema.reading import read
+from crgame_ros.simulation.event_check import check_swap
 from crgame_ros.simulation.setup import build_setup, Setup
+
+CLAIM = '.started'
 
 
 @dataclass(frozen=True)
@@ -44,23 +61,28 @@ class RunPlan:
     folder: Path
 
     @property
+    def claim(self) -> Path:
+        """Name the file that says, while the run goes on, that the folder is its own."""
+        return self.folder / CLAIM
+
+    @property
     def game_file(self) -> Path:
-        """The game as it is run, in the run's folder."""
+        """Name the game as it is run, in the run's folder."""
         return self.folder / 'game.yaml'
 
     @property
     def cockpit(self) -> Path:
-        """What people upload and choose in the cockpit."""
+        """Name the folder of what people upload and choose in the cockpit."""
         return self.folder / 'cockpit'
 
     @property
     def roster(self) -> Path:
-        """The vehicles of the game that runs now, while it runs."""
+        """Name the file of the vehicles of the game that runs now, while it runs."""
         return self.folder / '.roster.json'
 
     @property
     def bag(self) -> Path:
-        """The recording."""
+        """Name the recording."""
         return self.folder / 'bag'
 
 
@@ -98,7 +120,7 @@ def _with_limits(game: Game, request: RunRequest) -> Game:
     if request.duration_s is not None:
         game = replace(game, duration=request.duration_s)
     if request.rate_hz is not None:
-        timing = build(TimingSpec, {**vars(game.timing), 'rate': request.rate_hz}, '--rate')
+        timing = read(TimingSpec, {**vars(game.timing), 'rate': request.rate_hz}, '--rate')
         game = replace(game, timing=timing)
     return game
 
@@ -113,16 +135,31 @@ def effective_setup(request: RunRequest) -> Setup:
         together.
     """
     bag = _own_recording(request)
-    if bag is None:
-        setup = build_setup(effective_game(request))
-    else:
-        recorded = read_recorded_game(bag, other_planners=bool(request.planners))
-        setup = build_setup(_with_limits(recorded.game, request), recorded.loaded)
-    setup = with_replayed_events(with_planners(setup, request.planners))
+    with naming(request):
+        if bag is None:
+            setup = build_setup(effective_game(request))
+        else:
+            recorded = read_recorded_game(bag, other_planners=bool(request.planners))
+            setup = build_setup(_with_limits(recorded.game, request), recorded.loaded)
+        setup = with_replayed_events(with_planners(setup, request.planners))
     notices = [*setup.notices, *replay_notices(setup)]
     if bag is not None:
         notices.append(f'{bag}: this is the game of the recording')
     return replace(setup, notices=tuple(notices))
+
+
+@contextlib.contextmanager
+def naming(request: RunRequest) -> Iterator[None]:
+    """Let refusals that name no file name the one in which the game stands."""
+    file = _own_recording(request) or request.game
+    try:
+        yield
+    except InputError as error:
+        if file is None or '/' in error.where or file.name in str(error) \
+                or error.where.startswith('--'):
+            raise
+        place = f'{file}: {error.where}' if error.where else str(file)
+        raise InputError(error.what, place, error.remedy) from error
 
 
 def _own_recording(request: RunRequest) -> Path | None:
@@ -149,6 +186,22 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
     :raises InputError: if anything cannot be used.
     """
     setup = effective_setup(request)
+    with naming(request):
+        _check_run(request, setup)
+    folder = _make_folder(request.out, setup.loaded.benchmark_id, now())
+    try:
+        check_room(folder)
+        return _plan_in(folder, request, setup)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            (folder / CLAIM).unlink()
+            # Empty, unless it was there before.
+            folder.rmdir()
+        raise InputError(f'cannot be written to ({error.strerror})', str(folder),
+                         'free some space, or choose another folder with --out') from error
+
+
+def _check_run(request: RunRequest, setup: Setup) -> None:
     recorded_inputs(setup)
     if request.headless and any(human.driver == COCKPIT for human in setup.humans):
         raise InputError('nobody can take a seat in the browser', '--headless',
@@ -158,7 +211,10 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
     _check_swaps(setup)
     if not request.headless:
         check_address(request.listen or '127.0.0.1', request.port)
-    folder = _make_folder(request.out, setup.loaded.benchmark_id, now())
+
+
+def _plan_in(folder: Path, request: RunRequest, setup: Setup) -> RunPlan:
+    """Write what the nodes read into the folder of the run."""
     if _own_recording(request) is not None:
         # The nodes read files: this run's folder gets the scenario that the recording carries.
         scenario = folder / 'scenario.xml'
@@ -204,15 +260,23 @@ def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
 
 
 def _make_folder(out: Path | None, benchmark_id: str, now: datetime) -> Path:
-    folder = out if out is not None else Path('runs') / f'{now:%Y%m%d-%H%M%S}_{benchmark_id}'
-    number = 1
-    while out is None and folder.exists():
-        number += 1
-        folder = folder.with_name(f'{now:%Y%m%d-%H%M%S}_{benchmark_id}_{number}')
-    if (folder / 'bag').exists():
-        raise InputError('holds a recording already', str(folder), 'choose another folder')
+    """Make a folder of its own for the run: what is there already stays as it is."""
+    wanted = out if out is not None else Path('runs') / f'{now:%Y%m%d-%H%M%S}_{benchmark_id}'
+    folder, number = wanted, 1
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        wanted.parent.mkdir(parents=True, exist_ok=True)
+        while True:
+            with contextlib.suppress(FileExistsError):
+                folder.mkdir()
+            if not folder.is_dir():
+                raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR))
+            with contextlib.suppress(FileExistsError):
+                if not (folder / 'bag').exists():
+                    # Whoever makes this file has the folder: several may start at once.
+                    (folder / CLAIM).touch(exist_ok=False)
+                    break
+            number += 1
+            folder = wanted.with_name(f'{wanted.name}_{number}')
     except OSError as error:
         raise InputError(f'cannot be made ({error.strerror})', str(folder),
                          'choose another folder with --out') from error

@@ -1,30 +1,40 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """driver_node: one human's input, normalised and filtered in simulation time (CRG III-C1)."""
 
-import json
 import select
 import threading
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from crgame_ros.driver.device_map import load_device_map
+from crgame_ros.driver.source import DriverSource, is_replay, JoyDriver, parse_source
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.documents import GameDocument, parse_game_document, parse_seats_document
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.live_driver import live_driver
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
+from crgame_ros.ros.seats import GAME
+from crgame_ros.ros.spinning import spin
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
-
-from crgame_ros.driver.device_map import load_device_map
-from crgame_ros.driver.source import DriverSource, is_replay, JoyDriver, parse_source
-from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.live_driver import live_driver
-from crgame_ros.ros.messages import from_time, to_joy, to_time
-from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.seats import GAME
-from crgame_ros.ros.spinning import spin
-from crgame_ros.simulation.documents import GameDocument, parse_game_document
 
 DEVICE_POLL_S = 0.02
 
@@ -55,7 +65,7 @@ class DriverNode(Node):
         endpoints = Endpoints(self)
         self._commands = endpoints.publisher('/<v>/driver_command', self._vehicle_id)
         self._raw = endpoints.publisher('/<hv>/joy', self._vehicle_id)
-        self._diagnostics = endpoints.publisher('/diagnostics')
+        self._diagnostics = endpoints.diagnostics
         self._lock = threading.Lock()
         self._driver: DriverSource | None = None
         self._game: GameDocument | None = None
@@ -84,20 +94,20 @@ class DriverNode(Node):
     def _on_game(self, message: String) -> None:
         try:
             game = parse_game_document(message.data)
-            entry = game.vehicle(self._vehicle_id)
-            if entry is None:
+            human = game.human(self._vehicle_id)
+            if human is None:
                 self.get_logger().warning(f'{self._vehicle_id} takes no part in this game')
                 driver = None
-            elif not self._choice and is_replay(entry['driver']):
+            elif not self._choice and is_replay(human.driver):
                 self.get_logger().info(f'{self._vehicle_id}: the simulation repeats a recording')
                 driver = None
             else:
-                driver = live_driver(self._choice or entry['driver'],
-                                     '' if self._choice else entry['timeline'],
+                driver = live_driver(self._choice or human.driver,
+                                     '' if self._choice else human.timeline,
                                      self._vehicle_id, self._joy_map,
                                      self.get_logger().warning)
                 self.get_logger().info(
-                    f'{self._vehicle_id}: driven by {self._choice or entry["driver"]}')
+                    f'{self._vehicle_id}: driven by {self._choice or human.driver}')
         except CrgameError as error:
             self.get_logger().error(str(error))
             return
@@ -105,6 +115,7 @@ class DriverNode(Node):
             if self._driver is not None:
                 self._driver.close()
             self._driver, self._game, self._cycle = driver, game, -1
+            self._diagnostics.now_ns = game.scheduler.clock_offset_ns
         if isinstance(driver, JoyDriver) and self._joy_subscription is None:
             self._joy_subscription = self._endpoints.subscription(
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
@@ -112,11 +123,10 @@ class DriverNode(Node):
     def _on_seats(self, message: String) -> None:
         """Fall silent while somebody else has the seat."""
         try:
-            seat = json.loads(message.data).get(self._vehicle_id, {})
-            self._silent = seat.get('source', GAME) != GAME
-        except (AttributeError, RecursionError, ValueError):
-            self.get_logger().warning('/seats is not what the contract says',
-                                      throttle_duration_sec=1.0)
+            seat = parse_seats_document(message.data).get(self._vehicle_id)
+            self._silent = seat is not None and seat['source'] != GAME
+        except InputError as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
 
     def _on_clock(self, message: Clock) -> None:
         """Begin the cycle that the clock has reached."""
@@ -128,6 +138,7 @@ class DriverNode(Node):
             if cycle <= self._cycle:
                 return
             self._cycle = cycle
+            self._diagnostics.now_ns = from_time(message.clock)
             self._driver.poll(time.monotonic())
             self._publish()
 
@@ -181,10 +192,9 @@ class DriverNode(Node):
         self._told = text
         if text:
             self.get_logger().warning(text)
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.ERROR if text else DiagnosticStatus.OK,
-            name=f'driver_node: {self._vehicle_id}', message=text or 'device found')
-        self._diagnostics.publish(DiagnosticArray(status=[status]))
+        self._diagnostics.publish(
+            f'driver_node: {self._vehicle_id}',
+            DiagnosticStatus.ERROR if text else DiagnosticStatus.OK, text or 'device found', {})
 
 
 def main(args: list[str] | None = None) -> None:

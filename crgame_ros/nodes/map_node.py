@@ -1,24 +1,35 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """map_node: the permanent obstacles near the driven vehicles (FS II-A2)."""
 
 from array import array
-from pathlib import Path
 
+from crgame_ros.errors import CrgameError
+from crgame_ros.game.documents import parse_game_document
+from crgame_ros.messages.joint_messages import MAP
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.number_parameters import declare_number
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.spinning import poll
 from nav_msgs.msg import OccupancyGrid as OccupancyGridMessage
 import numpy as np
 from numpy.typing import NDArray
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.node import Node
-
-from crgame_ros.errors import CrgameError
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import MAP
-from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.spinning import poll
-from crgame_ros.scenario.occupancy import OccupancyGrid
-from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
-from crgame_ros.simulation.documents import parse_game_document
 
 PERIOD_S = 0.1
 # Joints of a vehicle in /vehicles/tick_state: x, y, yaw, steering.
@@ -32,10 +43,11 @@ class MapNode(Node):
 
     def __init__(self) -> None:
         super().__init__('map_node')
-        self._reach: float = self.declare_parameter('reach', 60.0, ParameterDescriptor(
-            description='how far around each vehicle the map is published [m]', read_only=True,
-            floating_point_range=[FloatingPointRange(from_value=1.0, to_value=1000.0)])).value
+        self._reach = declare_number(
+            self, 'reach', 60.0, 'how far around each vehicle the map is published [m]',
+            (1.0, 1000.0))
         endpoints = Endpoints(self)
+        self._diagnostics = endpoints.diagnostics
         self._games = endpoints.polled('/scenario/game')
         self._states = endpoints.polled('/vehicles/tick_state', depth=1)
         self._publisher = endpoints.publisher('/occupancy')
@@ -53,6 +65,8 @@ class MapNode(Node):
             if message is not None:
                 self._open(message.data)
             message = self._states.latest()
+            if message is not None:
+                self._diagnostics.now_ns = from_time(message.header.stamp)
             if message is not None and self._map is not None:
                 points = np.array(message.points[0].positions).reshape(-1, JOINTS)[:, :2]
                 self._publish(self._near(self._map, points) or NOTHING)
@@ -62,11 +76,11 @@ class MapNode(Node):
 
     def _open(self, text: str) -> None:
         """Open the map of a new game; the one before is forgotten even if it is the same file."""
-        path = parse_game_document(text).content.get('occupancy')
+        path = parse_game_document(text).occupancy
         if path is None:
             self._clear()
         else:
-            self._map = TiledOccupancy(Path(path))
+            self._map = TiledOccupancy(path)
 
     def _clear(self) -> None:
         """Take back what was published."""

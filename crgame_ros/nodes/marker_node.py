@@ -1,42 +1,56 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """marker_node: the scene as markers for RViz and Foxglove, while somebody looks at them."""
 
-import json
+from contextlib import suppress
 import time
 
-import numpy as np
-from rclpy.node import Node
-
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.planner.joints import (
-    object_joint_names,
-    vehicle_joint_names,
-    vehicles_from_joints,
-)
+from crgame_ros.game.documents import parse_signals_document
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.world_messages import WorldMessages
+from crgame_ros.nodes.markers.markers import SceneMarkers
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.markers import SceneMarkers
-from crgame_ros.ros.messages import from_joint_trajectory, from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
-from crgame_ros.scenario.objects import ObjectStates
+from crgame_ros.ros.transforms import Transforms
+import numpy as np
+from rclpy.node import Node
 
 PERIOD_S = 0.05
 # While nothing moves, the same is sent so often: markers that nobody renews vanish.
 KEEP_ALIVE_S = 1.0
 LOOK_S = 0.25
-# Of who has just been seen, writer and reader may not have met: the map is sent twice, after [s].
-MAP_AFTER_S = (0.1, 1.1)
+# Of who has just been seen, writer and reader may not have met, which takes seconds on a machine
+# with nothing to spare: the map is sent more than once, after [s].
+MAP_AFTER_S = (0.1, 1.1, 5.1)
 
 
 class MarkerNode(Node):
-    """Draws nothing, and reads nothing, while nobody subscribes to `/markers`."""
+    """Draws nothing, and reads nothing, while nobody subscribes to `/markers` or `/tf`."""
 
     def __init__(self) -> None:
         super().__init__('marker_node')
         self._endpoints = Endpoints(self)
         self._markers = self._endpoints.publisher('/markers')
+        self._transforms = Transforms(self._endpoints)
+        if not self._transforms.available:
+            self.get_logger().info('no /tf: the package tf2_msgs is not installed')
         self._documents = ScenarioDocuments(self._endpoints)
         self._objects = self._endpoints.polled('/traffic/objects', depth=1)
         self._signals = self._endpoints.polled('/scenario/signals')
@@ -46,11 +60,11 @@ class MarkerNode(Node):
         self._paths: dict[str, tuple[PolledSubscription, PolledSubscription]] = {}
         self._set: ScenarioSet | None = None
         self._scene: SceneMarkers | None = None
-        self._vehicle_names: list[str] = []
-        self._object_names: list[str] = []
         self._light_states: dict[str, str] = {}
         self._skipped = False
         self._clear = True
+        self._time = RunTime()
+        self._awaited = GameAwaited(self, 'there is nothing to draw')
         self._known: set[bytes] = set()
         self._looked_s = -np.inf
         self._sent_s = -np.inf
@@ -61,7 +75,7 @@ class MarkerNode(Node):
         poll(self, stop, PERIOD_S, self._work)
 
     def _work(self) -> None:
-        if not self._markers.get_subscription_count():
+        if not (self._markers.get_subscription_count() or self._transforms.wanted):
             self._rest()
             return
         if (order := self._orders.latest()) is not None:
@@ -72,6 +86,7 @@ class MarkerNode(Node):
             self._states = self._endpoints.polled('/vehicles/state', depth=1)
         self._take_documents()
         if self._scene is None or self._set is None:
+            self._awaited.look(False, self._states.take() is not None)
             return
         now_s = time.monotonic()
         self._look_for_newcomers(now_s)
@@ -113,19 +128,19 @@ class MarkerNode(Node):
             self._scene = None
             self.get_logger().error(str(error))
         if self._scene is not None and self._set is not None and not self._paths:
-            self._paths = {entry['id']: (self._endpoints.polled('/<av>/plan', entry['id']),
-                                         self._endpoints.polled('/<av>/plan_request', entry['id']))
-                           for entry in self._set.game.avs}
+            self._paths = {av.id: (self._endpoints.polled('/<av>/plan', av.id),
+                                   self._endpoints.polled('/<av>/plan_request', av.id))
+                           for av in self._set.game.avs}
 
     def _begin(self, documents: ScenarioSet) -> None:
         self._start_over()
         self._set, self._scene = documents, SceneMarkers(documents)
+        self._time = RunTime()
         self._scene.set_signals(self._light_states)
-        self._vehicle_names = [name for item in documents.driven
-                               for name in vehicle_joint_names(item.id)]
-        self._object_names = [name for item in documents.others
-                              for name in object_joint_names(item.id)]
+        self._reader = WorldMessages(documents.objects)
         self._clear = True
+        self._transforms.place_sensors(documents.game.avs,
+                                       documents.game.scheduler.clock_offset_ns)
 
     def _look_for_newcomers(self, now_s: float) -> None:
         """Have the map sent to whoever was not there before."""
@@ -145,23 +160,27 @@ class MarkerNode(Node):
             self._read_signals(signals.data)
             scene.set_signals(self._light_states)
         message = self._objects.latest()
-        if message is not None and message.joint_names == self._object_names \
-                and from_time(message.header.stamp) >= offset_ns:
-            point = message.points[0]
-            scene.set_objects(
-                ObjectStates(np.array(point.positions).reshape(-1, 3),
-                             np.array(point.velocities).reshape(-1, 3)),
-                from_time(message.header.stamp))
+        if message is not None and from_time(message.header.stamp) >= offset_ns:
+            # Those of the game before or after this one are passed over.
+            with suppress(InputError):
+                scene.set_objects(self._reader.object_states(message),
+                                  from_time(message.header.stamp))
         message = None if self._states is None else self._states.latest()
-        # Those of the game before or after this one are passed over.
-        if message is None or message.joint_names != self._vehicle_names \
-                or from_time(message.header.stamp) < offset_ns:
+        if message is not None \
+                and self._time.follow(from_time(message.header.stamp)) is TimeCourse.BACK:
+            # A recording that is played once more: viewers forget what they were shown.
+            self._begin(documents)
             return False
-        point = message.points[0]
-        scene.set_vehicles(
-            vehicles_from_joints(*(np.array(values).reshape(-1, 4) for values in (
-                point.positions, point.velocities, point.accelerations))),
-            from_time(message.header.stamp))
+        if message is None or from_time(message.header.stamp) < offset_ns:
+            return False
+        try:
+            states = self._reader.vehicle_states(message)
+        except InputError:
+            return False
+        stamp_ns = self._endpoints.diagnostics.now_ns = from_time(message.header.stamp)
+        scene.set_vehicles(states, stamp_ns)
+        self._transforms.place_vehicles([item.id for item in documents.driven],
+                                        states[:, :3].tolist(), stamp_ns)
         return True
 
     def _take_paths(self, scene: SceneMarkers) -> None:
@@ -178,11 +197,9 @@ class MarkerNode(Node):
 
     def _read_signals(self, text: str) -> None:
         try:
-            states = json.loads(text)['states']
-            self._light_states = {str(light): str(state) for light, state in states.items()}
-        except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
-            self.get_logger().error(
-                f'/scenario/signals: is no list of states ({type(error).__name__}: {error})')
+            _, self._light_states = parse_signals_document(text)
+        except InputError as error:
+            self.get_logger().error(str(error))
 
 
 def main(args: list[str] | None = None) -> None:

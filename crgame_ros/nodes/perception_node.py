@@ -1,32 +1,41 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """perception_node: what one AV perceives of the true world (FS II-B)."""
 
 import gc
 import math
-from pathlib import Path
 import time
 
-from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.node import Node
-
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.joints import JointSeries
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
 from crgame_ros.perception.perception import Perception
-from crgame_ros.perception.spec import parse_perception
-from crgame_ros.planner.joints import JointSeries
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_joint_trajectory, SeriesMessage
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.node_report import NodeReport
 from crgame_ros.ros.perception_messages import LocalizationMessage, ScanMessages
+from crgame_ros.ros.ros_messages import SeriesMessage
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
+from crgame_ros.ros.trusted_code import trust_code
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.simulation.av_models import make_perception
-from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
 
 PERIOD_S = 0.002
 COLLECT_EVERY = 100
@@ -40,9 +49,10 @@ class PerceptionNode(Node):
         self._vehicle_id: str = self.declare_parameter(
             'vehicle', 'av0', ParameterDescriptor(
                 description='id of the AV that perceives', read_only=True)).value
+        trust_code(self)
         endpoints = Endpoints(self)
         self._documents = ScenarioDocuments(endpoints)
-        self._world = WorldFollower(endpoints, '/vehicles/state')
+        self._world = WorldFollower(endpoints, '/vehicles/state', self._forget)
         self._true = endpoints.polled('/<av>/true_request', self._vehicle_id)
         self._perceived = endpoints.publisher('/<av>/plan_request', self._vehicle_id)
         self._localization = LocalizationMessage(endpoints, self._vehicle_id)
@@ -63,8 +73,8 @@ class PerceptionNode(Node):
         try:
             scenario = self._documents.poll()
             if scenario is not None:
-                self._scenario, self._perception, self._asked = scenario, None, None
-                self._n = -1
+                self._scenario = scenario
+                self._forget()
                 self._world.begin(scenario)
             message = self._true.latest()
             if message is not None:
@@ -75,6 +85,11 @@ class PerceptionNode(Node):
             self._answer()
         except CrgameError as error:
             self.get_logger().error(f'{self._vehicle_id}: {error}', throttle_duration_sec=1.0)
+
+    def _forget(self) -> None:
+        """Begin a run, or the same one anew."""
+        self._perception, self._asked = None, None
+        self._n = -1
 
     def _observe(self, step: WorldStep) -> None:
         """Look at the true world at one step."""
@@ -115,15 +130,14 @@ class PerceptionNode(Node):
     def _made(self, scenario: ScenarioSet, initial: VehicleState) -> Perception | None:
         """Make the perception of a new run, from where the AV is now; None if it has none."""
         game = scenario.game
-        entry = game.vehicle(self._vehicle_id)
-        if entry is None or entry.get('perception') is None:
+        av = game.av(self._vehicle_id)
+        if av is None or av.perception is None:
             return None
-        spec = parse_perception(entry['perception'], '/scenario/game: perception', Path())
-        occupancy = game.content.get('occupancy')
+        spec = av.perception
         perception = make_perception(
-            self._vehicle_id, spec, scenario.objects, VehicleParameters(**entry['vehicle']),
-            RigidTransform(*entry['transform']), initial, int(game.content['seed']),
-            game.scheduler.dt_s, None if occupancy is None else TiledOccupancy(Path(occupancy)))
+            self._vehicle_id, spec, scenario.objects, av.vehicle, av.transform, initial, game.seed,
+            game.scheduler.dt_s,
+            None if game.occupancy is None else TiledOccupancy(game.occupancy))
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -146,8 +160,7 @@ class PerceptionNode(Node):
         except (KeyError, ValueError) as error:
             raise InputError(f'is of another run ({error})',
                              f'/{self._vehicle_id}/true_request') from error
-        if self._message is None or not self._message.fits(request):
-            self._message = SeriesMessage(request.names, request.times_ns)
+        self._message = SeriesMessage.for_series(request, self._message)
         self._perceived.publish(self._message.fill(request))
 
 

@@ -1,33 +1,47 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """planner_node: one AV's planner in its own process (CRG III-B, the worker of algorithm 2)."""
 
 import gc
 import math
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.documents import GameDocument, parse_events_document
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
+from crgame_ros.messages.joints import plan_to_joints
+from crgame_ros.messages.plan import Plan
+from crgame_ros.planner.crew import PlannerCrew
+from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.request_reader import RequestReader
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.ros_messages import SeriesMessage, to_time
+from crgame_ros.ros.run_time import RunTime, TimeCourse, USUAL_NS
+from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
+from crgame_ros.ros.spinning import spin
+from crgame_ros.ros.trusted_code import trust_code
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
-
-from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.planner.crew import PlannerCrew
-from crgame_ros.planner.interface import Plan, PlannerContext
-from crgame_ros.planner.joints import plan_to_joints
-from crgame_ros.planner.request_reader import RequestReader
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_joint_trajectory, MAP, SeriesMessage, to_time
-from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
-from crgame_ros.ros.spinning import spin
-from crgame_ros.scenario.events import FiredEvent
-from crgame_ros.simulation.documents import GameDocument, parse_events_document
-from crgame_ros.vehicle.parameters import VehicleParameters
 
 # Garbage is collected after an answer, never in the middle of planning one.
 COLLECT_EVERY = 10
@@ -45,10 +59,11 @@ class PlannerNode(Node):
             'planner', '', ParameterDescriptor(
                 description='planner instead of the one that the game names',
                 read_only=True)).value
+        trust_code(self, self._choice)
         endpoints = Endpoints(self)
         self._plans = endpoints.publisher('/<av>/plan', self._vehicle_id)
         self._paths = endpoints.publisher('/<av>/plan_path', self._vehicle_id)
-        self._diagnostics = endpoints.publisher('/diagnostics')
+        self._diagnostics, self._refusals = endpoints.diagnostics, endpoints.refusals
         self._documents = DocumentCollector()
         self._game: GameDocument | None = None
         self._transform = RigidTransform(0.0, 0.0, 0.0)
@@ -58,6 +73,8 @@ class PlannerNode(Node):
         self._frames_skipped = False
         self._message: SeriesMessage | None = None
         self._waiting: JointTrajectory | None = None
+        self._scenario: ScenarioSet | None = None
+        self._time = RunTime()
         self._subscriptions_kept = [
             endpoints.subscription('/scenario/xml', self._on_xml),
             endpoints.subscription('/scenario/objects', self._on_objects),
@@ -84,7 +101,7 @@ class PlannerNode(Node):
         try:
             self._events = parse_events_document(message.data)
         except InputError as error:
-            self.get_logger().error(str(error))
+            self._refusals.note('/scenario/events', str(error))
             return
         self._apply_events()
 
@@ -100,7 +117,12 @@ class PlannerNode(Node):
         self._frames_skipped = message.data
 
     def _take_document(self, kind: str, text: str) -> None:
-        self._documents.take(kind, text)
+        try:
+            self._documents.take(kind, text)
+        except InputError as error:
+            # The game before goes on.
+            self._refusals.note(f'/scenario/{kind}', str(error))
+            return
         try:
             scenario = self._documents.complete()
             if scenario is not None:
@@ -116,27 +138,28 @@ class PlannerNode(Node):
     def _prepare(self, scenario: ScenarioSet) -> None:
         """Set the planner up for documents that belong together."""
         game, loaded = scenario.game, scenario.loaded
-        entry = game.vehicle(self._vehicle_id)
-        if entry is None:
+        self._scenario = scenario
+        self._time = RunTime(max(USUAL_NS, 3 * game.scheduler.time_step_ns))
+        av = game.av(self._vehicle_id)
+        if av is None:
             self._crew = None
             self.get_logger().warning(f'{self._vehicle_id} takes no part in this game: waiting')
             return
         objects = {item.id: item for item in scenario.objects}
         problem = next((problem for problem in loaded.planning_problems
-                        if problem.planning_problem_id == entry['planning_problem']), None)
+                        if problem.planning_problem_id == av.planning_problem), None)
         if problem is None:
-            raise InputError(f'planning problem {entry["planning_problem"]} is not in it',
+            raise InputError(f'planning problem {av.planning_problem} is not in it',
                              '/scenario/xml')
-        name = self._choice or entry['planner']
-        options = {} if self._choice and self._choice != entry['planner'] else entry['options']
+        name = self._choice or av.planner
+        options = {} if self._choice and self._choice != av.planner else dict(av.options)
         context = PlannerContext(
-            self._vehicle_id, loaded.scenario, problem, VehicleParameters(**entry['vehicle']),
-            objects, game.scheduler.time_step_s, game.scheduler.k0, int(game.content['seed']),
-            game.drivability.road)
+            self._vehicle_id, loaded.scenario, problem, av.vehicle, objects,
+            game.scheduler.time_step_s, game.scheduler.k0, game.seed, game.drivability.road)
         crew = PlannerCrew(context, name, options, game.events, time.perf_counter)
         self._reader = RequestReader(self._vehicle_id, objects, game.scheduler)
         self._crew, self._game = crew, game
-        self._transform = RigidTransform(*entry['transform'])
+        self._transform = av.transform
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -158,10 +181,16 @@ class PlannerNode(Node):
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
             self._waiting = message
             return
+        course = self._time.follow(request.stamp_ns)
+        if course is TimeCourse.BEHIND:
+            return
+        if course is TimeCourse.BACK and self._scenario is not None:
+            # A recording that is played once more: the planner knows nothing of it yet.
+            self._prepare(self._scenario)
+        self._diagnostics.now_ns = request.stamp_ns
         plan = self._crew.plan(request)
         series = plan_to_joints(plan, self._vehicle_id, self._game.scheduler.time_step_ns)
-        if self._message is None or not self._message.fits(series):
-            self._message = SeriesMessage(series.names, series.times_ns)
+        self._message = SeriesMessage.for_series(series, self._message)
         self._plans.publish(self._message.fill(series))
         if not self._frames_skipped and self._paths.get_subscription_count():
             self._paths.publish(_path(plan, self._transform))
@@ -175,17 +204,13 @@ class PlannerNode(Node):
         statistics = self._crew.statistics
         if not plan.fallback and statistics.plans % 10:
             return
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if plan.fallback else DiagnosticStatus.OK,
-            name=f'planner_node: {self._vehicle_id}',
-            message=f'braking: {self._crew.last_reason}' if plan.fallback else 'planning')
-        times = statistics.durations_s
-        status.values = [KeyValue(key=key, value=str(value)) for key, value in (
-            ('k', k), ('plans', statistics.plans), ('fallbacks', statistics.fallbacks),
-            ('plan_time_ms', f'{times[-1] * 1e3:.3f}'), ('planner', self._crew.name))]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = to_time(plan.stamp_ns)
-        self._diagnostics.publish(message)
+        self._diagnostics.publish(
+            f'planner_node: {self._vehicle_id}',
+            DiagnosticStatus.WARN if plan.fallback else DiagnosticStatus.OK,
+            f'braking: {self._crew.last_reason}' if plan.fallback else 'planning',
+            {'k': k, 'plans': statistics.plans, 'fallbacks': statistics.fallbacks,
+             'plan_time_ms': f'{statistics.durations_s[-1] * 1e3:.3f}',
+             'planner': self._crew.name})
 
 
 def _path(plan: Plan, transform: RigidTransform) -> Path:

@@ -1,28 +1,44 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """recorder_node: every recorded topic of the contract, raw, into MCAP; one bag a run."""
 
+from collections import deque
 from dataclasses import dataclass
+import math
 from pathlib import Path
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.node import Node
-from rclpy.serialization import deserialize_message
-from std_msgs.msg import String
-
 from crgame_ros.errors import CrgameError
+from crgame_ros.game.documents import GAME_TOPIC, parse_game_document
+from crgame_ros.messages.cdr import header_stamp_ns
+from crgame_ros.messages.contract import load_contract, Topic
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.recording.writer import BagWriter
-from crgame_ros.ros.contract import load_contract, Topic
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.messages import from_time
+from crgame_ros.ros.heard_topics import OFFSET, RECORDED
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.spinning import poll
-from crgame_ros.simulation.documents import GAME_TOPIC, parse_game_document
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import String
 
 PERIOD_S = 0.01
 REPORT_S = 1.0
@@ -31,6 +47,9 @@ QUEUE_DEPTH = 2000
 DIAGNOSTICS_TOPIC = '/diagnostics'
 # After a run has ended, what the others said last is taken in [s].
 DRAIN_S = 0.3
+# A simulation that says nothing for so long has ended, or stands still [s].
+SILENCE_S = 2.0
+CLOCK_TOPIC = '/clock'
 
 
 @dataclass
@@ -60,14 +79,22 @@ class RecorderNode(Node):
                 'run_2, run_3, … beside it',
                 read_only=True)).value)
         self._endpoints = Endpoints(self)
-        self._diagnostics = self._endpoints.publisher('/diagnostics')
         self._topics: dict[str, RecordedTopic] = {}
         self._writer: BagWriter | None = None
         self._offset_ns = 0
         self._ended_s: float | None = None
         self._closed: dict[str, int] | None = None
         self._game_text = b''
+        # Topics of which there is a message in this bag, and whether all of them have been told.
+        self._recorded: set[str] = set()
+        self._recorded_told = True
+        self._heard_s = -math.inf
         self._report_s = 0.0
+        self._time = RunTime()
+        # Messages of which it is not certain yet to which run they belong, and of no run yet.
+        self._held: list[tuple[RecordedTopic, bytes, int, int]] | None = None
+        self._early: deque[tuple[RecordedTopic, bytes, int, int]] = deque(maxlen=QUEUE_DEPTH)
+        self._awaited = GameAwaited(self, 'nothing is recorded')
         self._subscribe((), ())
 
     def _subscribe(self, humans: tuple[str, ...], avs: tuple[str, ...]) -> None:
@@ -78,7 +105,7 @@ class RecorderNode(Node):
                 if name in self._topics:
                     continue
                 vehicle = '' if topic.placeholder is None else name.split('/')[1]
-                slot = self._endpoints.polled(topic.name, vehicle, raw=True,
+                slot = self._endpoints.polled(topic.name, vehicle, verify=True,
                                               depth=max(QUEUE_DEPTH, topic.qos.depth))
                 self._topics[name] = RecordedTopic(topic, name, slot)
 
@@ -96,6 +123,8 @@ class RecorderNode(Node):
             for recorded in list(self._topics.values()):
                 if not recorded.latched:
                     self._take(recorded)
+        else:
+            self._take(self._topics[CLOCK_TOPIC])
         # The game comes last of them: a new bag then begins with the documents that belong to it.
         latched = [recorded for recorded in self._topics.values() if recorded.latched]
         for recorded in sorted(latched, key=lambda item: item.name == GAME_TOPIC):
@@ -107,9 +136,17 @@ class RecorderNode(Node):
                 self._tell(error)
             if self._ended_s is not None and time.monotonic() - self._ended_s > DRAIN_S:
                 self._close()
+        if not self._recorded_told:
+            self._tell_recorded()
         if time.monotonic() - self._report_s > REPORT_S:
             self._report_s = time.monotonic()
             self._report(self._writer)
+
+    def _tell_recorded(self) -> None:
+        """Tell whose messages arrive here: a run begins when everybody's do."""
+        self._recorded_told = True
+        self._publish_status(DiagnosticStatus.OK, RECORDED, {
+            OFFSET: self._offset_ns, **dict.fromkeys(sorted(self._recorded), 1)}, RECORDED)
 
     def _report(self, writer: BagWriter | None) -> None:
         """Tell how the recording is going, or that it is done."""
@@ -123,10 +160,9 @@ class RecorderNode(Node):
             str(writer.failed) if failed else f'recording into {writer.folder.name}',
             {'messages': writer.message_count, 'bytes': writer.bytes_written})
 
-    def _publish_status(self, level: bytes, text: str, values: dict[str, int]) -> None:
-        status = DiagnosticStatus(level=level, name='recorder_node: recording', message=text)
-        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
-        self._diagnostics.publish(DiagnosticArray(status=[status]))
+    def _publish_status(self, level: bytes, text: str, values: dict[str, int],
+                        subject: str = 'recording') -> None:
+        self._endpoints.diagnostics.publish(f'recorder_node: {subject}', level, text, values)
 
     def _take(self, recorded: RecordedTopic) -> None:
         while (taken := recorded.slot.take_timed()) is not None:
@@ -136,10 +172,31 @@ class RecorderNode(Node):
                 if recorded.name == GAME_TOPIC and data != self._game_text:
                     self._begin_bag(data)
                     continue
+            elif recorded.name == CLOCK_TOPIC:
+                self._heard_s = time.monotonic()
+                stamp_ns = header_stamp_ns(data)
+                self._endpoints.diagnostics.now_ns = stamp_ns
+                self._follow(stamp_ns)
             elif recorded.name == DIAGNOSTICS_TOPIC and b'sim_node: run' in data \
                     and b'ended' in data:
                 self._take_end(data)
             self._write(recorded, data, published_ns, received_ns)
+
+    def _follow(self, clock_ns: int) -> None:
+        """Open another bag where time has run back: a recording is played once more."""
+        self._awaited.look(bool(self._game_text), True)
+        course = self._time.follow(clock_ns)
+        if course is TimeCourse.BEHIND:
+            # Until it is certain to which run it belongs.
+            self._held = [] if self._held is None else self._held
+            return
+        held, self._held = self._held or [], None
+        if course is TimeCourse.BACK and self._game_text:
+            self.get_logger().info('time has run back: what comes now is another run')
+            self._ended_s = time.monotonic()
+            self._begin_bag(self._game_text)
+        for item in held:
+            self._write(*item)
 
     def _take_end(self, data: bytes) -> None:
         """Note that the run has ended; an end that is told late may be that of the run before."""
@@ -155,12 +212,21 @@ class RecorderNode(Node):
         try:
             # Before the bag is closed: what is no game must not end its recording.
             game = parse_game_document(deserialize_message(game_data, String).data)
+            offset_ns = game.scheduler.clock_offset_ns
+            if offset_ns <= self._offset_ns and self._goes_on:
+                self._endpoints.refusals.note(
+                    GAME_TOPIC, f'{GAME_TOPIC}: another game of a run that goes on')
+                return
             self._close()
-            self._subscribe(tuple(entry['id'] for entry in game.humans),
-                            tuple(entry['id'] for entry in game.avs))
+            # Before its first cycle: what is told of this recording is not of the run before.
+            self._endpoints.diagnostics.now_ns = offset_ns
+            self._subscribe(tuple(item.id for item in game.humans),
+                            tuple(item.id for item in game.avs))
             self._writer = BagWriter(self._folder_of(game.epoch), now_ns=time.monotonic_ns)
-            self._offset_ns, self._ended_s = game.scheduler.clock_offset_ns, None
+            self._offset_ns, self._ended_s = offset_ns, None
+            self._time = RunTime()
             self._closed = None
+            self._recorded.clear()
             for recorded in self._topics.values():
                 qos = recorded.topic.qos
                 recorded.channel = self._writer.add_topic(
@@ -171,8 +237,16 @@ class RecorderNode(Node):
             for recorded in self._topics.values():
                 if recorded.latest is not None:
                     self._write(recorded, recorded.latest[0], recorded.latest[1], now_ns)
+            while self._early:
+                self._write(*self._early.popleft())
         except CrgameError as error:
             self._tell(error)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Whether a run is being recorded, and its simulation has been heard just now."""
+        return self._writer is not None and self._ended_s is None \
+            and time.monotonic() - self._heard_s < SILENCE_S
 
     def _folder_of(self, epoch: int) -> Path:
         """Choose a folder; a simulation that was started again begins with the first run anew."""
@@ -185,10 +259,19 @@ class RecorderNode(Node):
 
     def _write(self, recorded: RecordedTopic, data: bytes, published_ns: int,
                received_ns: int) -> None:
+        if self._held is not None:
+            self._held.append((recorded, data, published_ns, received_ns))
+            return
+        if self._writer is None and recorded.name == CLOCK_TOPIC:
+            # Looked at early; it belongs to the bag that is opened next.
+            self._early.append((recorded, data, published_ns, received_ns))
         if self._writer is None or self._writer.failed is not None:
             return
         try:
             self._writer.write(recorded.channel, data, received_ns, published_ns)
+            if recorded.name not in self._recorded:
+                self._recorded.add(recorded.name)
+                self._recorded_told = False
         except RecordingError as error:
             self._tell(error)
 

@@ -1,35 +1,51 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """sim_node: paces the simulation against the wall clock (CRG algorithms 1 and 2, live)."""
 
+from contextlib import nullcontext
 from dataclasses import asdict
 import json
 import os
+import time
 from typing import TYPE_CHECKING
-
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 
 from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.errors import CrgameError
+from crgame_ros.game.game import Game
+from crgame_ros.game.game_file import dump_game
+from crgame_ros.nodes.sim.live_run import LiveRun, Outcome
+from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.recording.run_folder import run_folder
-from crgame_ros.ros.live_run import LiveRun, Outcome
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.sim_control import SimControl
-from crgame_ros.scenario.game import Game
-from crgame_ros.scenario.game_file import dump_game
+from crgame_ros.ros.other_simulation import refuse_another
+from crgame_ros.ros.place import held
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.timing.time_slice import shorten_time_slice
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 
-# Recordings are read in few runs, by code that takes time to load.
-if TYPE_CHECKING:
-    from crgame_ros.simulation.replay import RecordedInputs
+if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
+    from crgame_ros.recording.recorded_inputs import RecordedInputs
 
 NS_PER_S = 1_000_000_000
 # /clock starts here: ROS takes a time of zero for "no clock yet".
 FIRST_OFFSET_NS = NS_PER_S
 REALTIME_PRIORITY = 50
+# Within such a time nodes know of each other [s].
+DISCOVERY_S = 2.0
 
 
 class SimNode(Node):
@@ -41,10 +57,21 @@ class SimNode(Node):
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self)
         self._recorded: RecordedInputs | None = None
+        self._created_s = time.monotonic()
 
     def run(self, stop: StopFlag) -> None:
         """Run until the game ends or a stop is asked for."""
+        # A launcher holds the place of those that it started.
+        place = held(str(self.context.get_domain_id()), self.get_namespace()) \
+            if self._control.roster is None else nullcontext()
+        with place:
+            self._run(stop)
+
+    def _run(self, stop: StopFlag) -> None:
         setup = self._told(build_setup(self._control.first_game()))
+        # Of others that it started a launcher knows.
+        refuse_another(self, self._created_s + (DISCOVERY_S if self._control.roster is None
+                                                else 0.0))
         if self._control.wants_realtime_priority:
             self._raise_priority()
         else:
@@ -99,7 +126,7 @@ class SimNode(Node):
         """Read whole what repeats a recording, before the run: its loop opens no file."""
         if not any(is_replay(human.driver) for human in setup.humans):
             return None
-        from crgame_ros.simulation.replay import recorded_inputs
+        from crgame_ros.recording.recorded_inputs import recorded_inputs
         return recorded_inputs(setup)
 
     def _write_roster(self, setup: Setup) -> None:

@@ -1,22 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """timesync_node: the time-sync supervisor; computes CRG table I live and orders frame skipping."""
 
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.node import Node
-from std_msgs.msg import Bool
-
-from crgame_ros.errors import CrgameError
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.documents import GameDocument, parse_game_document
+from crgame_ros.game.game import TimingSpec
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.spinning import poll
-from crgame_ros.scenario.game import TimingSpec
-from crgame_ros.simulation.documents import GameDocument, parse_game_document
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.timing.frame_skipping import FrameSkipping
 from crgame_ros.timing.timing_metrics import TimingMetrics
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
+from std_msgs.msg import Bool
 
 PERIOD_S = 0.02
 REPORT_S = 1.0
@@ -29,12 +41,15 @@ class TimesyncNode(Node):
         super().__init__('timesync_node')
         endpoints = Endpoints(self)
         self._cycles = endpoints.polled('/timing/cycle')
+        self._refusals = endpoints.refusals
         self._games = endpoints.polled('/scenario/game')
-        self._diagnostics = endpoints.publisher('/diagnostics')
+        self._diagnostics = endpoints.diagnostics
         self._orders = endpoints.publisher('/timing/frame_skip')
         self._game: GameDocument | None = None
         self._metrics: TimingMetrics | None = None
         self._skipping = FrameSkipping(TimingSpec())
+        self._time = RunTime()
+        self._awaited = GameAwaited(self, 'nothing is measured')
         self._report_s = 0.0
 
     def run(self, stop: StopFlag) -> None:
@@ -46,24 +61,42 @@ class TimesyncNode(Node):
         if message is not None:
             self._begin(message.data)
         while (message := self._cycles.take()) is not None:
-            table = CycleTable.from_message(message.layout.dim[1].label, message.data)
-            if self._game is not None and self._metrics is not None \
-                    and table.epoch == self._game.epoch:
-                self._metrics.add_rows(table.timing_rows())
-                self._order(table.column('cumulative_error_s')[-1])
+            try:
+                self._add(CycleTable.from_message(message.layout.dim[1].label, message.data))
+            except InputError as error:
+                self._refusals.note('/timing/cycle', str(error))
         if self._metrics is not None and time.monotonic() - self._report_s > REPORT_S:
             self._report_s = time.monotonic()
             self._report(self._metrics)
 
+    def _add(self, table: CycleTable) -> None:
+        self._awaited.look(self._game is not None, True)
+        if self._game is None or self._metrics is None or table.epoch != self._game.epoch:
+            return
+        stamp_ns = self._game.scheduler.stamp_ns(int(table.column('n')[-1]))
+        course = self._time.follow(stamp_ns)
+        if course is TimeCourse.BACK:
+            # A recording that is played once more.
+            self._begin_anew(self._game)
+        if course in (TimeCourse.ON, TimeCourse.BACK):
+            self._metrics.add_rows(table.timing_rows())
+            self._order(table.column('cumulative_error_s')[-1])
+            self._diagnostics.now_ns = stamp_ns
+
     def _begin(self, text: str) -> None:
         try:
             self._game = parse_game_document(text)
-            self._metrics = TimingMetrics(self._game.scheduler.dt_s)
-            self._skipping = FrameSkipping(TimingSpec(**self._game.content['timing']))
-            # An order of the run before, or of a supervisor that was killed, ends with it.
-            self._orders.publish(Bool(data=False))
+            self._time = RunTime()
+            self._begin_anew(self._game)
         except (CrgameError, TypeError) as error:
             self.get_logger().error(str(error))
+
+    def _begin_anew(self, game: GameDocument) -> None:
+        """Measure a run from its start."""
+        self._metrics = TimingMetrics(game.scheduler.dt_s)
+        self._skipping = FrameSkipping(game.timing)
+        # An order of the run before, or of a supervisor that was killed, ends with it.
+        self._orders.publish(Bool(data=False))
 
     def _order(self, lag_s: float) -> None:
         """Order frame skipping, or its end (CRG III-A2a, mechanism 2)."""
@@ -75,22 +108,18 @@ class TimesyncNode(Node):
             return
         summary = metrics.summary()
         late = summary.worst_lag_ms > 10.0 * metrics.dt_s * 1e3
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if late or self._skipping.active else DiagnosticStatus.OK,
-            name='timesync_node: table I',
-            message=f'mean step error {summary.mean_step_error_ms:.3f} ms, '
-            f'worst lag {summary.worst_lag_ms:.1f} ms, timeouts {summary.timeout_ratio:.2%}')
         values = summary.as_dict()
         ratios = values.pop('real_time_ratio')
         values.update({f'real_time_ratio_{key}': value for key, value in ratios.items()})
         values['frame_skipping'] = self._skipping.active
         values['frame_skip_orders'] = self._skipping.orders
-        status.values = [
-            KeyValue(key=key, value=f'{value:.6g}' if isinstance(value, float) else str(value))
-            for key, value in values.items()]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+        self._diagnostics.publish(
+            'timesync_node: table I',
+            DiagnosticStatus.WARN if late or self._skipping.active else DiagnosticStatus.OK,
+            f'mean step error {summary.mean_step_error_ms:.3f} ms, '
+            f'worst lag {summary.worst_lag_ms:.1f} ms, timeouts {summary.timeout_ratio:.2%}',
+            {key: f'{value:.6g}' if isinstance(value, float) else value
+             for key, value in values.items()})
 
 
 def main(args: list[str] | None = None) -> None:

@@ -1,36 +1,47 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """traffic_node: reactive traffic in its own process (FS III)."""
 
 import gc
-from pathlib import Path
 import time
 
-import numpy as np
-from rclpy.node import Node
-
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.planner.joints import object_joint_names
+from crgame_ros.game.documents import parse_events_document
+from crgame_ros.game.events import FiredEvent, TrafficOrder
+from crgame_ros.game.objects import ObjectStates, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.messages.joints import object_joint_names
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import StateMessage
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.node_report import NodeReport
+from crgame_ros.ros.ros_messages import StateMessage
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
+from crgame_ros.ros.trusted_code import trust_code
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.scenario.events import FiredEvent, TrafficOrder
-from crgame_ros.scenario.objects import ObjectStates, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.signals import TrafficLights
-from crgame_ros.simulation.documents import parse_events_document
 from crgame_ros.simulation.traffic_orders import TrafficOrders
 from crgame_ros.simulation.traffic_setup import make_traffic
 from crgame_ros.simulation.world_reader import WorldReader
-from crgame_ros.traffic.spec import parse_traffic, TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.warm_up import drive_everything
-from crgame_ros.traffic.world import WorldView
+from crgame_ros.traffic.world_view import WorldView
+import numpy as np
+from rclpy.node import Node
 
 PERIOD_S = 0.005
 # Garbage is collected after an answer, never in the middle of one.
@@ -44,9 +55,11 @@ class TrafficNode(Node):
 
     def __init__(self) -> None:
         super().__init__('traffic_node')
+        trust_code(self)
         endpoints = Endpoints(self)
+        self._refusals = endpoints.refusals
         self._documents = ScenarioDocuments(endpoints)
-        self._world = WorldFollower(endpoints, '/vehicles/tick_state')
+        self._world = WorldFollower(endpoints, '/vehicles/tick_state', self._begin_anew)
         self._events = endpoints.polled('/scenario/events')
         self._agents = endpoints.publisher('/traffic/agents')
         self._report = NodeReport(endpoints, 'traffic_node: agents')
@@ -57,7 +70,6 @@ class TrafficNode(Node):
         self._ticks = 0
         self._fired: tuple[int, tuple[FiredEvent, ...]] = (-1, ())
         self._obeyed: set[str] = set()
-        self._warm = False
 
     def run(self, stop: StopFlag) -> None:
         """Follow the world until asked to stop."""
@@ -68,10 +80,10 @@ class TrafficNode(Node):
             scenario = self._documents.poll()
             if scenario is not None:
                 self._begin(scenario)
-            ticks = list(self._world.steps())
             message = self._events.latest()
             if message is not None:
-                self._fired = parse_events_document(message.data)
+                self._take_events(message.data)
+            ticks = list(self._world.steps()) if self._knows_the_events else []
             # A little late, the agents catch up; after a standstill they go on from where they
             # are by now.
             for step in ticks if len(ticks) <= MAX_BEHIND else ticks[-1:]:
@@ -81,18 +93,31 @@ class TrafficNode(Node):
             self._spec = None
             self.get_logger().error(str(error))
 
+    @property
+    def _knows_the_events(self) -> bool:
+        """Whether what events have done in this run has been heard: agents go on by it."""
+        game = self._scenario.game if self._scenario is not None else None
+        return game is None or not game.events or self._fired[0] == game.epoch
+
+    def _begin_anew(self) -> None:
+        """Follow the same run from its start."""
+        if self._scenario is not None:
+            self._begin(self._scenario)
+
+    def _take_events(self, text: str) -> None:
+        try:
+            self._fired = parse_events_document(text)
+        except InputError as error:
+            self._refusals.note('/scenario/events', str(error))
+
     def _begin(self, scenario: ScenarioSet) -> None:
         """Get ready for a run; its agents are made when its world is heard of."""
         self._world.begin(scenario)
         self._scenario, self._traffic, self._spec = scenario, None, None
-        entry = scenario.game.content.get('traffic')
-        if entry is None:
+        self._spec = scenario.game.traffic
+        if self._spec is None:
             return
-        self._spec = parse_traffic(entry, '/scenario/game: traffic', Path())
-        if not self._warm:
-            # Compiled code is loaded when it is first run: a second that no tick has.
-            drive_everything()
-            self._warm = True
+        drive_everything()
         self._orders = TrafficOrders(scenario.loaded, scenario.game.events)
         self._obeyed = set()
         self._network = RoadNetwork(scenario.loaded.scenario.lanelet_network)
@@ -163,7 +188,7 @@ class TrafficNode(Node):
             traffic = make_traffic(
                 self._spec, self._scenario.loaded, self._network, self._reader.others,
                 self._obstacles, self._adopted, view, game.scheduler,
-                int(game.content['seed']))
+                game.seed)
             if tuple(item.id for item in traffic.descriptions) != tuple(
                     item.id for item in self._scenario.objects if item.role is Role.TRAFFIC):
                 raise InputError('has other agents than this version makes',

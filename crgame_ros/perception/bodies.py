@@ -1,15 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The outlines that rays can hit: of everything that can appear, placed in the map."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.objects import ObjectDescription
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -45,7 +56,7 @@ class Discs(NamedTuple):
     body: Index
 
 
-class Bodies:
+class SensedBodies:
     """
     The bodies of everything that can appear: rectangles and polygons as edges, circles as discs.
 
@@ -58,7 +69,7 @@ class Bodies:
         self.count = len(shapes)
         self._discs: Index = np.array(
             [i for i, shape in enumerate(shapes) if shape.kind == 'circle'], dtype=np.intp)
-        cornered = [(i, _corners(shape)) for i, shape in enumerate(shapes)
+        cornered = [(i, outline(shape)) for i, shape in enumerate(shapes)
                     if shape.kind != 'circle']
         counts = [len(corners) for _, corners in cornered]
         starts = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.intp)
@@ -81,7 +92,7 @@ class Bodies:
 
     @property
     def poses(self) -> Array:
-        """The centre poses (M, 3) last given to `place`."""
+        """Give the (M, 3) centre poses last given to `place`."""
         return self._poses
 
     def near(self, x: float, y: float, reach: float) -> tuple[Edges, Discs]:
@@ -92,19 +103,8 @@ class Bodies:
         discs = self._discs[close[self._discs]]
         kept = np.flatnonzero(close[self._body])
         body = self._body[kept]
-        pose, local = self._poses[body], self._local[kept]
-        cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-        corners = np.stack((pose[:, 0] + cos * local[:, 0] - sin * local[:, 1],
-                            pose[:, 1] + sin * local[:, 0] + cos * local[:, 1]), axis=1)
+        corners = placed(self._local[kept, None], self._poses[body])[:, 0]
         place = np.empty(len(self._local), dtype=np.intp)
         place[kept] = np.arange(len(kept))
         edges = Edges(corners, np.arange(len(kept)), place[self._next[kept]], body)
         return edges, Discs(self._poses[discs, :2], self.radii[discs], discs)
-
-
-def _corners(shape: Shape) -> Array:
-    """Give the corners (n, 2) of a rectangle or polygon around its centre [m]."""
-    if shape.kind == 'polygon':
-        return np.array(shape.vertices, dtype=np.float64)
-    return 0.5 * np.array([[shape.length, shape.width], [-shape.length, shape.width],
-                           [-shape.length, -shape.width], [shape.length, -shape.width]])

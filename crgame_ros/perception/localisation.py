@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Imperfect localisation: biased white noise on the truth, and an extended Kalman filter (FS II-B1).
 
@@ -14,19 +26,17 @@ Robotics, 2005, table 3.3). Its noise covariances are those of the noise that is
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from crgame_ros.game.perception_spec import LocalisationSpec
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.perception.noise import KeyedNoise
-from crgame_ros.perception.spec import LocalisationSpec
+from crgame_ros.vehicle.standstill import ENCODER_REST
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
 STATES = 4
-# Wheel encoders see that a vehicle stands: below this speed they err by no more than this [m/s].
-STANDING = 0.01
 # Columns of a step's row of random numbers.
 _HEADING, _SPEED_CHANGE, _WALK, _MEASUREMENT, _WIDTH = 0, 1, 2, 4, 8
 
@@ -69,7 +79,7 @@ class Localisation:
     @property
     def estimate(self) -> VehicleState:
         """
-        The vehicle's state as the filter has it.
+        Give the vehicle's state as the filter has it.
 
         Its speed never has the wrong sign: the gear is known.
         """
@@ -147,7 +157,7 @@ class Localisation:
     def _deviations(self, truth: VehicleState) -> Array:
         """Give the standard deviations (4) of a measurement of x, y, yaw and speed."""
         spec = self._spec
-        speed = min(spec.speed_noise, STANDING) if abs(truth.speed) < STANDING \
+        speed = min(spec.speed_noise, ENCODER_REST) if abs(truth.speed) < ENCODER_REST \
             else spec.speed_noise
         return np.array((spec.position_noise, spec.position_noise, spec.yaw_noise, speed))
 

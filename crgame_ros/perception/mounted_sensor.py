@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A sensor on its vehicle: when it scans, from where, and with what noise."""
 
 from dataclasses import replace
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.errors import InputError
+from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.perception.bodies import Bodies
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.noise import KeyedNoise
 from crgame_ros.perception.sensors import create_sensor, PERMANENT, Pose, Scan
-from crgame_ros.perception.spec import SensorSpec
-from crgame_ros.scenario.occupancy import OccupancyGrid
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -56,8 +67,7 @@ class MountedSensor:
         self.spec = spec
         self.period = max(1, round(1.0 / (spec.rate * dt_s)))
         self.latency = round(spec.latency / dt_s)
-        self.mount = (vehicle.rear_to_center + 0.5 * vehicle.length if spec.x is None
-                      else spec.x, spec.y, spec.yaw)
+        self.mount = spec.mount(vehicle.rear_to_center, vehicle.length)
         self._count = count
         self._sensor = create_sensor(spec, f'sensor {spec.name} of {name}')
         # Scans are rare: a block would draw rows that nobody asks for.
@@ -75,7 +85,7 @@ class MountedSensor:
         return (carrier.x + cos * x - sin * y, carrier.y + sin * x + cos * y,
                 wrap_pi(carrier.yaw + yaw))
 
-    def scan(self, n: int, carrier: VehicleState, bodies: Bodies,
+    def scan(self, n: int, carrier: VehicleState, bodies: SensedBodies,
              grid: OccupancyGrid | None) -> tuple[Scan, Detections]:
         """
         Scan the world at step n.

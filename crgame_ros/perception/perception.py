@@ -1,28 +1,40 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The perception of an AV: turns the engine's true request into what the AV knows (FS II-B)."""
 
 from collections.abc import Callable, Sequence
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.perception.bodies import Bodies
+from crgame_ros.messages.joints import JointSeries, vehicle_to_joints, without_absent
+from crgame_ros.messages.request_layout import RequestLayout
+from crgame_ros.occupancy.occupancy import OccupancyGrid, OccupancyMap
+from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.localisation import Localisation
 from crgame_ros.perception.mounted_sensor import Detections, MountedSensor
-from crgame_ros.perception.request_layout import RequestLayout
 from crgame_ros.perception.sensors import Scan
-from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
-from crgame_ros.perception.tracking import Tracks
-from crgame_ros.planner.joints import JointSeries, vehicle_to_joints
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.occupancy import OccupancyGrid, OccupancyMap
+from crgame_ros.perception.tracks import Tracks
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import StateColumn, VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -84,7 +96,7 @@ class Perception:
             spec.localisation, seed, av_id, initial, dt_s)
         self._sensors = [MountedSensor(sensor, vehicle, len(self._ids), seed, av_id, dt_s)
                          for sensor in spec.sensors]
-        self._bodies = Bodies(descriptions)
+        self._bodies = SensedBodies(descriptions)
         free = np.array([d.type in FREE_MOVERS for d in descriptions], dtype=bool)
         self._tracks = Tracks(~(free | self._static), dt_s)
         self._pending: list[_View] = []
@@ -92,7 +104,8 @@ class Perception:
         self._n = 0
         self._truth = initial
         self._present = np.ones(len(self._ids), dtype=bool)
-        self._layout: tuple[tuple[str, ...], RequestLayout] | None = None
+        # Of the requests' names: who is meant, and their columns.
+        self._layout: tuple[tuple[str, ...], NDArray[np.intp], NDArray[np.intp]] | None = None
 
     @property
     def estimate(self) -> VehicleState:
@@ -106,7 +119,7 @@ class Perception:
 
     @property
     def scans(self) -> tuple[tuple[SensorSpec, int, Scan], ...]:
-        """The latest scan of each sensor and the step n that it was made at."""
+        """Give the latest scan of each sensor and the step n that it was made at."""
         return tuple(self._scans.values())
 
     @property
@@ -146,9 +159,10 @@ class Perception:
         Turn a true request into the one that the planner gets.
 
         :param request: of the step last observed, in the AV's scenario coordinates
-        :return: the same joints and times. The AV itself is where it takes itself to be, whoever
-            is neither seen nor remembered is NaN, all others are where they were seen, moved on.
-            Their steering angles and accelerations are not observable: NaN.
+        :return: the same times. The AV itself is where it takes itself to be; objects that are
+            neither seen nor remembered are left out, driven vehicles are NaN then; all others are
+            where they were seen, moved on. Their steering angles and accelerations are not
+            observable: NaN.
         :raises InputError: if it names something that was not described.
         """
         if self._localisation is None and not self._sensors:
@@ -161,20 +175,19 @@ class Perception:
                 array[0, :4] = values
         if self._sensors:
             self._fill(request, *arrays)
-        return JointSeries(request.stamp_ns, request.names, request.times_ns, *arrays)
+        return without_absent(JointSeries(
+            request.stamp_ns, request.names, request.times_ns, *arrays), self._vehicles)
 
     def _scan(self, n: int, firing: Sequence[MountedSensor], vehicle_states: Array,
               object_poses: Array, object_velocities: Array) -> None:
         """Let sensors look at the world; what they see is known after their latency."""
         yaw, speed = vehicle_states[:, StateColumn.YAW], vehicle_states[:, StateColumn.SPEED]
-        cos, sin = np.cos(yaw), np.sin(yaw)
         poses = np.concatenate((vehicle_states[:, :3], object_poses))
         velocities = np.concatenate((
-            np.stack((speed * cos, speed * sin, vehicle_states[:, StateColumn.YAW_RATE]), axis=1),
+            np.stack((speed * np.cos(yaw), speed * np.sin(yaw),
+                      vehicle_states[:, StateColumn.YAW_RATE]), axis=1),
             object_velocities))
-        centers = poses.copy()
-        centers[:self._vehicles, 0] += self._to_center * cos
-        centers[:self._vehicles, 1] += self._to_center * sin
+        centers = np.concatenate((shifted(vehicle_states[:, :3], self._to_center), object_poses))
         # A sensor does not see the vehicle that carries it.
         centers[self._own] = np.nan
         self._bodies.place(centers)
@@ -220,13 +233,14 @@ class Perception:
               accelerations: Array) -> None:
         """Put what is known of others into a request, and nothing else."""
         if self._layout is None or self._layout[0] != request.names:
-            self._layout = (request.names,
-                            RequestLayout.of(request.names, self.av_id, self._ids))
-        layout = self._layout[1]
+            found = RequestLayout.of(request.names, self.av_id, f'/{self.av_id}/true_request')
+            number = {name: index for index, name in enumerate(self._ids)}
+            self._layout = request.names, found.indices(number), found.columns
+        _, told, where = self._layout
         for array in (positions, velocities, accelerations):
             array[:, 4:] = np.nan
-        known = np.flatnonzero(self._tracks.known(self._n)[layout.things])
-        things, columns = layout.things[known], layout.columns[known]
+        known = np.flatnonzero(self._tracks.known(self._n)[told])
+        things, columns = told[known], where[known]
         times_s = 1e-9 * request.times_ns.astype(np.float64)
         poses, rates = self._tracks.predict(things, self._n, times_s)
         # As the engine does: everybody in the AV's scenario coordinates.

@@ -1,16 +1,27 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Line tracing with a constant horizon (FS II-B2), in closed form and for all rays at once."""
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.perception.bodies import Bodies, Discs, Edges
+from crgame_ros.game.perception_spec import SensorSpec
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.perception.bodies import Discs, Edges, SensedBodies
 from crgame_ros.perception.grid_cells import BorderCells
 from crgame_ros.perception.ray_fan import RayFan
 from crgame_ros.perception.sensors import NOTHING, PERMANENT, Pose, Scan, Sensor
-from crgame_ros.perception.spec import SensorSpec
-from crgame_ros.scenario.occupancy import OccupancyGrid
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -33,7 +44,7 @@ class RayCaster(Sensor):
         self._fan = RayFan(spec.field_of_view, spec.rays)
         self._cells = BorderCells()
 
-    def scan(self, pose: Pose, bodies: Bodies, grid: OccupancyGrid | None = None) -> Scan:
+    def scan(self, pose: Pose, bodies: SensedBodies, grid: OccupancyGrid | None = None) -> Scan:
         """Trace all rays; see the class."""
         x, y, yaw = pose
         horizon = self.spec.horizon

@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The interface of virtual sensors (FS II-B2), and those that a game may name."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from crgame_ros.game.perception_spec import SensorSpec
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.perception.bodies import SensedBodies
+from crgame_ros.registry import ModelRegistry
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.perception.bodies import Bodies
-from crgame_ros.perception.spec import SensorSpec
-from crgame_ros.registry import ModelRegistry
-from crgame_ros.scenario.occupancy import OccupancyGrid
 
 Pose = tuple[float, float, float]
 
@@ -50,7 +61,7 @@ class Sensor(ABC):
         self.spec = spec
 
     @abstractmethod
-    def scan(self, pose: Pose, bodies: Bodies, grid: OccupancyGrid | None = None) -> Scan:
+    def scan(self, pose: Pose, bodies: SensedBodies, grid: OccupancyGrid | None = None) -> Scan:
         """
         Sense the world.
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The adapter that every planner runs behind: its failures become braking plans."""
 
 from collections import Counter
@@ -8,10 +20,12 @@ from dataclasses import dataclass, field
 import re
 
 from crgame_ros.errors import CrgameError, PlanningError
+from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.braking import braking_plan
-from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.plan_check import check_start
 from crgame_ros.planner.road_limit import RoadLimit
+from crgame_ros.vehicle.stopping import FIRM_BRAKING
 
 Clock = Callable[[], float]
 
@@ -48,7 +62,7 @@ class PlannerAdapter:
     """
 
     def __init__(self, planner: Planner, clock: Clock | None = None,
-                 deceleration: float = 4.0) -> None:
+                 deceleration: float = FIRM_BRAKING) -> None:
         self.planner = planner
         self.statistics = PlannerStatistics()
         self.last_reason: str | None = None

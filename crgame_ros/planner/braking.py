@@ -1,25 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The answer when a planner has none: brake to a stop along the last plan's path."""
 
 import math
 
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.rollout import Rollout
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.standstill import REST
+from crgame_ros.vehicle.state import StateColumn
+from crgame_ros.vehicle.steering import steering_rate
+from crgame_ros.vehicle.stopping import braking_acceleration, FIRM_BRAKING, moving_time
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.planner.interface import Plan, PlanRequest
-from crgame_ros.vehicle.kinematic_single_track import integrate
-from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
-
 # Steps after the stop, so that a late next plan still finds the vehicle at rest.
 REST_STEPS = 10
-# Plans of a lesser speed do not say where they lead [m/s].
-CREEPING = 0.05
 
 
 def braking_plan(request: PlanRequest, last_plan: Plan | None, vehicle: VehicleParameters,
-                 deceleration: float = 4.0) -> Plan:
+                 deceleration: float = FIRM_BRAKING) -> Plan:
     """
     Brake to a stop along the last plan's path, beyond its end with constant curvature.
 
@@ -33,31 +45,18 @@ def braking_plan(request: PlanRequest, last_plan: Plan | None, vehicle: VehicleP
     ego, dt_s = request.ego, request.time_step_s
     steps = math.ceil(abs(ego.speed) / (deceleration * dt_s)) + REST_STEPS
     distances, angles = _steering_over_distance(request, last_plan)
-    states = np.empty((steps + 1, STATE_WIDTH))
-    states[0] = ego
-    x, y, yaw, speed, steering = ego[:5]
+    drive = Rollout(ego, steps, dt_s, vehicle.wheelbase)
     covered = 0.0
-    for i in range(steps):
-        before = speed
-        acceleration = -math.copysign(deceleration, speed) if speed else 0.0
-        moving = min(dt_s, abs(speed) / deceleration)
-        moved = abs(speed + 0.5 * acceleration * moving) * moving
-        wanted = float(np.interp(covered + moved, distances, angles))
-        rate = 0.0
-        if moving > 0.0:
-            limit = vehicle.max_steering_rate
-            rate = min(max((wanted - steering) / moving, -limit), limit)
-            x, y, yaw, speed, steering = integrate(
-                x, y, yaw, speed, steering, acceleration, rate, vehicle.wheelbase, moving)
-        if moving < dt_s:
-            speed = 0.0
-        covered += moved
-        states[i + 1] = (x, y, yaw, speed, steering, 0.0,
-                         speed * math.tan(steering) / vehicle.wheelbase, 0.0)
-        if i:
-            states[i, StateColumn.ACCELERATION] = (speed - before) / dt_s
-            states[i, StateColumn.STEERING_RATE] = rate * moving / dt_s
-    return Plan(request.stamp_ns, states, fallback=True)
+    for _ in range(steps):
+        speed, rate = drive.speed, 0.0
+        acceleration = braking_acceleration(speed, deceleration)
+        moving_s = moving_time(speed, acceleration, dt_s) if speed else 0.0
+        covered += abs(speed + 0.5 * acceleration * moving_s) * moving_s
+        if moving_s > 0.0:
+            wanted = float(np.interp(covered, distances, angles))
+            rate = steering_rate(wanted, drive.steering, moving_s, vehicle.max_steering_rate)
+        drive.step(acceleration, rate, moving_s)
+    return Plan(request.stamp_ns, drive.states, fallback=True)
 
 
 def _steering_over_distance(request: PlanRequest, last_plan: Plan | None,
@@ -72,7 +71,8 @@ def _steering_over_distance(request: PlanRequest, last_plan: Plan | None,
     lengths = np.hypot(*np.diff(states[:, :2], axis=0).T)
     along = np.concatenate(([0.0], np.cumsum(lengths)))
     origin = float(np.interp(position, np.arange(len(states)), along))
-    ahead = along > origin + CREEPING * request.time_step_s
+    # Slower states do not say where the plan leads.
+    ahead = along > origin + REST * request.time_step_s
     if not ahead.any():
         return here
     return (np.concatenate((here[0], along[ahead] - origin)),

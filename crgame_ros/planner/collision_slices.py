@@ -1,19 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Predicted obstacles as one collision checker for each step of a request."""
 
 import math
 
 from commonroad_dc import pycrcc
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.errors import PlanningError
+from crgame_ros.geometry.outline import outline
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.planner.interface import PlannerContext, PlanRequest
-from crgame_ros.planner.obstacles import outline, prolong
+from crgame_ros.messages.plan import PlanRequest
+from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.path_obstacles import prolong
 from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -121,11 +134,10 @@ class CollisionSlices:
         """Tell whether an obstacle drives behind the ego's rear in its lane, or into it."""
         dx, dy = float(pose[0]) - ego.x, float(pose[1]) - ego.y
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-        rear = self._vehicle.rear_to_center - 0.5 * self._vehicle.length
-        shape = self._described(name)
+        rear, width, shape = self._vehicle.rear, self._vehicle.width, self._described(name)
         along, aside = dx * cos + dy * sin, abs(dy * cos - dx * sin)
-        behind = (along + 0.5 * shape.length < rear and aside < 0.5 * self._vehicle.width + 1.0)
-        pushing = along < rear and aside < 0.5 * (self._vehicle.width + shape.width)
+        behind = along + 0.5 * shape.length < rear and aside < 0.5 * width + 1.0
+        pushing = along < rear and aside < 0.5 * (width + shape.width)
         return math.cos(float(pose[2]) - ego.yaw) > 0.5 and (behind or pushing)
 
     def _footprint(self, ego: VehicleState) -> pycrcc.RectOBB:

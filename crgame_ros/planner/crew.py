@@ -1,16 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The planners of one AV in a run: the game's, and those that events bring in."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from crgame_ros.game.events import EventSpec, PlannerSwap, SpeedLimit
+from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.adapter import Clock, PlannerAdapter, PlannerStatistics
-from crgame_ros.planner.interface import Plan, PlannerContext, PlanRequest
-from crgame_ros.planner.registry import create_planner
-from crgame_ros.scenario.events import EventSpec, PlannerSwap, SpeedLimit
-from crgame_ros.scenario.speed_limits import set_speed_limit, with_own_roads
+from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.planner_registry import create_planner
+from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 
 
 class PlannerCrew:

@@ -1,32 +1,44 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The default planner: the Intelligent Driver Model on the reference path."""
 
 from collections.abc import Sequence
 import math
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
-from crgame_ros.planner.interface import Plan, PlannerContext, PlanRequest
-from crgame_ros.planner.lane_change import LaneChange, Verdict
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.lane_gap import has_gap
-from crgame_ros.planner.obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_following import Longitudinal, PathPosition
+from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
 from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.planner.route_lane_change import LaneChange, Verdict
 from crgame_ros.planner.side_lanes import OWN_LANE, SideLane
 from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds
 from crgame_ros.planner.stop_lines import StopLines
+from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.standstill import STANDING
 from crgame_ros.vehicle.state import StateColumn, VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
 LINE_GAP = 0.5
-STANDING = 0.1
 # A standing vehicle starts when the model wants at least this share of a; it stops below it.
 START_SHARE = 0.2
 # Who may still come into the way is answered less hard than who is in the way [m/s^2], unless more
@@ -109,7 +121,7 @@ class IdmPlanner(PathPlanner):
             driving, desired, vehicle, self._lateral_acceleration, self._model.b).tolist()
         self._stop_lines = StopLines(context.scenario, driving, self._model.b_max,
                                      self._model.b + 1.0)
-        self._front = vehicle.rear_to_center + 0.5 * vehicle.length
+        self._front = vehicle.front
 
     def setup(self, context: PlannerContext) -> None:
         """Plan the path from the planning problem's initial state."""

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 The package commonroad-idm-planner 0.2.1 as a planner, its faults repaired where possible.
 
@@ -46,25 +58,28 @@ from commonroad_idm_planner.idm_path import IDMPathFactory  # noqa: E402
 from commonroad_idm_planner.idm_planner import IDMPlanner  # noqa: E402
 from commonroad_idm_planner.idm_state import IDMState  # noqa: E402
 from commonroad_idm_planner.idm_trajectory import IDMTrajectory  # noqa: E402
-from commonroad_idm_planner.util.closest_obstacle import get_closest_obstacle_front_on_idm_path  # noqa: E402
-import numpy as np  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
-
+from commonroad_idm_planner.util import closest_obstacle  # noqa: E402
 from crgame_ros.geometry.shape import Shape  # noqa: E402
-from crgame_ros.planner.interface import Plan, PlanRequest  # noqa: E402
-from crgame_ros.planner.obstacles import Corridor, ObstacleProjector, prolong  # noqa: E402
+from crgame_ros.messages.plan import Plan, PlanRequest  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
+from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, prolong  # noqa: E402
 from crgame_ros.planner.path_planner import check_positive, PathPlanner  # noqa: E402
 from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
-from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds  # noqa: E402
+from crgame_ros.planner.speed_profile import (  # noqa: E402
+    admissible_speeds,
+    default_speed,
+    desired_speeds,
+)
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
+from crgame_ros.vehicle.standstill import STANDING  # noqa: E402
+import numpy as np  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
 
 Array = NDArray[np.float64]
 
 AHEAD = 150.0
 HALF_CORRIDOR = 4.0
 LATERAL_ACCELERATION = 2.5
-STANDING = 0.1
 
 
 class IdmPackagePlanner(PathPlanner):
@@ -165,9 +180,8 @@ class IdmPackagePlanner(PathPlanner):
 
     def _scenario(self, request: PlanRequest, position: PathPosition, steps: int) -> Scenario:
         """Make a scenario of the obstacles near the path, each with its prediction."""
-        vehicle = self._context.vehicle
         corridor = Corridor(position.s, position.d, 10.0, AHEAD, HALF_CORRIDOR,
-                            vehicle.rear_to_center + 0.5 * vehicle.length)
+                            self._context.vehicle.front)
         near = self._projector.project(self._driving.path, corridor, request, steps + 1).ids
         poses, velocities = prolong(request, steps + 1)
         scenario = Scenario(request.time_step_s)
@@ -182,7 +196,7 @@ class IdmPackagePlanner(PathPlanner):
     def _leader(self, scenario: Scenario, request: PlanRequest, position: PathPosition,
                 steps: int) -> int | None:
         window = self._planner._idm_path
-        found = get_closest_obstacle_front_on_idm_path(
+        found = closest_obstacle.get_closest_obstacle_front_on_idm_path(
             scenario, window.reference_path, window.path_length_per_point,
             self._center(position.s), request.k, request.k + steps, False)
         return found.obstacle_id if found.exist else None

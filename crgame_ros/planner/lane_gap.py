@@ -1,15 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whether there is a gap in the lane into which a vehicle wants to change."""
 
 import math
 
-import numpy as np
-
 from crgame_ros.geometry.polyline import ReferencePath
-from crgame_ros.planner.interface import PlanRequest
-from crgame_ros.planner.obstacles import Corridor, ObstacleProjector
+from crgame_ros.messages.plan import PlanRequest
+from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector
 from crgame_ros.vehicle.parameters import VehicleParameters
+import numpy as np
 
 # Who comes into the lane within this time counts as well [s].
 LOOK_AHEAD_S = 1.0
@@ -37,8 +48,7 @@ def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequ
     :param ahead_too: False where the caller itself sees to who is in front.
     """
     speed = max(request.ego.speed, 0.0)
-    rear = vehicle.rear_to_center - 0.5 * vehicle.length
-    front = rear + vehicle.length
+    rear, front = vehicle.rear, vehicle.front
     corridor = Corridor(s, offset, 1.0, AHEAD, 0.5 * vehicle.width + SIDE_MARGIN, front,
                         offset, BEHIND)
     steps = 1 + math.ceil(LOOK_AHEAD_S / request.time_step_s - 1e-9)

@@ -1,20 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Driving a kinematic single-track vehicle along a path, step by step."""
 
 from collections.abc import Callable
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.errors import PlanningError
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.polyline import ReferencePath
-from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.planner.rollout import Rollout
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.steering import steering_rate
+from crgame_ros.vehicle.stopping import moving_time
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 # Acceleration [m/s^2] as a function of step, arc length [m] and speed [m/s].
@@ -109,34 +122,20 @@ class PathFollower:
         if abs(start.heading_error) > MAX_HEADING_ERROR:
             raise PlanningError(
                 f'the vehicle faces away from its path by {start.heading_error:.2f} rad')
-        wheelbase = self._vehicle.wheelbase
         length = self.correction_length(start, abs(ego.speed))
         gains = (60.0 / length ** 3, 36.0 / length ** 2, 9.0 / length)
-        x, y, yaw, speed, steering = ego[:5]
-        states = np.empty((steps + 1, STATE_WIDTH))
-        states[0] = ego
+        driven = Rollout(ego, steps, dt_s, self._vehicle.wheelbase)
         position, moved = start, 0.0
         for i in range(steps):
             if i:
-                position = self.locate(x, y, yaw, position.s + moved)
+                position = self.locate(driven.x, driven.y, driven.yaw, position.s + moved)
+            speed = driven.speed
             wanted = longitudinal(i, position.s, speed)
-            # A vehicle that brakes to a stop inside the step stands for the rest of it.
-            moving = dt_s
-            if speed * wanted < 0.0:
-                moving = min(dt_s, -speed / wanted)
-            moved = (speed + 0.5 * wanted * moving) * moving
-            rate = self._steering_rate(position, speed, steering, moved, moving, gains)
-            before = speed
-            x, y, yaw, speed, steering = integrate(
-                x, y, yaw, speed, steering, wanted, rate, wheelbase, moving)
-            if moving < dt_s:
-                speed = 0.0
-            states[i + 1] = (x, y, yaw, speed, steering, 0.0,
-                             speed * math.tan(steering) / wheelbase, 0.0)
-            if i:
-                states[i, StateColumn.ACCELERATION] = (speed - before) / dt_s
-                states[i, StateColumn.STEERING_RATE] = rate * moving / dt_s
-        return states
+            moving_s = moving_time(speed, wanted, dt_s)
+            moved = (speed + 0.5 * wanted * moving_s) * moving_s
+            driven.step(wanted, self._steering_rate(
+                position, speed, driven.steering, moved, moving_s, gains), moving_s)
+        return driven.states
 
     def _steering_rate(self, position: PathPosition, speed: float, steering: float, moved: float,
                        time_s: float, gains: tuple[float, float, float]) -> float:
@@ -153,5 +152,4 @@ class PathFollower:
         limit = vehicle.max_steering_angle
         wanted = math.atan(vehicle.wheelbase * (curvature + change))
         wanted = min(max(wanted, -limit), limit)
-        rate = vehicle.max_steering_rate
-        return min(max((wanted - steering) / time_s, -rate), rate)
+        return steering_rate(wanted, steering, time_s, vehicle.max_steering_rate)

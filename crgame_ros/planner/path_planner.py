@@ -1,18 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What planners that follow a reference path have in common."""
 
 from abc import abstractmethod
 import math
 
-import numpy as np
-
 from crgame_ros.errors import InputError, PlanningError
-from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.geometry.reference_point import ahead
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.path_following import PathFollower, PathPosition
 from crgame_ros.planner.reference_path import DrivingPath, plan_driving_path
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
 
 # Beyond this offset the vehicle is no longer where its path was planned [m].
 LOST = 4.0
@@ -24,10 +37,8 @@ RESERVE = 300.0
 def initial_state(context: PlannerContext) -> VehicleState:
     """Give the rear-axle state at which a planning problem starts; it declares the centre."""
     start = context.planning_problem.initial_state
-    yaw = float(start.orientation)
-    offset = context.vehicle.rear_to_center
-    return VehicleState(float(start.position[0]) - offset * math.cos(yaw),
-                        float(start.position[1]) - offset * math.sin(yaw), yaw,
+    (x, y), yaw = start.position[:2].tolist(), float(start.orientation)
+    return VehicleState(*ahead(x, y, yaw, -context.vehicle.rear_to_center), yaw,
                         float(getattr(start, 'velocity', 0.0)))
 
 
@@ -55,7 +66,7 @@ class PathPlanner(Planner):
 
     @property
     def driving(self) -> DrivingPath:
-        """The path that is followed now; `locate` may replace it."""
+        """Give the path that is followed now; `locate` may replace it."""
         return self._driving
 
     @abstractmethod

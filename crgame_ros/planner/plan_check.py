@@ -1,20 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whether a plan may be followed: the engine's grounds for refusing one."""
 
 from dataclasses import dataclass
 import math
 
+from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
+from crgame_ros.messages.plan import Plan
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
-from crgame_ros.planner.interface import Plan
-from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import StateColumn, VehicleState
-
 Array = NDArray[np.float64]
-SHORTEST = 2
+# States of a plan; no magnitude in one is beyond this [m], [rad], [m/s], …
+SHORTEST, LONGEST = 2, 3000
+LARGEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -65,11 +78,16 @@ def check_start(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
         return (f'the stamp {plan.stamp_ns} ns is not that of the request, '
                 f'{request_stamp_ns} ns')
     states = plan.states
+    if len(states) > LONGEST:
+        return f'{len(states)} states are too many, at most {LONGEST} are read'
     if len(states) < SHORTEST:
         return f'{len(states)} state is no plan, at least {SHORTEST} are needed'
     if not np.isfinite(states).all():
         row, column = np.argwhere(~np.isfinite(states))[0]
         return f'{StateColumn(column).name.lower()} of state {row} is {states[row, column]}'
+    if np.abs(states).max() > LARGEST:
+        row, column = np.argwhere(np.abs(states) > LARGEST)[0]
+        return f'{StateColumn(column).name.lower()} of state {row} is {states[row, column]:g}'
     x, y, yaw, speed = states[0, :4].tolist()
     distance = math.hypot(x - request_ego.x, y - request_ego.y)
     if distance > tolerances.start_position:
@@ -127,8 +145,9 @@ def _check_limits(states: Array, vehicle: VehicleParameters, dt_s: float,
          rate * dt_s + tolerances.steering, 'rad'))
     for what, values, limit, unit in checks:
         excess = values - limit
-        worst = int(excess.argmax())
-        if excess[worst] > 0.0:
+        # Written so that what is no number fails.
+        if not (excess <= 0.0).all():
+            worst = int(excess.argmax())
             first = worst + (len(values) < len(states))
             return f'{what} of {values[worst]:.2f} {unit} at state {first}'
     return None

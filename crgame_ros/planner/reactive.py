@@ -1,23 +1,36 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A reactive sampling planner that changes lanes, on commonroad-reactive-planner 2025.1."""
 
 from collections.abc import Iterator
 import math
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.errors import PlanningError
+from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.idm import IdmPlanner
-from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.path_following import PathPosition
 from crgame_ros.planner.path_planner import check_positive
-from crgame_ros.planner.reactive_core import configuration, ReactiveCore, STANDING
+from crgame_ros.planner.reactive_core import configuration, ReactiveCore
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.planner.road_limit import TOLERANCE
 from crgame_ros.planner.side_lanes import OWN_LANE, road_bounds, side_lanes, SideLane
+from crgame_ros.vehicle.standstill import REST
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -180,7 +193,7 @@ class ReactivePlanner(Planner):
         if first > speed:
             target = float(speeds[-1])
         # At rest the package keeps standing, where less than this is wanted.
-        return 0.0 if speed < STANDING and target < 5.0 * STANDING else target
+        return 0.0 if speed < REST and target < 5.0 * REST else target
 
     def _comfortable(self, aim: _Aim, position: PathPosition, speed: float) -> Array | None:
         """Drive to the lane and its speed."""

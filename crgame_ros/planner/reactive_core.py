@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What both planners on commonroad-reactive-planner 2025.1 need to run it on plan requests."""
 
 from copy import deepcopy
@@ -16,23 +28,22 @@ from commonroad_rp.state import ReactivePlannerState  # noqa: E402
 from commonroad_rp.trajectories import TrajectoryBundle, TrajectorySample  # noqa: E402
 from commonroad_rp.utility.config import ReactivePlannerConfiguration  # noqa: E402
 from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem  # noqa: E402
-import numpy as np  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
-
 from crgame_ros.errors import PlanningError  # noqa: E402
 from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
 from crgame_ros.geometry.curvilinear import CurvilinearFrame  # noqa: E402
+from crgame_ros.messages.plan import PlanRequest  # noqa: E402
 from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
-from crgame_ros.planner.interface import PlannerContext, PlanRequest  # noqa: E402
+from crgame_ros.planner.interface import PlannerContext  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
 from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
+from crgame_ros.vehicle.standstill import REST  # noqa: E402
 from crgame_ros.vehicle.state import STATE_WIDTH  # noqa: E402
+import numpy as np  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
 
 Array = NDArray[np.float64]
 
-# A vehicle that rolls backwards no faster is taken to stand [m/s].
-STANDING = 0.05
 # The frame begins so far behind the vehicle, is so long, and is renewed when less lies ahead [m].
 FRAME_BEHIND = 30.0
 FRAME_LENGTH = 500.0
@@ -76,7 +87,7 @@ class _Planner(package.ReactivePlanner):
     def _get_optimal_trajectory(self, trajectory_bundle: TrajectoryBundle,
                                 ) -> TrajectorySample | None:
         found = super()._get_optimal_trajectory(trajectory_bundle)
-        if found is None and self.x_0.velocity <= STANDING:
+        if found is None and self.x_0.velocity <= REST:
             # It goes on to stand, and wants to compare the costs with those of a sample.
             standing = self._compute_standstill_trajectory()
             standing.cost = self.cost_function
@@ -116,7 +127,7 @@ class ReactiveCore:
         :raises PlanningError: if the ego rolls backwards or an obstacle was never described.
         """
         ego = request.ego
-        if ego.speed < -STANDING:
+        if ego.speed < -REST:
             raise PlanningError('the vehicle rolls backwards, which the package cannot plan')
         if driving is not self._driving or position.s > self._frame.last - FRAME_RESERVE:
             self._build_frame(driving, position.s)

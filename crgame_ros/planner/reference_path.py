@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The drivable path of a planning problem: routed, smoothed, prolonged beyond the goal."""
 
 from dataclasses import dataclass
@@ -7,15 +19,14 @@ from itertools import pairwise
 
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.geometry.polyline import arc_length, ReferencePath
-from crgame_ros.planner.route import find_route, goal_lanelets, in_lane, Route, start_lanelet
-from crgame_ros.scenario.road_network import LaneLine, RoadNetwork
+from crgame_ros.roads.road_network import LaneLine, RoadNetwork
+from crgame_ros.roads.route import find_route, goal_lanelets, in_lane, Route, start_lanelet
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

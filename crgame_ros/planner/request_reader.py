@@ -1,22 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Reading a plan request from joints, the same in process and over DDS."""
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from crgame_ros.errors import InputError
-from crgame_ros.planner.interface import PlanRequest
-from crgame_ros.planner.joints import (
-    JointSeries,
-    object_joint_names,
-    vehicle_joint_names,
-    vehicles_from_joints,
-)
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.geometry.reference_point import shifted, shifted_velocities
+from crgame_ros.messages.joints import JointSeries, vehicles_from_joints
+from crgame_ros.messages.plan import PlanRequest
+from crgame_ros.messages.request_layout import RequestLayout
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
 
 
 class RequestReader:
@@ -56,36 +64,20 @@ class RequestReader:
                                    series.accelerations[0, :4])
         poses = series.positions[:, self._columns]
         velocities = series.velocities[:, self._columns]
-        shifted = self._to_center != 0.0
-        if shifted.any():
-            yaw, reach = poses[:, shifted, 2], self._to_center[shifted]
-            yaw_rate = velocities[:, shifted, 2]
-            poses[:, shifted, 0] += reach * np.cos(yaw)
-            poses[:, shifted, 1] += reach * np.sin(yaw)
-            velocities[:, shifted, 0] -= reach * np.sin(yaw) * yaw_rate
-            velocities[:, shifted, 1] += reach * np.cos(yaw) * yaw_rate
+        driven = self._to_center != 0.0
+        if driven.any():
+            rear, reach = poses[:, driven], self._to_center[driven]
+            poses[:, driven] = shifted(rear, reach)
+            velocities[:, driven] = shifted_velocities(rear[..., 2], velocities[:, driven], reach)
         return PlanRequest(
             series.stamp_ns, self._scheduler.k(tick), self._scheduler.time_step_s,
             VehicleState(*ego.tolist()), self._ids, poses, velocities)
 
     def _learn(self, names: tuple[str, ...]) -> None:
         """Find out which columns hold which object; the joints stay the same over a run."""
-        where = f'/{self._vehicle_id}/plan_request'
-        own = vehicle_joint_names(self._vehicle_id)
-        if names[:4] != own:
-            raise InputError('does not begin with ' + ', '.join(own), where)
-        place = {name: index for index, name in enumerate(names)}
-        ids = list(dict.fromkeys(name.rpartition('/')[0] for name in names[4:]))
-        for object_id in ids:
-            if object_id not in self._objects:
-                raise InputError(f'object "{object_id}" is not described', where,
-                                 'publish it on /scenario/objects first')
-            if not place.keys() >= set(object_joint_names(object_id)):
-                raise InputError(f'object "{object_id}" lacks a joint', where,
-                                 'name ' + ', '.join(object_joint_names(object_id)))
-        self._ids = tuple(ids)
-        self._columns = np.array([[place[f'{object_id}/{joint}'] for joint in ('x', 'y', 'yaw')]
-                                  for object_id in ids], dtype=np.intp).reshape(-1, 3)
+        layout = RequestLayout.of(names, self._vehicle_id)
+        layout.indices({name: number for number, name in enumerate(self._objects)})
+        self._ids, self._columns = layout.ids, layout.columns
         self._to_center = np.array([self._objects[object_id].rear_to_center
-                                    for object_id in ids])
+                                    for object_id in layout.ids])
         self._names = names

@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How far planned poses may leave the road: no further than the vehicle is off it already."""
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
-# Its collision objects are loaded by those only who have a road to keep to.
-if TYPE_CHECKING:
-    from crgame_ros.drivability.road_boundary import RoadBoundary
+if TYPE_CHECKING:  # Its collision objects are loaded by those only who have a road to keep to.
+    from crgame_ros.roads.road_boundary import RoadBoundary
 
 Array = NDArray[np.float64]
 
@@ -81,9 +92,7 @@ class RoadLimit:
         """
         if self._road is None:
             return None
-        centers = states[:, :3].copy()
-        yaw = centers[:, 2]
-        centers[:, :2] += self._rear_to_center * np.column_stack((np.cos(yaw), np.sin(yaw)))
+        centers = shifted(states[:, :3], self._rear_to_center)
         off = np.flatnonzero(self._road.are_off_road(centers, self._shape))
         if not len(off):
             return None

@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The lanes beside a path that a vehicle may use, and how far the carriageway reaches."""
 
 from collections.abc import Iterator
 import math
 from typing import Literal, NamedTuple, TypeAlias
 
+from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.vehicle.parameters import VehicleParameters
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.planner.reference_path import DrivingPath
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.vehicle.parameters import VehicleParameters
 
 Array = NDArray[np.float64]
 Reach: TypeAlias = Literal['lane', 'lanes', 'carriageway']

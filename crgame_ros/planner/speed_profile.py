@@ -1,13 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How fast to drive along a path: desired speed, speed limits and curves."""
 
 from commonroad.planning.planning_problem import PlanningProblem
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.speed_envelope import SpeedEnvelope
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -65,8 +77,7 @@ def admissible_speeds(driving: DrivingPath, desired: Array, vehicle: VehiclePara
 
     :param desired: (N) [m/s]
     :param lateral_acceleration: comfortable in curves [m/s^2]
-    :param deceleration: with which a lower speed ahead is approached, v^2 <= v'^2 + 2 b (s' - s)
-        [m/s^2]
+    :param deceleration: with which a lower speed ahead is approached [m/s^2]
     :return: (N) [m/s]
     """
     path = driving.path
@@ -77,6 +88,4 @@ def admissible_speeds(driving: DrivingPath, desired: Array, vehicle: VehiclePara
     limit = np.minimum(desired, np.sqrt(lateral_acceleration / curvature))
     limit = np.minimum(limit, rate / (vehicle.wheelbase * slope * cos ** 2))
     limit = np.clip(limit, 0.5, vehicle.max_speed)
-    energy = limit ** 2 + 2.0 * deceleration * path.s
-    ahead = np.minimum.accumulate(energy[::-1])[::-1]
-    return np.asarray(np.sqrt(np.maximum(ahead - 2.0 * deceleration * path.s, 0.0)))
+    return SpeedEnvelope(path.s, limit, deceleration).speeds

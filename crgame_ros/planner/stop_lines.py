@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where traffic lights and stop signs along a path want a vehicle to halt."""
 
 from dataclasses import dataclass
 
 from commonroad.scenario.scenario import Scenario
-import numpy as np
-
 from crgame_ros.planner.reference_path import DrivingPath
-from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import has_stop_sign, lights_for, lights_of, stop_line_middle
+from crgame_ros.vehicle.standstill import STANDING
 
 TURN = 0.45
-HALTED = 0.1
 SIGN_REACH = 4.0
 
 
@@ -74,7 +85,7 @@ class StopLines:
             if 'yellow' in shown and needed <= self._deceleration:
                 return line.s
             if line.sign and line.s not in self._obeyed:
-                if speed < HALTED and distance < SIGN_REACH:
+                if speed < STANDING and distance < SIGN_REACH:
                     self._obeyed.add(line.s)
                 elif needed <= self._max_deceleration:
                     return line.s
@@ -87,24 +98,13 @@ def _find(scenario: Scenario, driving: DrivingPath) -> tuple[StopLine, ...]:
     for index, (lanelet_id, (first, last)) in enumerate(
             zip(driving.lanelets, driving.lanelet_spans, strict=True)):
         lanelet = network.find_lanelet_by_id(lanelet_id)
-        line = lanelet.stop_line
-        lights = set(lanelet.traffic_lights)
-        signs: set[int] = set()
-        s = float(last)
-        if line is not None:
-            lights |= line.traffic_light_ref or set()
-            signs = line.traffic_sign_ref or set()
-            if line.start is not None and line.end is not None:
-                middle = 0.5 * (np.asarray(line.start) + np.asarray(line.end))[None, :2]
-                s = float(driving.path.project(middle, first - 5.0, last + 5.0)[0][0])
-        sign = line is not None and any(
-            element.traffic_sign_element_id.name == 'STOP'
-            for sign_id in signs | set(lanelet.traffic_signs)
-            if (post := network.find_traffic_sign_by_id(sign_id)) is not None
-            for element in post.traffic_sign_elements)
-        relevant = _relevant(scenario, lights, _turn(driving, index))
-        if relevant or sign:
-            found.append(StopLine(s, relevant, sign))
+        middle = stop_line_middle(lanelet)
+        s = float(last) if middle is None else float(
+            driving.path.project(middle[None], first - 5.0, last + 5.0)[0][0])
+        lights = lights_for(lights_of(lanelet, network), _turn(driving, index))
+        sign = has_stop_sign(lanelet, network)
+        if lights or sign:
+            found.append(StopLine(s, tuple(light.traffic_light_id for light in lights), sign))
     return tuple(sorted(found, key=lambda line: line.s))
 
 
@@ -114,16 +114,3 @@ def _turn(driving: DrivingPath, index: int) -> str:
         return 'straight'
     start, end = driving.path.pose_at(driving.lanelet_spans[index + 1])[:, 2]
     return 'left' if end - start > TURN else 'right' if end - start < -TURN else 'straight'
-
-
-def _relevant(scenario: Scenario, lights: set[int], turn: str) -> tuple[int, ...]:
-    """Keep the lights whose arrow shows where the route goes; all if none does."""
-    shown = {}
-    for light_id in sorted(lights):
-        light = scenario.lanelet_network.find_traffic_light_by_id(light_id)
-        if light is not None:
-            direction = light.direction.value if light.direction is not None else 'all'
-            shown[light_id] = direction.lower()
-    matching = [light for light, direction in shown.items()
-                if direction == 'all' or turn in direction]
-    return tuple(matching or shown)

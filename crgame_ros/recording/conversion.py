@@ -1,14 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """From a recording to a CommonRoad scenario file."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from datetime import date, datetime, UTC
 from pathlib import Path
 
+from crgame_ros.recording.epochs import epoch_numbers
+from crgame_ros.recording.exceptions import RunTooShortError
+from crgame_ros.recording.export import export_scenario, scenario_path, write_text
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import read_run_log
-from crgame_ros.scenario.export import export_scenario, scenario_path, write_text
+from crgame_ros.recording.run_log import read_run_log, RunLog
 
 
 @dataclass(frozen=True)
@@ -34,23 +49,60 @@ class ConversionReport:
     notices: tuple[str, ...]
 
 
-def convert(bag: Path, out: Path | None = None, epoch: int | None = None) -> ConversionReport:
+def convert(bag: Path, out: Path | None = None, epoch: int | None = None,
+            progress: Callable[[float], object] | None = None) -> ConversionReport:
     """
     Write the scenario that a recording holds.
 
     :param bag: a recording of ours or of `ros2 bag record`, finished or cut off.
     :param out: the file (`*.xml`) or the folder for `<benchmark id>.xml`; None puts it beside the
         recording.
-    :param epoch: which run, where the recording holds several; None for the last.
+    :param epoch: which run, where the recording holds several; None for the last that began.
+    :param progress: as for `read_run_log`.
+    :raises RunTooShortError: if the run ended before its second scenario step.
     :raises InputError: if there is no run in it, or another file is in the way.
     :raises CrgameError: if the schema refuses the result; nothing is written then.
     """
-    log = read_run_log(bag, epoch)
+    log = read_last_run(bag, progress) if epoch is None else read_run_log(bag, epoch, progress)
+    return convert_log(log, bag, out)
+
+
+def convert_log(log: RunLog, bag: Path, out: Path | None = None) -> ConversionReport:
+    """
+    Write the scenario of a run that has been read; parameters and errors as for `convert`.
+
+    :param log: the run.
+    """
     exported = export_scenario(log, day=_day_of(bag))
     path = scenario_path(bag.resolve().parent if out is None else out, exported.benchmark_id)
     write_text(exported.xml_text, path)
     return ConversionReport(path, exported.benchmark_id, int(log.ks[0]), len(log.ks),
                             exported.obstacle_ids, exported.problem_ids, exported.notices)
+
+
+def read_last_run(bag: Path, progress: Callable[[float], object] | None = None) -> RunLog:
+    """
+    Read the last run of a recording that did begin; a notice names those that did not.
+
+    :param progress: as for `read_run_log`.
+    :raises RunTooShortError: if none did.
+    :raises InputError: as `read_run_log`.
+    """
+    with BagReader(bag, parts=True) as reader:
+        epochs = epoch_numbers(reader)
+    told: list[str] = []
+    for epoch in reversed(epochs):
+        try:
+            log = read_run_log(bag, epoch, progress)
+        except RunTooShortError as error:
+            told.append(error.what)
+            refusal = error
+            continue
+        others = ', '.join(str(other) for other in epochs[:epochs.index(epoch)])
+        if others:
+            told.append(f'this is epoch {epoch}; the recording holds {others} as well (--epoch)')
+        return replace(log, notices=(*told, *log.notices))
+    raise refusal
 
 
 def _day_of(bag: Path) -> date:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Which run of a recording to read: its documents, and the messages that belong to it."""
 
 from collections.abc import Sequence
@@ -8,19 +20,18 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.scenario.loading import scenario_digest
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.simulation.documents import (
+from crgame_ros.game.documents import (
     GAME_TOPIC,
     GameDocument,
     OBJECTS_TOPIC,
     parse_game_document,
     parse_objects_document,
 )
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.scenario.loading import scenario_digest
 
 XML_TOPIC = '/scenario/xml'
-_STRING = 'std_msgs/msg/String'
 
 
 class _Text(NamedTuple):
@@ -68,8 +79,8 @@ def epoch_numbers(reader: BagReader) -> tuple[int, ...]:
 
     :raises InputError: if a document is missing.
     """
-    games = (parse_game_document(text) for _, text in _documents(reader)[GAME_TOPIC])
-    return tuple(dict.fromkeys(game.epoch for game in games))
+    games = _games(_documents(reader)[GAME_TOPIC], reader)
+    return tuple(dict.fromkeys(game.epoch for _, game in games))
 
 
 def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
@@ -80,7 +91,7 @@ def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
     :raises InputError: if a document or the epoch is not in the recording.
     """
     texts = _documents(reader)
-    games = [(log_ns, parse_game_document(text)) for log_ns, text in texts[GAME_TOPIC]]
+    games = _games(texts[GAME_TOPIC], reader)
     chosen = [index for index, (_, game) in enumerate(games)
               if number is None or game.epoch == number]
     if not chosen:
@@ -100,6 +111,21 @@ def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
         after[0] if after is not None and not clock_goes_on else None)
 
 
+def _games(texts: Sequence[_Text], reader: BagReader) -> list[tuple[int, GameDocument]]:
+    """Read the games with their log times, but those that are none."""
+    found, refusal = [], None
+    for log_ns, text in texts:
+        try:
+            found.append((log_ns, parse_game_document(text)))
+        except InputError as error:
+            reader.foreign[GAME_TOPIC] += 1
+            refusal = error
+    if refusal is not None and not found:
+        raise InputError(refusal.what, f'{reader.path}, {refusal.where}',
+                         'the recording is damaged; record again') from refusal
+    return found
+
+
 def _offset(game: GameDocument) -> int:
     return game.scheduler.clock_offset_ns
 
@@ -107,10 +133,7 @@ def _offset(game: GameDocument) -> int:
 def _documents(reader: BagReader) -> dict[str, list[_Text]]:
     """Read every version of the documents, without immediate repetitions."""
     texts: dict[str, list[_Text]] = {GAME_TOPIC: [], XML_TOPIC: [], OBJECTS_TOPIC: []}
-    for topic, type_name, log_time_ns, message in reader.decoded(texts):
-        if type_name != _STRING:
-            raise InputError(f'{topic} is a {type_name}', str(reader.path),
-                             'give a recording of crgame_ros')
+    for topic, _, log_time_ns, message in reader.readable(texts):
         texts[topic].append(_Text(log_time_ns, str(message.data)))
     for topic, found in texts.items():
         if not found:
@@ -131,9 +154,13 @@ def _scenario_of(game: GameDocument, texts: Sequence[_Text], reader: BagReader) 
 def _objects_of(game: GameDocument, texts: Sequence[_Text], log_ns: int,
                 reader: BagReader) -> tuple[ObjectDescription, ...]:
     """Choose the list that names the game's vehicles and was logged nearest to the game."""
-    vehicles = [entry['id'] for entry in (*game.humans, *game.avs)]
+    vehicles = [item.id for item in game.vehicles]
     for _, text in sorted(texts, key=lambda found: abs(found.log_time_ns - log_ns)):
-        descriptions = parse_objects_document(text)
+        try:
+            descriptions = parse_objects_document(text)
+        except InputError:
+            reader.foreign[OBJECTS_TOPIC] += 1
+            continue
         if [item.id for item in descriptions if item.role.is_ego] == vehicles:
             return (*(item for item in descriptions if item.role.is_ego),
                     *(item for item in descriptions if not item.role.is_ego))

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Completing a run's recording, and deriving the scenario and the timing report from it.
 
@@ -13,59 +25,87 @@ from pathlib import Path
 import sys
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.recording.conversion import convert
+from crgame_ros.recording.conversion import convert_log, read_last_run
+from crgame_ros.recording.exceptions import RunTooShortError
+from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recover import recover
-from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK
-from crgame_ros.recording.run_log import CYCLE_TOPIC
+from crgame_ros.recording.run_cycles import CYCLE_TOPIC
+from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, parts_of
+from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.timing_report import write_timing_report
 
 # Exit codes.
 OK, FAILED, EMPTY = 0, 1, 3
 # The run that goes on comes first.
 _NICE = 10
+_NOTHING = 'nothing was recorded: the run ended before its first step'
 
 
-def finish_run(folder: Path, say: Callable[[str], object]) -> int:
+def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True) -> int:
     """
     Complete the recordings of a run, and write the files that are made from them.
 
     :param folder: of the run.
     :param say: takes one line for people.
+    :param progress: whether to say how far it is, where it takes long.
     :return: OK, FAILED if something could not be written, EMPTY if nothing was recorded.
     """
     code = OK
+    tell = say if progress else _tell_nobody
     bags = bags_of(folder)
+    # A recorder that was started again went on in another folder.
+    runs = [bag for bag in bags if not any(bag in parts_of(other)[1:] for other in bags)]
     for bag in bags:
-        code |= _attempt(partial(recover, bag), say)
-    driven = [bag for bag in bags if _has_cycles(bag)]
-    for bag in driven:
-        # The first bag gives the run's files their names, later ones their own.
-        suffix = bag.name.removeprefix(bags[0].name)
+        failed = _attempt(partial(recover, bag, Progress(tell, f'finishing {bag}')), say)
+        # Of one that was killed at once there is nothing; what is there is told below.
+        code |= failed if len(parts_of(bag)) == 1 and bag in runs else OK
+    results = []
+    for bag in runs:
+        # The first gives the run's files their names, later ones their own.
+        suffix = bag.name.removeprefix(runs[0].name)
         scenario = folder / f'{bag.name}.xml' if suffix else folder
-        code |= _attempt(partial(write_timing_report, bag, folder / f'timing{suffix}.json'), say)
-        code |= _attempt(partial(convert, bag, scenario), say)
-    if not driven:
-        say(f'{folder}: nothing was recorded: the run ended before its first step')
+        results.append(_derive(bag, folder / f'timing{suffix}.json', scenario, say, tell))
+    if not runs:
+        say(f'{folder}: {_NOTHING}')
+    if set(results) <= {EMPTY}:
         code = code or EMPTY
+    code |= FAILED if FAILED in results else OK
     for path in sorted(path for path in folder.iterdir() if not path.name.startswith('.')):
         say(f'  {path}')
     (folder / FINISHED_MARK).touch()
     return code
 
 
-def _attempt(step: Callable[[], object], say: Callable[[str], object]) -> int:
+def _tell_nobody(_line: str) -> None:
+    """Take word of progress that nobody reads in time."""
+
+
+def _derive(bag: Path, report: Path, scenario: Path, say: Callable[[str], object],
+            tell: Callable[[str], object]) -> int:
+    """Write what is made from one recording: timing report and scenario agree on its steps."""
+    if not _has_cycles(bag):
+        say(f'{bag.parent}: {_NOTHING}')
+        return EMPTY
+    logs: list[RunLog] = []
     try:
-        step()
-    except (CrgameError, OSError) as error:
-        say(f'error: {error}')
-        return FAILED
-    return OK
+        reading = Progress(tell, f'reading {bag}')
+        code = _attempt(lambda: logs.append(read_last_run(bag, reading)), say)
+    except RunTooShortError as error:
+        say(f'{bag.parent}: {error.what}')
+        return EMPTY
+    # What cannot be made a scenario still has its timing.
+    log = logs[0] if logs else None
+    timing = Progress(tell, f'reading the timing of {bag}')
+    code |= _attempt(partial(write_timing_report, bag, report, log=log, progress=timing), say)
+    if log is not None:
+        code |= _attempt(partial(convert_log, log, bag, scenario), say)
+    return code
 
 
 def _has_cycles(bag: Path) -> bool:
     try:
-        with BagReader(bag) as reader:
+        with BagReader(bag, parts=True) as reader:
             cycles = reader.topics.get(CYCLE_TOPIC)
             return cycles is not None and cycles.message_count > 0
     except CrgameError:
@@ -73,10 +113,26 @@ def _has_cycles(bag: Path) -> bool:
         return True
 
 
+def _attempt(step: Callable[[], object], say: Callable[[str], object]) -> int:
+    try:
+        step()
+    except RunTooShortError:
+        raise
+    except (CrgameError, OSError) as error:
+        say(f'error: {error}')
+        return FAILED
+    except Exception as error:
+        # One file that cannot be made must not cost the others.
+        say(f'error: {type(error).__name__}: {error}')
+        return FAILED
+    return OK
+
+
 def main() -> int:
     """Finish the run in the folder that the command line names."""
     os.nice(_NICE)
-    return finish_run(Path(sys.argv[1]), lambda line: print(line, flush=True))
+    # What it says is read when it has ended.
+    return finish_run(Path(sys.argv[1]), lambda line: print(line, flush=True), progress=False)
 
 
 if __name__ == '__main__':

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What is in a recording, for people."""
 
 from collections.abc import Iterable, Iterator
@@ -7,18 +19,19 @@ from dataclasses import dataclass
 import json
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from crgame_ros.errors import InputError
 from crgame_ros.recording.metadata import BagTopic
 from crgame_ros.recording.reader import BagReader
+import numpy as np
+import numpy.typing as npt
 
 _GAME_TOPIC = '/scenario/game'
 _GAME_TYPE = 'std_msgs/msg/String'
 _CYCLE_TOPIC = '/timing/cycle'
 _CYCLE_TYPE = 'std_msgs/msg/Float64MultiArray'
 _GAPS_SHOWN = 5
+# Whole numbers up to here are exact in a float.
+_LARGEST_N = 2 ** 53
 
 
 @dataclass(frozen=True)
@@ -143,24 +156,32 @@ def _read_game(reader: BagReader) -> GameInfo | None:
 def _read_cycles(reader: BagReader) -> CycleInfo | None:
     if not _holds(reader, _CYCLE_TOPIC, _CYCLE_TYPE):
         return None
-    cycles = np.concatenate(list(_cycle_numbers(reader)))
+    found = list(_cycle_numbers(reader))
+    if not found:
+        return None
+    cycles = np.concatenate(found)
     return CycleInfo(len(cycles), tuple(_find_gaps(cycles)))
 
 
 def _cycle_numbers(reader: BagReader) -> Iterator[npt.NDArray[np.int64]]:
-    """Yield arrays of rows (epoch, n)."""
-    for _, _, _, message in reader.decoded([_CYCLE_TOPIC]):
+    """Yield arrays of rows (epoch, n), but of messages that somebody else sent."""
+    refusal, found = None, False
+    for _, _, _, message in reader.readable([_CYCLE_TOPIC]):
         try:
             rows, columns = message.layout.dim
             names = columns.label.split(',')
             table = message.data.reshape(rows.size, len(names))
             picked = table[:, [names.index('epoch'), names.index('n')]]
         except ValueError as error:
-            raise InputError(f'{_CYCLE_TOPIC} is not as the contract has it ({error})',
-                             str(reader.path),
-                             'its second dimension names the columns, epoch and n among them'
-                             ) from error
-        yield picked.astype(np.int64)
+            refusal = InputError(f'{_CYCLE_TOPIC} is not as the contract has it ({error})',
+                                 str(reader.path),
+                                 'its second dimension names the columns, epoch and n among them')
+            reader.foreign[_CYCLE_TOPIC] += 1
+            continue
+        found = True
+        yield picked[(np.abs(picked) < _LARGEST_N).all(axis=1)].astype(np.int64)
+    if refusal is not None and not found:
+        raise refusal
 
 
 def _find_gaps(cycles: npt.NDArray[np.int64]) -> Iterator[Gap]:

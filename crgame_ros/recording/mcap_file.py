@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 One MCAP file, finished or cut off anywhere, read without help of its index.
 
@@ -16,14 +28,14 @@ import struct
 from typing import BinaryIO, NamedTuple
 import zlib
 
+from crgame_ros.errors import InputError
+from crgame_ros.recording.mcap_index import Extent, McapIndex, MESSAGE_INDEX_HEAD
 import lz4.frame
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, Header, Schema, Statistics
+from mcap.records import Channel, Header, Schema
 import zstandard
-
-from crgame_ros.errors import InputError
 
 _MAGIC = b'\x89MCAP0\r\n'
 _RECORD = struct.Struct('<BQ')
@@ -32,6 +44,10 @@ _CHUNK = struct.Struct('<QQQII')
 _CHANNEL_ID = struct.Struct('<H')
 _LENGTH = struct.Struct('<Q')
 _RUN_BYTES = 1 << 20
+# ROS counts time in signed 64 bit; what is later is no time of a recorder [ns].
+_LATEST_NS = 2 ** 63 - 1
+# A chunk unpacked is as large as a few messages; what claims more is damaged [bytes].
+_LARGEST_CHUNK = 1 << 29
 _DAMAGES = (struct.error, ValueError, RuntimeError, MemoryError, EOFError, EndOfFile,
             OverflowError, zstandard.ZstdError)
 _LAST_DEFINED_OPCODE = max(Opcode)
@@ -39,7 +55,7 @@ _FIRST_PRIVATE_OPCODE = 0x80
 
 
 class McapMessage(NamedTuple):
-    """A message as it is stored; times in ns."""
+    """A message as it is stored; times in ns, the log time at most 2^63 - 1."""
 
     channel_id: int
     sequence: int
@@ -78,7 +94,8 @@ class McapFile:
     What a walk over the records of a file finds; the messages stay in the file.
 
     :param path: the file.
-    :ivar complete: whether the file has its closing records.
+    :ivar complete: whether the file has its closing records, and they are sound.
+    :ivar contradicts: whether what it says of its content doesn't agree; its index is not used.
     :ivar segments: where the messages are, in file order.
     :ivar kept: offset and size of each metadata and attachment record.
     :ivar useless_bytes: size of what is cut off or damaged, as far as the walk shows.
@@ -88,14 +105,16 @@ class McapFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.complete = False
+        self.complete = self.contradicts = False
         self.size = self.useless_bytes = 0
         self.header = Header('', '')
         self.segments: list[Segment] = []
         self.kept: list[tuple[int, int]] = []
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
-        self.statistics: Statistics | None = None
+        self._index = McapIndex()
+        # Those that the summary doesn't repeat.
+        self._defined: tuple[dict[int, Channel], dict[int, Schema]] = ({}, {})
         try:
             self.size = self.path.stat().st_size
             with self.path.open('rb') as stream:
@@ -105,9 +124,6 @@ class McapFile:
                 self._walk(stream)
         except OSError as error:
             raise InputError(f'cannot be read: {error.strerror}', str(self.path)) from error
-        if not self.complete and self.segments:
-            # Its index may be cut off: then it does not name every channel.
-            self.segments[-1] = replace(self.segments[-1], channels=None)
         while not self.complete and self.segments and not self.is_sound(self.segments[-1]):
             # A power cut can leave a last chunk that has its length but not its bytes.
             self.useless_bytes += self.segments.pop().size
@@ -126,8 +142,9 @@ class McapFile:
             if end > self.size or not defined:
                 break
             if opcode == Opcode.MESSAGE:
-                _, _, log_time_ns, _ = _MESSAGE.unpack(stream.read(_MESSAGE.size))
-                self._extend_run(run, position, end, log_time_ns)
+                channel, _, log_time_ns, _ = _MESSAGE.unpack(stream.read(_MESSAGE.size))
+                self._index.count_outside(channel)
+                self._extend_run(run, position, end, min(log_time_ns, _LATEST_NS))
             else:
                 self._close_run(run)
                 try:
@@ -142,26 +159,45 @@ class McapFile:
                 readable = min(end + len(_MAGIC), self.size)
                 break
         self._close_run(run)
+        if self.complete:
+            self._use_index()
         self.complete = self.complete and not self.useless_bytes
         self.useless_bytes += self.size - readable
+
+    def _use_index(self) -> None:
+        """Take over which channels are in which chunk, where the file agrees with itself."""
+        chunks = {segment.offset: segment for segment in self.segments if segment.chunked}
+        self.contradicts = not self._index.agrees({
+            offset: Extent(chunk.size, chunk.start_ns, chunk.end_ns)
+            for offset, chunk in chunks.items()})
+        if self.contradicts:
+            self.complete = False
+            self.channels, self.schemas = self._defined
+            return
+        self.segments = [replace(segment, channels=self._index.channels(segment.offset))
+                         for segment in self.segments]
 
     def _take(self, stream: BinaryIO, opcode: int, position: int, end: int) -> None:
         length = end - position - _RECORD.size
         if opcode == Opcode.CHUNK:
             start_ns, end_ns, _, _, _ = _CHUNK.unpack(stream.read(_CHUNK.size))
-            self.segments.append(Segment(position, end - position, start_ns, end_ns, True))
+            self.segments.append(Segment(position, end - position, min(start_ns, _LATEST_NS),
+                                         min(end_ns, _LATEST_NS), True))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(opcode, stream.read(length))
-        elif opcode == Opcode.MESSAGE_INDEX and self.segments and self.segments[-1].chunked:
+        elif opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX, Opcode.STATISTICS):
             # One index of each channel in it follows a chunk.
-            (number,) = _CHANNEL_ID.unpack(stream.read(_CHANNEL_ID.size))
-            chunk = self.segments[-1]
-            self.segments[-1] = replace(
-                chunk, channels=(chunk.channels or frozenset()) | {number})
+            last = self.segments[-1] if self.segments else None
+            chunk = last.offset if last is not None and last.chunked else None
+            # Of its entries, one a message, their number is enough.
+            size = MESSAGE_INDEX_HEAD.size if opcode == Opcode.MESSAGE_INDEX else length
+            self._index.take(opcode, stream.read(min(size, length)), chunk)
         elif opcode == Opcode.HEADER:
             self.header = Header.read(ReadDataStream(BytesIO(stream.read(length))))
-        elif opcode == Opcode.STATISTICS:
-            self.statistics = Statistics.read(ReadDataStream(BytesIO(stream.read(length))))
+        elif opcode == Opcode.DATA_END:
+            self._defined = dict(self.channels), dict(self.schemas)
+        elif opcode == Opcode.FOOTER:
+            self._index.check_summary(stream, position)
         elif opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
             self.kept.append((position, end - position))
 
@@ -190,25 +226,45 @@ class McapFile:
     def is_sound(self, segment: Segment) -> bool:
         """Return whether all of a segment can be read."""
         try:
+            if self.complete and segment.chunked and self._has_checksum(segment):
+                # What its bytes are was read when they were written: they are the same.
+                self._content(segment)
+                return True
             for _ in self.messages(segment):
                 pass
-        except InputError:
+        except (InputError, *_DAMAGES):
             return False
         return True
+
+    def _has_checksum(self, segment: Segment) -> bool:
+        with self.path.open('rb') as stream:
+            stream.seek(segment.offset + _RECORD.size)
+            return _CHUNK.unpack(stream.read(_CHUNK.size))[3] != 0
 
     def tally(self) -> Tally:
         """
         Count the messages of each channel, by the summary or else by reading them all.
 
+        What is in which segment, and when, is then as was read.
+
         :raises InputError: as `messages`.
         """
-        found = self.statistics
+        found = self._index.statistics
         if self.complete and found is not None and self.channels:
             return Tally({number: count for number, count in found.channel_message_counts.items()
-                          if count}, found.message_start_time, found.message_end_time)
+                          if count}, min(found.message_start_time, _LATEST_NS),
+                         min(found.message_end_time, _LATEST_NS))
         counts: Counter[int] = Counter()
-        for segment in self.segments:
-            counts.update(message.channel_id for message in self.messages(segment))
+        for index, segment in enumerate(self.segments):
+            inside = Counter[int]()
+            start_ns, end_ns = _LATEST_NS, 0
+            for number, _, log_time_ns, _, _ in self.messages(segment):
+                inside[number] += 1
+                start_ns, end_ns = min(start_ns, log_time_ns), max(end_ns, log_time_ns)
+            counts.update(inside)
+            if inside:
+                self.segments[index] = replace(segment, channels=frozenset(inside),
+                                               start_ns=start_ns, end_ns=end_ns)
         return Tally(dict(counts), min((s.start_ns for s in self.segments), default=0),
                      max((s.end_ns for s in self.segments), default=0))
 
@@ -238,6 +294,8 @@ class McapFile:
         body += _CHUNK.size
         compression = data[body:body + name_length].decode()
         body += name_length + _LENGTH.size
+        if size > _LARGEST_CHUNK:
+            raise ValueError(f'a chunk of {size} bytes')
         content = _decompress(compression, data[body:], size)
         if len(content) != size or checksum and zlib.crc32(content) != checksum:
             raise ValueError('wrong size or checksum')
@@ -245,18 +303,22 @@ class McapFile:
 
     def _messages(self, content: bytes,
                   without: Collection[int]) -> Iterator[McapMessage]:
-        position = 0
-        while position < len(content):
-            opcode, length = _RECORD.unpack_from(content, position)
-            body = position + _RECORD.size
+        position, end = 0, len(content)
+        # Every message of a recording passes here: names are looked up once.
+        head, message, head_size = _RECORD.unpack_from, _MESSAGE.unpack_from, _RECORD.size
+        channel_id, plain, data_place = _CHANNEL_ID.unpack_from, int(Opcode.MESSAGE), _MESSAGE.size
+        while position < end:
+            opcode, length = head(content, position)
+            body = position + head_size
             position = body + length
-            if position > len(content):
+            if position > end:
                 raise ValueError('a record is longer than its chunk')
-            if opcode == Opcode.MESSAGE:
-                if without and _CHANNEL_ID.unpack_from(content, body)[0] in without:
+            if opcode == plain:
+                if without and channel_id(content, body)[0] in without:
                     continue
-                yield McapMessage._make((*_MESSAGE.unpack_from(content, body),
-                                         content[body + _MESSAGE.size:position]))
+                channel, number, log_ns, publish_ns = message(content, body)
+                yield McapMessage(channel, number, min(log_ns, _LATEST_NS), publish_ns,
+                                  content[body + data_place:position])
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._define(opcode, content[body:position])
 
@@ -265,7 +327,7 @@ def _decompress(compression: str, data: bytes, size: int) -> bytes:
     if compression == 'zstd':
         return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
     if compression == 'lz4':
-        return bytes(lz4.frame.decompress(data))
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
     if compression:
         raise ValueError(f'unknown compression {compression!r}')
     return data

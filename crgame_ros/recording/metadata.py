@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The `metadata.yaml` of a recording's folder, in the layout of rosbag2 version 9."""
 
 from collections.abc import Iterable, Sequence
@@ -9,16 +21,15 @@ import os
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from crgame_ros.errors import InputError
+from crgame_ros.yaml_text import parse_yaml, read_text
+import yaml
 
 METADATA_FILE = 'metadata.yaml'
 VERSION = 9
-# rosbag2 needs 6.
-_MAX_DEPTH = 20
-# PyYAML has it in C where libyaml was there to build with.
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+# A recording that was split into thousands of files names them all.
+_MAX_BYTES = 32 << 20
+_REMEDY = 'write it again with `crgame recover` or `ros2 bag reindex`'
 _ROOT = 'rosbag2_bagfile_information'
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 # Recordings older than version 9 store the numbers of the middleware's enumerations.
@@ -90,24 +101,9 @@ class BagMetadata:
 
 
 @functools.lru_cache(maxsize=64)
-def _load(text: str) -> Any:
-    """
-    Read YAML, most of it in C: a recording is opened in a fifth of the time.
-
-    What is built from the text is shared by all who read the same text: nobody changes it.
-
-    :raises yaml.YAMLError: if it is none, or nested deeper than any metadata: building in C has no
-        limit but the stack.
-    """
-    depth = 0
-    for event in yaml.parse(text, Loader=_LOADER):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth > _MAX_DEPTH:
-                raise yaml.YAMLError(f'nested deeper than {_MAX_DEPTH} levels')
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-    return yaml.load(text, _LOADER)
+def _load(text: str, where: str = '') -> Any:
+    """Read YAML; what is built is shared by all who read the same text: nobody changes it."""
+    return parse_yaml(text, where, _REMEDY, _MAX_BYTES)
 
 
 def qos_text(profiles: Iterable[TopicQos]) -> str:
@@ -128,7 +124,11 @@ def parse_qos(value: object, where: str) -> tuple[TopicQos, ...]:
         return tuple(TopicQos(int(entry['depth']), _named(entry['reliability'], _RELIABILITIES),
                               _named(entry['durability'], _DURABILITIES))
                      for entry in entries or [])
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, IndexError) as error:
+    except InputError as error:
+        raise InputError(f'its offered_qos_profiles cannot be read ({error.what})', where,
+                         'record again, or correct the entry') from error
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError,
+            AttributeError) as error:
         raise InputError(f'its offered_qos_profiles cannot be read ({error!r})', where,
                          'record again, or correct the entry') from error
 
@@ -194,7 +194,7 @@ def read_metadata(folder: Path) -> BagMetadata:
     """
     path = folder / METADATA_FILE
     try:
-        content = _load(path.read_text('utf-8'))[_ROOT]
+        content = _load(read_text(path, 'metadata file', _REMEDY, _MAX_BYTES), str(path))[_ROOT]
         # Only the name: before version 4 the path repeats the folder, and none may lead outside.
         names = [Path(str(name)).name for name in content['relative_file_paths']]
         details = {Path(str(entry['path'])).name: entry for entry in content.get('files') or []}
@@ -204,10 +204,9 @@ def read_metadata(folder: Path) -> BagMetadata:
             topics=tuple(_read_topic(entry, str(path))
                          for entry in content['topics_with_message_count'] or []),
             compression_mode=str(content.get('compression_mode') or '').lower())
-    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError,
-            AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InputError(f'not the metadata of a recording ({error!r})', str(path),
-                         'write it again with `crgame recover` or `ros2 bag reindex`') from error
+                         _REMEDY) from error
 
 
 def _read_file(name: str, entry: dict[str, Any] | None) -> BagFile:

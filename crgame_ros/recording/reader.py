@@ -1,24 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Reading recordings: our own, those of `ros2 bag record`, and what a killed recorder left."""
 
-from collections import deque
-from collections.abc import Collection, Iterator
+from collections import Counter, deque
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 import struct
 from types import TracebackType
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
+from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import BIG_ENDIAN, HEADER_BYTES, LITTLE_ENDIAN
+from crgame_ros.recording.contract_types import is_foreign
+from crgame_ros.recording.mcap_file import McapFile
+from crgame_ros.recording.metadata import METADATA_FILE, read_metadata
+from crgame_ros.recording.run_folder import parts_of
+from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
 
-from crgame_ros.errors import InputError
-from crgame_ros.recording.metadata import METADATA_FILE, read_metadata
-from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
-
-_HEADER_BYTES = 4
-_NS_PER_S = 1_000_000_000
-_BIG_ENDIAN, _LITTLE_ENDIAN = b'\x00\x00', b'\x00\x01'
+_WATCHED_EVERY = 1000
 _SUFFIXES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 
 
@@ -41,6 +54,8 @@ class BagReader:
     A recording, opened for reading.
 
     :param path: a folder (with `metadata.yaml`, or with a single file), a `.mcap` or `.db3` file.
+    :param parts: read on in the folders in which a recorder that was started again continued.
+    :param progress: is told now and then how much of it has been read, 0 to 1.
     :ivar files: the files that hold the messages.
     :ivar storage: `mcap` or `sqlite3`.
     :ivar topics: what was recorded, by name.
@@ -50,12 +65,18 @@ class BagReader:
     :raises InputError: if there is no recording or it cannot be read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, parts: bool = False,
+                 progress: Callable[[float], object] | None = None) -> None:
         self.path = path
+        self._progress = progress
         notices: tuple[str, ...] = ()
         if not path.exists():
             raise InputError('no such file or folder', str(path), 'give a recording')
-        if path.is_dir() and (path / METADATA_FILE).is_file():
+        family = parts_of(path) if parts and path.is_dir() else [path]
+        if len(family) > 1:
+            self.files, notices = _files_of(family)
+            self.storage, compressed = 'mcap', False
+        elif path.is_dir() and (path / METADATA_FILE).is_file():
             self.files, self.storage, compressed = _listed_files(path)
         else:
             self.files, self.storage, compressed = (_single_file(path),), '', False
@@ -72,11 +93,19 @@ class BagReader:
         self.start_ns, self.end_ns = self._storage.start_ns, self._storage.end_ns
         self.notices = self._storage.damages + notices
         self._types = get_typestore(Stores.ROS2_JAZZY)
+        # Messages by topic that cannot be those of a run.
+        self.foreign: Counter[str] = Counter()
 
     @property
     def complete(self) -> bool:
         """Return whether the recorder finished its work; see `notices` where not."""
         return not self.notices
+
+    @property
+    def foreign_notices(self) -> tuple[str, ...]:
+        """Tell of the messages so far that cannot be those of a run, one line for each topic."""
+        return tuple(f'{count} messages of {topic} are not of this run: left out'
+                     for topic, count in sorted(self.foreign.items()))
 
     @property
     def message_count(self) -> int:
@@ -88,13 +117,32 @@ class BagReader:
         """
         Yield the messages as they were serialised, in the order of their log time.
 
-        :param topics: only these; names that were not recorded yield nothing. None for all.
+        :param topics: only these; names that were not recorded yield nothing, and of the
+            contract's those of another type are left out, counted in `foreign`. None for all.
         :param start_ns: none that was logged earlier [ns]; None for no limit.
         :param end_ns: none that was logged then or later [ns]; None for no limit.
         :raises InputError: if the recording is damaged inside.
         """
-        return self._storage.messages(None if topics is None else frozenset(topics), start_ns,
-                                      end_ns)
+        found = self._storage.messages(None if topics is None else frozenset(topics), start_ns,
+                                       end_ns)
+        if topics is not None:
+            found = self._own(found)
+        return found if self._progress is None else self._watched(found, self._progress)
+
+    def _own(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
+        for message in messages:
+            if is_foreign(message.topic, message.type_name):
+                self.foreign[message.topic] += 1
+                continue
+            yield message
+
+    def _watched(self, messages: Iterator[BagMessage],
+                 progress: Callable[[float], object]) -> Iterator[BagMessage]:
+        for index, message in enumerate(messages):
+            if index % _WATCHED_EVERY == 0:
+                passed_ns = message.log_time_ns - self.start_ns
+                progress(min(1.0, passed_ns / max(self.end_ns - self.start_ns, 1)))
+            yield message
 
     def decoded(self, topics: Collection[str] | None = None, start_ns: int | None = None,
                 end_ns: int | None = None) -> Iterator[DecodedMessage]:
@@ -106,6 +154,21 @@ class BagReader:
         """
         for message in self.messages(topics, start_ns, end_ns):
             yield self.decode(message)
+
+    def readable(self, topics: Collection[str] | None = None) -> Iterator[DecodedMessage]:
+        """
+        Yield messages as `decoded` does, but those that do not fit their type.
+
+        In a recording of a graph in which anybody may speak one such message must not cost the
+        run; they are counted in `foreign`.
+
+        :raises InputError: as `messages`.
+        """
+        for message in self.messages(topics):
+            try:
+                yield self.decode(message)
+            except InputError:
+                self.foreign[message[0]] += 1
 
     def decode(self, message: BagMessage) -> DecodedMessage:
         """
@@ -133,12 +196,12 @@ class BagReader:
             if type_name not in self._types.fielddefs:
                 self._learn(topic, type_name)
             codec = self._types.get_msgdef(type_name)
-            decode = {_BIG_ENDIAN: codec.deserialize_cdr_be,
-                      _LITTLE_ENDIAN: codec.deserialize_cdr_le}[data[:2]]
-            message, end = decode(data[_HEADER_BYTES:], 0, codec.cls, self._types)
+            decode = {BIG_ENDIAN: codec.deserialize_cdr_be,
+                      LITTLE_ENDIAN: codec.deserialize_cdr_le}[data[:2]]
+            message, end = decode(data[HEADER_BYTES:], 0, codec.cls, self._types)
             # The middleware may reserve more than a message needs; the rest means nothing.
-            if end + _HEADER_BYTES > len(data):
-                raise ValueError(f'it needs {end + _HEADER_BYTES} bytes and has {len(data)}')
+            if end + HEADER_BYTES > len(data):
+                raise ValueError(f'it needs {end + HEADER_BYTES} bytes and has {len(data)}')
             return message
         except (SerdeError, TypesysError, struct.error, ValueError, LookupError) as error:
             raise InputError(f'a message of {topic} is no {type_name} ({error})', str(self.path),
@@ -167,15 +230,23 @@ class BagReader:
         self.close()
 
 
-def header_stamp_ns(data: bytes) -> int:
-    """
-    Give the stamp of a serialised message that begins with a std_msgs/Header [ns].
-
-    :param data: CDR with its header.
-    """
-    order: Literal['big', 'little'] = 'big' if data[:2] == _BIG_ENDIAN else 'little'
-    seconds = int.from_bytes(data[_HEADER_BYTES:_HEADER_BYTES + 4], order, signed=True)
-    return seconds * _NS_PER_S + int.from_bytes(data[_HEADER_BYTES + 4:_HEADER_BYTES + 8], order)
+def _files_of(family: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    """Find the MCAP files of a recording in several folders, and say which are of no use."""
+    files: list[Path] = []
+    notices: list[str] = []
+    refusal: InputError | None = None
+    for file in (file for folder in family for file in sorted(folder.glob('*.mcap'))):
+        try:
+            McapFile(file)
+            files.append(file)
+        except InputError as error:
+            # A recorder that was killed at once has written nothing yet.
+            notices.append(f'{error.what} ({file.parent.name}/{file.name}): left out')
+            refusal = error
+    if not files:
+        raise refusal or InputError('no recording in this folder', str(family[0]),
+                                    'give the folder that holds a .mcap or .db3 file')
+    return tuple(files), tuple(notices)
 
 
 def _listed_files(folder: Path) -> tuple[tuple[Path, ...], str, bool]:
@@ -206,7 +277,7 @@ def _single_file(path: Path) -> Path:
                              'give the folder that holds a .mcap or .db3 file')
     if len(candidates) > 1:
         raise InputError(f'{len(candidates)} files but no {METADATA_FILE}', str(path),
-                         'name one of the files, or write it with `ros2 bag reindex`')
+                         'name one of the files, or write it with `crgame recover`')
     if candidates[0].suffix not in _SUFFIXES:
         raise InputError('not a recording', str(path), 'give a folder, a .mcap or a .db3 file')
     return candidates[0]

@@ -1,21 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The game that a recording carries: to run it again without any other file."""
 
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-import yaml
-
 from crgame_ros.errors import InputError
+from crgame_ros.game.documents import GAME_TOPIC, GameDocument
+from crgame_ros.game.events import PlannerSwap
+from crgame_ros.game.game import Game, PoseSpawn
+from crgame_ros.game.game_file import parse_game
 from crgame_ros.recording.epochs import read_epoch, XML_TOPIC
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.scenario.events import PlannerSwap
-from crgame_ros.scenario.game import Game, PoseSpawn
-from crgame_ros.scenario.game_file import parse_game
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
-from crgame_ros.simulation.documents import GAME_TOPIC, GameDocument
+from crgame_ros.yaml_text import parse_yaml
 
 
 class RecordedGame(NamedTuple):
@@ -53,17 +64,13 @@ def read_recorded_game(bag: Path, *, other_planners: bool = False) -> RecordedGa
     with BagReader(bag) as reader:
         run = read_epoch(reader)
     where = f'{bag}, {GAME_TOPIC}'
-    text = run.game.content.get('file')
-    if not isinstance(text, str):
+    text = run.game.file
+    if not text:
         raise InputError('does not hold the game file', where,
                          'name the game that was recorded before --driver')
-    try:
-        values = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputError('holds a game file that is no YAML', where, 'record again') from error
-    game = parse_game(values, where, bag.parent)
-    starts = {entry['id']: PoseSpawn(*map(float, entry['state'][:4]))
-              for entry in run.game.humans}
+    game = parse_game(parse_yaml(text, f'{where}, its game file', 'record again'), where,
+                      bag.parent)
+    starts = {human.id: PoseSpawn(*human.state[:4]) for human in run.game.humans}
     humans = tuple(replace(human, driver=f'replay:{bag.resolve()}', spawn=starts[human.id])
                    for human in game.humans if human.id in starts)
     code = _named_code(game, other_planners)

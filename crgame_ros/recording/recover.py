@@ -1,17 +1,27 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Finishing what a killed recorder left, without ever risking it."""
 
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from io import BytesIO
 import os
 from pathlib import Path
+import sqlite3
 from typing import Any, BinaryIO
-
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.records import Attachment, Metadata
-from mcap.writer import CompressionType, Writer
 
 from crgame_ros.errors import InputError
 from crgame_ros.recording.exceptions import RecordingError
@@ -24,8 +34,12 @@ from crgame_ros.recording.metadata import (
     write_metadata,
 )
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.storage import McapStorage
+from crgame_ros.recording.storage import McapStorage, merge_topics, RosbagsStorage
 from crgame_ros.recording.writer import CHUNK_BYTES
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata
+from mcap.writer import CompressionType, Writer
 
 _RECORD_HEAD_BYTES = 9
 
@@ -56,14 +70,17 @@ class RecoverReport:
         return bool(self.rewritten) or self.metadata_written
 
 
-def recover(path: Path) -> RecoverReport:
+def recover(path: Path, progress: Callable[[float], object] | None = None) -> RecoverReport:
     """
     Finish a recording whose recorder was killed; leave a finished one as it is.
 
     Each unfinished file is copied, message by message, to a file beside it, which is read back and
     then takes its place in one step: at every moment there is one file with all messages.
 
+    Of SQLite files only the metadata is written.
+
     :param path: the folder of a recording, or a bare `.mcap` file.
+    :param progress: is told how much of a file has been copied, 0 to 1.
     :raises InputError: if there is nothing that could be finished.
     :raises RecordingError: if the disk refuses; the recording is then as it was.
     """
@@ -71,9 +88,9 @@ def recover(path: Path) -> RecoverReport:
         raise InputError('no such file or folder', str(path), 'give a recording')
     files = [path] if path.is_file() else sorted(path.glob('*.mcap'))
     if not files or files[0].suffix != '.mcap':
-        return _untouched(path)
+        return _recover_other(path)
     try:
-        dropped = {file.name: _finish(file) for file in files}
+        dropped = {file.name: _finish(file, progress) for file in files}
         written = path.is_dir() and not _has_metadata(path, files, any(
             count is not None for count in dropped.values()))
         if written:
@@ -88,17 +105,62 @@ def recover(path: Path) -> RecoverReport:
             tuple(name for name, count in dropped.items() if count is not None), written)
 
 
-def _untouched(path: Path) -> RecoverReport:
-    """Report on a recording in another storage, if it is finished."""
+def _recover_other(path: Path) -> RecoverReport:
+    """Write the metadata of SQLite files that lack it; what has it is left as it is."""
+    files = sorted(path.glob('*.db3')) if path.is_dir() else []
+    written = bool(files) and not _is_described(path, files)
+    if written:
+        _describe_databases(path, files)
     with BagReader(path) as reader:
-        if not reader.complete:
-            raise InputError(f'{reader.notices[0].split(";")[0]} in a recording that is not MCAP',
-                             str(path), 'use `ros2 bag reindex`')
         return RecoverReport(path, reader.message_count,
-                             (reader.end_ns - reader.start_ns) / 1e9, 0, (), False)
+                             (reader.end_ns - reader.start_ns) / 1e9, 0, (), written)
 
 
-def _finish(path: Path) -> int | None:
+def _is_described(folder: Path, files: list[Path]) -> bool:
+    """Tell whether the metadata of SQLite files is there and can be read by."""
+    if not _has_metadata(folder, files, False):
+        return False
+    try:
+        with BagReader(folder):
+            return True
+    except InputError:
+        return False
+
+
+def _describe_databases(folder: Path, files: list[Path]) -> None:
+    """
+    Write `metadata.yaml` for SQLite files.
+
+    :raises InputError: if a file is damaged.
+    :raises RecordingError: if the disk refuses.
+    """
+    storages = []
+    for file in files:
+        try:
+            # What was written half is taken back by opening; readers open without looking.
+            with closing(sqlite3.connect(file)) as connection:
+                (state,), *_ = connection.execute('PRAGMA quick_check(1)').fetchall()
+        except sqlite3.Error as error:
+            state = str(error)
+        if state != 'ok':
+            raise InputError(f'the database is damaged ({state})', str(file),
+                             f'save what is left with `sqlite3 {file.name} .recover`')
+        storages.append(RosbagsStorage(file))
+    entries = [BagFile(file.name, storage.start_ns, storage.end_ns,
+                       sum(topic.message_count for topic in storage.topics))
+               for file, storage in zip(files, storages, strict=True)]
+    topics = merge_topics(topic for storage in storages for topic in storage.topics)
+    for storage in storages:
+        storage.close()
+    entries.sort(key=lambda entry: entry.start_ns)
+    try:
+        write_metadata(folder, BagMetadata('sqlite3', tuple(entries), topics))
+    except OSError as error:
+        raise RecordingError(folder, f'cannot be finished: {error.strerror}',
+                             'free some space; the recording is as it was') from error
+
+
+def _finish(path: Path, progress: Callable[[float], object] | None) -> int | None:
     """Rewrite a file unless it is finished and sound; return the bytes dropped, or None."""
     source = McapFile(path)
     damaged = {segment for segment in source.segments if not source.is_sound(segment)}
@@ -108,7 +170,7 @@ def _finish(path: Path) -> int | None:
     temporary = path.with_name(f'.{path.name}.part')
     try:
         with temporary.open('wb') as stream:
-            count, lost = _copy(source, stream)
+            count, lost = _copy(source, stream, progress)
             stream.flush()
             os.fsync(stream.fileno())
         copy = McapFile(temporary)
@@ -121,7 +183,8 @@ def _finish(path: Path) -> int | None:
     return source.useless_bytes + lost + sum(segment.size for segment in damaged)
 
 
-def _copy(source: McapFile, target: BinaryIO) -> tuple[int, int]:
+def _copy(source: McapFile, target: BinaryIO,
+          progress: Callable[[float], object] | None) -> tuple[int, int]:
     """Copy all messages; return how many, and the bytes of those whose channel is not known."""
     writer: Any = Writer(target, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(source.header.profile, source.header.library)
@@ -129,6 +192,8 @@ def _copy(source: McapFile, target: BinaryIO) -> tuple[int, int]:
     channels: dict[int, int] = {}
     count = lost = 0
     for segment in source.segments:
+        if progress is not None:
+            progress(segment.offset / max(source.size, 1))
         for message in source.messages(segment):
             if message.channel_id not in source.channels:
                 lost += len(message.data)

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 A run's motion at the times that its stamps say.
 
@@ -10,12 +22,11 @@ disagree with speeds. Whoever exports or measures motion takes it from here.
 
 from collections.abc import Collection, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -28,7 +39,7 @@ def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: fl
 
     Where that sum is n dt exactly, so without any measured interval, it is the state n itself.
     Between two states positions and heading are cubic by their rates at both ends, all else is
-    linear; ahead of the first and up to dt beyond the last a vehicle keeps its speed and yaw rate.
+    linear; up to dt ahead of the first and beyond the last a vehicle keeps its speed and yaw rate.
 
     :param states: (S, V, 8) rear-axle states, columns as in `StateColumn`, S >= 1
     :param ns: (S) their simulation steps, increasing
@@ -37,7 +48,7 @@ def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: fl
     :param dt_s: nominal step [s]
     :param wanted_ns: (K) simulation steps n
     :return: (K, V, 8) states at n dt; NaN where a vehicle has not driven so far, as whatever the
-        clip of CRG 13 drops is missing at the end.
+        clip of CRG 13 drops is missing at the end, or was not recorded yet.
     """
     # Summed as differences, nominal intervals add up to exactly nothing.
     leads_s = np.cumsum(intervals_s - dt_s, axis=0)
@@ -47,32 +58,39 @@ def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: fl
     for column in range(states.shape[1]):
         times_s = ns * dt_s + leads_s[ns, column]
         found[:, column] = _at(states[:, column], times_s, wanted_s)
-        found[wanted_s > times_s[-1] + 1.5 * dt_s, column] = np.nan
+        unknown = (wanted_s > times_s[-1] + 1.5 * dt_s) | (wanted_s < times_s[0] - 1.5 * dt_s)
+        found[unknown, column] = np.nan
     return found
 
 
 def moved_intervals(table: CycleTable, vehicles: Sequence[str], humans: Collection[str],
-                    dt_s: float, last_n: int) -> FloatArray:
+                    dt_s: float, last_n: int, lost_s: FloatArray | None = None) -> FloatArray:
     """
     Give the intervals over which each vehicle was moved in each step, as `resample` takes them.
 
     A human is moved over Delta t_eff, and so is an AV while somebody drives it; an AV on its plan
-    and a step that was not recorded take the nominal step.
+    takes the nominal step.
 
     :param table: the recorded cycles.
     :param vehicles: (V) ids.
     :param humans: which of them are humans.
     :param dt_s: nominal step [s]
+    :param lost_s: (last_n + 1) Delta t_eff of the steps that were not recorded [s], nominal where
+        None; an AV was driven there if it was in the cycle before.
     :return: (last_n + 1, V) intervals [s]
     """
-    intervals_s = np.full((last_n + 1, len(vehicles)), dt_s)
     ns = table.column('n').astype(np.int64)
     known = (ns >= 0) & (ns <= last_n)
+    effective_s = np.full(last_n + 1, dt_s) if lost_s is None else lost_s.copy()
+    effective_s[ns[known]] = table.column('dt_eff_s')[known]
+    intervals_s = np.full((last_n + 1, len(vehicles)), dt_s)
+    # The cycle whose driver is that of step n: the last that was recorded.
+    latest = np.searchsorted(ns, np.arange(last_n + 1), side='right') - 1
     for column, vehicle in enumerate(vehicles):
-        driven = known
+        driven = np.ones(last_n + 1, dtype=bool)
         if vehicle not in humans:
-            driven = known & table.drove(vehicle)
-        intervals_s[ns[driven], column] = table.column('dt_eff_s')[driven]
+            driven = (latest >= 0) & table.drove(vehicle)[latest]
+        intervals_s[driven, column] = effective_s[driven]
     return intervals_s
 
 
@@ -88,8 +106,8 @@ def _at(states: FloatArray, times_s: FloatArray, wanted_s: FloatArray) -> FloatA
     found = first + share * (second - first)
     turn = wrap_pi_array(second[:, 2] - first[:, 2])
     displacement = np.column_stack((second[:, :2] - first[:, :2], turn))
-    found[:, :3] = first[:, :3] + _cubic(share, length, displacement, _rates(first),
-                                         _rates(second))
+    found[:, :3] = first[:, :3] + cubic(share, length, displacement, _rates(first),
+                                        _rates(second))
     # Nothing was recorded so early or so late: the vehicle goes on as it was.
     beyond_s = (wanted_s - times_s[after])[:, np.newaxis]
     found = np.where(inside[:, np.newaxis], found, second)
@@ -101,9 +119,16 @@ def _at(states: FloatArray, times_s: FloatArray, wanted_s: FloatArray) -> FloatA
     return found
 
 
-def _cubic(share: FloatArray, length: FloatArray, displacement: FloatArray,
-           start_rates: FloatArray, end_rates: FloatArray) -> FloatArray:
-    """Evaluate Hermite polynomials that start at 0: (K, 3) displacements."""
+def cubic(share: FloatArray, length: FloatArray, displacement: FloatArray,
+          start_rates: FloatArray, end_rates: FloatArray) -> FloatArray:
+    """
+    Evaluate Hermite polynomials that start at 0: displacements (K, C).
+
+    :param share: (K, 1) of the way from start to end, 0 to 1
+    :param length: (K, 1) from start to end [s]
+    :param displacement: (K, C) or (C) from start to end
+    :param start_rates: (K, C) or (C) derivatives at the start, `end_rates` those at the end
+    """
     rest = 1.0 - share
     return (share * share * (3.0 - 2.0 * share) * displacement
             + share * rest * length * (rest * start_rates - share * end_rates))

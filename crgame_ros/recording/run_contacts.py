@@ -1,21 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The contacts of a recorded run, named as those of an offline run are."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
-from crgame_ros.planner.joints import vehicles_from_joints
+from crgame_ros.messages.joints import vehicles_from_joints
+from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.recording.epochs import Epoch
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import OBJECT_STATES_TOPIC, read_points, VEHICLES_TOPIC
+from crgame_ros.recording.run_points import read_points
 from crgame_ros.simulation.contacts import Contact, find_contacts, Motions
 from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
 
 
 def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability]
@@ -63,7 +75,7 @@ def _read_motions(reader: BagReader, run: Epoch) -> Motions:
     others = others.reshape(len(object_ns), 3, len(objects), 3)
     return Motions(
         run.descriptions,
-        {entry['id']: float(entry['vehicle']['max_acceleration']) for entry in run.game.avs},
+        {av.id: av.vehicle.max_acceleration for av in run.game.avs},
         run.game.scheduler,
         _every_step(vehicles_from_joints(joints[:, 0], joints[:, 1], joints[:, 2]), ns),
         object_ns, others[:, 0], others[:, 1])

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where the files of each run of a session are."""
 
 from pathlib import Path
@@ -7,6 +19,8 @@ import re
 
 # In a folder in which there is nothing more to come, whether or not all could be written.
 FINISHED_MARK = '.finished'
+# How a recorder that was started again names its folder.
+_PART = re.compile(r'_part([1-9][0-9]*)$')
 _LATER = re.compile(r'run_([1-9][0-9]*)')
 
 
@@ -28,4 +42,21 @@ def run_folders(session: Path) -> list[Path]:
 
 def bags_of(folder: Path) -> list[Path]:
     """Find a run's recordings in their order: several where the recorder was started again."""
-    return sorted(path for path in folder.glob('bag*') if path.is_dir())
+    return sorted((path for path in folder.glob('bag*') if path.is_dir()), key=_order)
+
+
+def parts_of(bag: Path) -> list[Path]:
+    """
+    Give a recording and those in which it was continued: `bag`, `bag_part2` and so on.
+
+    :param bag: the first of them; any other is given alone.
+    """
+    stem = _PART.sub('', bag.name)
+    family = sorted((path for path in bag.parent.glob(f'{stem}*')
+                     if path.is_dir() and _PART.sub('', path.name) == stem), key=_order)
+    return family if family[:1] == [bag] else [bag]
+
+
+def _order(path: Path) -> tuple[str, int]:
+    part = _PART.search(path.name)
+    return _PART.sub('', path.name), int(part[1]) if part else 1

@@ -1,35 +1,56 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a run was, on the grid of its scenario's time steps, and what its humans did."""
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a run was, on the grid of its scenario's time steps."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
 
+from crgame_ros.errors import InputError, one_line
+from crgame_ros.game.documents import GAME_TOPIC, GameDocument, parse_game_document
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.messages.joints import vehicle_to_joints, vehicles_from_joints
+from crgame_ros.messages.world_messages import (
+    OBJECT_STATES_TOPIC,
+    TICK_STATES_TOPIC,
+    VEHICLES_TOPIC,
+)
+from crgame_ros.recording.bridging import (
+    bridge_objects,
+    bridged_notice,
+    farthest,
+    longest_stretch,
+    lost_intervals,
+    piece_around,
+)
+from crgame_ros.recording.epochs import Epoch, read_epoch
+from crgame_ros.recording.exceptions import RunTooShortError
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.resampling import moved_intervals, resample
+from crgame_ros.recording.run_cycles import cycle_tables, table_of
+from crgame_ros.recording.run_points import read_points, TRAJECTORY
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.offline import OfflineResult
+from crgame_ros.timing.cycle_rows import CycleTable
+from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.errors import InputError
-from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicles_from_joints
-from crgame_ros.recording.epochs import Epoch, read_epoch
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.resampling import moved_intervals, resample
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.simulation.documents import game_document, GameDocument, parse_game_document
-from crgame_ros.simulation.offline import OfflineResult
-from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CycleTable
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
-from crgame_ros.vehicle.state import StateColumn
-
-VEHICLES_TOPIC = '/vehicles/state'
-OBJECT_STATES_TOPIC = '/traffic/objects'
-CYCLE_TOPIC = '/timing/cycle'
-_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
-_ARRAY = 'std_msgs/msg/Float64MultiArray'
-_NS_PER_S = 1_000_000_000
-
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -46,6 +67,7 @@ class RunLog:
     :param object_poses: (K, M, 3) centre poses [m, m, rad]; NaN where absent.
     :param object_velocities: (K, M, 3) their derivatives; NaN where absent.
     :param notices: what of the run is not in here, one line each.
+    :param cycles: its recorded cycles, where they are known.
     """
 
     xml_text: str
@@ -56,6 +78,7 @@ class RunLog:
     object_poses: FloatArray
     object_velocities: FloatArray
     notices: tuple[str, ...] = ()
+    cycles: CycleTable | None = None
 
     @property
     def vehicles(self) -> tuple[ObjectDescription, ...]:
@@ -68,175 +91,179 @@ class RunLog:
         return self.descriptions[self.vehicle_states.shape[1]:]
 
 
-class ReplayInputs(NamedTuple):
-    """
-    What `ReplayDriver` and `run_offline` need to repeat a recorded run to the last bit.
-
-    :param commands: (n, 4) throttle, brake, steering, reverse by human, and by AV that somebody
-        took over (NaN while it followed its plan); row i was consumed in the step from i to i + 1.
-    :param dt_eff_s: (n) interval over which that step was integrated [s]
-    """
-
-    commands: dict[str, FloatArray]
-    dt_eff_s: FloatArray
-
-
-def read_run_log(path: Path, epoch: int | None = None) -> RunLog:
+def read_run_log(path: Path, epoch: int | None = None,
+                 progress: Callable[[float], object] | None = None) -> RunLog:
     """
     Read a run from a recording: ours or of `ros2 bag record`, finished or cut off.
 
-    Where scenario steps are missing, the run is taken up to the first of them, and a notice says
-    so: what came after could only be joined to it by inventing motion.
+    What a busy recorder missed is bridged by what other topics hold and by the states around it,
+    as far as `bridging` allows; a notice tells each. Where more is missing, the run is its longest
+    piece, for the pieces could only be joined by inventing motion.
 
     :param epoch: which run, where a recording holds several; None for the last.
+    :param progress: is told how much of the recording has been read, from 0 to 1 for states, then
+        for cycles.
+    :raises RunTooShortError: if the run ended before its second scenario step.
     :raises InputError: if the recording lacks what describes the run, or its states.
     """
-    with BagReader(path) as reader:
+    with BagReader(path, parts=True, progress=progress) as reader:
         run = read_epoch(reader, epoch)
         vehicles = [item.id for item in run.descriptions if item.role.is_ego]
         objects = [item.id for item in run.descriptions if not item.role.is_ego]
-        for topic, ids in ((VEHICLES_TOPIC, vehicles), (OBJECT_STATES_TOPIC, objects)):
-            found = reader.topics.get(topic)
-            if ids and (found is None or not found.message_count):
-                raise InputError(f'no {topic} in it', str(path), 'record this topic too')
-            if found is not None and found.type_name != _TRAJECTORY:
-                raise InputError(f'{topic} is a {found.type_name}', str(path),
-                                 'give a recording of crgame_ros')
-        points = read_points(reader, run,
-                             {VEHICLES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects})
-        notices = list(reader.notices)
-    ticks = _usable_ticks(points, bool(objects), run, path, notices)
-    ns = np.array(sorted(points[VEHICLES_TOPIC]))
-    joints = np.array([points[VEHICLES_TOPIC][n] for n in ns.tolist()])
-    joints = joints.reshape(len(ns), 3, len(vehicles), 4)
-    intervals_s = _intervals(path, run, vehicles, int(ns[-1]), notices)
-    states, ticks = _on_ticks(
-        vehicles_from_joints(joints[:, 0], joints[:, 1], joints[:, 2]), ns, intervals_s,
-        run.game.scheduler, ticks, notices)
-    others = np.array([points[OBJECT_STATES_TOPIC][n] for n in ticks.tolist()]) if objects \
-        else np.empty((len(ticks), 3, 0))
-    others = others.reshape(len(ticks), 3, len(objects), 3)
-    return RunLog(
-        run.xml_text, run.game, run.descriptions, _ks(run.game.scheduler, ticks), states,
-        others[:, 0], others[:, 1], tuple(notices))
-
-
-def read_points(reader: BagReader, run: Epoch, ids: Mapping[str, list[str]],
-                ) -> dict[str, dict[int, FloatArray]]:
-    """
-    Read how vehicles and objects moved.
-
-    :param ids: whose joints are wanted of `VEHICLES_TOPIC` and `OBJECT_STATES_TOPIC`.
-    :return: by topic and step n: (3, joints) positions, velocities, accelerations.
-    :raises InputError: if a message does not hold them.
-    """
+        points = read_points(reader, run, _wanted(reader, vehicles, objects))
+        notices = [*reader.notices, *reader.foreign_notices]
+        table = _cycles(reader, run, points, notices)
+        _check_begun(reader, run, points, table, objects)
     scheduler = run.game.scheduler
-    wanted = {
-        VEHICLES_TOPIC: [name for item in ids[VEHICLES_TOPIC]
-                         for name in vehicle_joint_names(item)],
-        OBJECT_STATES_TOPIC: [name for item in ids[OBJECT_STATES_TOPIC]
-                              for name in object_joint_names(item)]}
-    points: dict[str, dict[int, FloatArray]] = {topic: {} for topic in wanted}
-    orders: dict[tuple[str, ...], list[int]] = {}
-    for topic, _, log_time_ns, message in reader.decoded(wanted):
-        stamp_ns = stamp_of(message)
-        n = scheduler.step_of_stamp(stamp_ns)
-        if run.holds(stamp_ns, log_time_ns) and scheduler.stamp_ns(n) == stamp_ns:
-            points[topic][n] = first_point(message, wanted[topic], topic, reader, orders)
-    return points
+    spares = _spare_states(points, run)
+    recorded = {VEHICLES_TOPIC: {n: point for states in reversed(spares.values())
+                                 for n, point in states.items()} | points[VEHICLES_TOPIC]}
+    if objects:
+        recorded[OBJECT_STATES_TOPIC] = {n: point for n, point in points[
+            OBJECT_STATES_TOPIC].items() if scheduler.is_tick(n)}
+    steps = {topic: np.array(sorted(found), dtype=np.int64) for topic, found in recorded.items()}
+    ticks = _ticks(path, run, steps, notices)
+    for topic, states in spares.items():
+        if taken := len(states.keys() & set(ticks.tolist())):
+            notices.append(f'{taken} scenario steps of {VEHICLES_TOPIC} are those of {topic}')
+    for topic, ns in steps.items():
+        notices += bridged_notice(topic, ticks, ns, scheduler)
+    vehicle_states, ticks = _vehicle_states(recorded[VEHICLES_TOPIC], steps[VEHICLES_TOPIC],
+                                            vehicles, run, table, ticks, notices)
+    others = bridge_objects(ticks, recorded.get(OBJECT_STATES_TOPIC, {}), scheduler.dt_s,
+                            3 * len(objects)) if objects else np.empty((len(ticks), 2, 0))
+    others = others.reshape(len(ticks), 2, len(objects), 3)
+    return RunLog(run.xml_text, run.game, run.descriptions, _ks(scheduler, ticks), vehicle_states,
+                  others[:, 0], others[:, 1], tuple(map(one_line, notices)), table)
 
 
-def stamp_of(message: Any) -> int:
-    """Give the header's stamp of a decoded message [ns]."""
-    return int(message.header.stamp.sec) * _NS_PER_S + int(message.header.stamp.nanosec)
+def _wanted(reader: BagReader, vehicles: list[str], objects: list[str]) -> dict[str, list[str]]:
+    """Say whose joints to read from which topics."""
+    wanted = {VEHICLES_TOPIC: vehicles, TICK_STATES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects}
+    for topic in wanted:
+        found = reader.topics.get(topic)
+        if found is not None and found.type_name != TRAJECTORY:
+            raise InputError(f'{topic} is a {found.type_name}', str(reader.path),
+                             'give a recording of crgame_ros')
+    return wanted
 
 
-def _places(names: list[str], wanted: list[str], topic: str, reader: BagReader) -> list[int]:
-    place = {name: index for index, name in enumerate(names)}
-    for name in wanted:
-        if name not in place:
-            raise InputError(f'{topic} does not name the joint {name}', str(reader.path),
-                             'name the joints as msg_defs/interfaces.yaml has them')
-    return [place[name] for name in wanted]
+def _check_begun(reader: BagReader, run: Epoch, points: Mapping[str, Mapping[int, FloatArray]],
+                 table: CycleTable | None, objects: Sequence[str]) -> None:
+    """See that a run went on long enough, and that what moved in it was recorded."""
+    needed = {VEHICLES_TOPIC: points[VEHICLES_TOPIC] or points[TICK_STATES_TOPIC]}
+    if objects:
+        needed[OBJECT_STATES_TOPIC] = points[OBJECT_STATES_TOPIC]
+    last_n = max((n for found in points.values() for n in found), default=0)
+    if table is not None:
+        last_n = max(last_n, int(table.column('n')[-1]))
+    recorded = table is not None or all(topic in reader.topics for topic in needed)
+    if last_n < run.game.scheduler.steps_per_tick and recorded:
+        raise RunTooShortError(
+            f'run {run.game.epoch + 1} ended before it began, after {last_n} simulation steps: '
+            'there is no scenario of it', str(reader.path))
+    for topic, found in needed.items():
+        if not found and topic not in reader.topics:
+            raise InputError(f'no {topic} in it', str(reader.path), 'record this topic too')
+        if not found:
+            raise InputError(f'no scenario step of the run is in it: no {topic} at its times',
+                             str(reader.path), 'record from before the start of the run')
 
 
-def first_point(message: Any, wanted: list[str], topic: str, reader: BagReader,
-                orders: dict[tuple[str, ...], list[int]]) -> FloatArray:
-    """
-    Give the first point of a decoded JointTrajectory.
-
-    :param message: of a topic that gives one point.
-    :param wanted: names of the joints, in the order in which they are given back.
-    :param topic: for messages.
-    :param orders: remembers, from call to call, where the joints of a message are.
-    :return: (3, joints) positions, velocities, accelerations.
-    :raises InputError: if a joint is missing.
-    """
-    joints = len(message.joint_names)
-    names = (topic, *message.joint_names)
-    if names not in orders:
-        orders[names] = _places(message.joint_names, wanted, topic, reader)
-    rows = [] if not message.points else [
-        message.points[0].positions, message.points[0].velocities,
-        message.points[0].accelerations]
-    if [len(row) for row in rows] != [joints] * 3:
-        raise InputError(f'a point of {topic} does not give every joint', str(reader.path),
-                         'give one position, velocity and acceleration for each')
-    return np.array(rows, dtype=np.float64)[:, orders[names]]
+def _spare_states(points: Mapping[str, Mapping[int, FloatArray]], run: Epoch
+                  ) -> dict[str, dict[int, FloatArray]]:
+    """Give what other topics tell of states that `VEHICLES_TOPIC` lacks, by topic and step."""
+    states = points[VEHICLES_TOPIC]
+    ticks = {n: point for n, point in points[TICK_STATES_TOPIC].items() if n not in states}
+    begun = min((*states, *ticks), default=0)
+    if not 0 < begun <= farthest(run.game.scheduler):
+        return {TICK_STATES_TOPIC: ticks}
+    starts = [vehicle_to_joints(item.state) for item in run.game.vehicles]
+    return {TICK_STATES_TOPIC: ticks,
+            GAME_TOPIC: {0: np.array(starts).reshape(-1, 3, 4).swapaxes(0, 1).reshape(3, -1)}}
 
 
-def _usable_ticks(points: Mapping[str, Mapping[int, FloatArray]], with_objects: bool, run: Epoch,
-                  path: Path, notices: list[str]) -> NDArray[np.int64]:
-    """Choose the steps n of the ticks up to the first that is missing."""
-    per_tick = run.game.scheduler.steps_per_tick
-    topics = [VEHICLES_TOPIC, *([OBJECT_STATES_TOPIC] if with_objects else [])]
-    seen = [{n // per_tick for n in points[topic] if n % per_tick == 0} for topic in topics]
-    found, last_seen = set.intersection(*seen), max((0, *set.union(*seen)))
-    if not found:
+def _ticks(path: Path, run: Epoch, steps: Mapping[str, IntArray],
+           notices: list[str]) -> IntArray:
+    """Choose the steps n of the ticks of a run."""
+    stretch = longest_stretch(steps, run.game.scheduler)
+    if not len(stretch.ticks):
         raise InputError('no scenario step of the run is in it', str(path),
                          'record from before the start of the run')
-    first = end = min(found)
-    while end in found:
-        end += 1
-    k0 = run.game.scheduler.k0
-    if first:
-        notices.append(f'the recording begins at scenario step {k0 + first} of a run that began '
-                       f'at {k0}')
-    if last_seen > end:
-        notices.append(f'scenario step {k0 + end} was not recorded: the run is taken up to '
-                       f'{k0 + end - 1} of {k0 + last_seen}')
-    return per_tick * np.arange(first, end)
+    notices += stretch.notices
+    return stretch.ticks
 
 
-def _intervals(path: Path, run: Epoch, vehicles: Sequence[str], last_n: int,
-               notices: list[str]) -> FloatArray:
-    """Read the intervals over which each vehicle was moved, nominal where unknown (n + 1, V)."""
-    dt_s = run.game.scheduler.dt_s
+def _cycles(reader: BagReader, run: Epoch, points: Mapping[str, dict[int, FloatArray]],
+            notices: list[str]) -> CycleTable | None:
+    """Read a run's cycles, None where they are not known; take out what is not the run's."""
     try:
-        table = read_cycles(path, run.game.epoch)
+        tables = cycle_tables(reader)
+        table = table_of(tables, run.game.epoch, reader)
     except InputError as error:
         notices.append(f'{error}; motion is as it was stamped, through stalls too')
+        return None
+    later = {found.epoch for found in tables if found.epoch > run.game.epoch}
+    last_n = int(table.column('n')[-1])
+    strange = [(found, n) for found in points.values() for n in found
+               if n > last_n + run.game.scheduler.steps_per_tick]
+    if later and strange:
+        # Where the next game is not known, its states would pass for late ones of this.
+        notices.append(f'what was recorded after cycle {last_n} is of another run, whose '
+                       f'{GAME_TOPIC} was not recorded: left out')
+        for found, n in strange:
+            del found[n]
+    return table
+
+
+def _vehicle_states(points: Mapping[int, FloatArray], ns: IntArray, vehicles: Sequence[str],
+                    run: Epoch, table: CycleTable | None, ticks: IntArray,
+                    notices: list[str]) -> tuple[FloatArray, IntArray]:
+    """Give the states at those of the ticks that every vehicle has reached; give them too."""
+    scheduler = run.game.scheduler
+    # Nothing behind a gap that cuts the run is used.
+    ns = piece_around(ns, int(ticks[0]), scheduler)
+    joints = np.array([points[n] for n in ns.tolist()]).reshape(len(ns), 3, len(vehicles), 4)
+    return _on_ticks(vehicles_from_joints(joints[:, 0], joints[:, 1], joints[:, 2]), ns,
+                     _intervals(run, table, vehicles, int(ns[-1]), notices), scheduler, ticks,
+                     notices)
+
+
+def _intervals(run: Epoch, table: CycleTable | None, vehicles: Sequence[str], last_n: int,
+               notices: list[str]) -> FloatArray:
+    """Give the intervals over which each vehicle was moved, nominal where unknown (n + 1, V)."""
+    dt_s = run.game.scheduler.dt_s
+    if table is None:
         return np.full((last_n + 1, len(vehicles)), dt_s)
     ns = table.column('n')
+    lost_s = lost_intervals(table, run.game.timing, dt_s, last_n)
     missing = int(ns[-1] - ns[0]) + 1 - len(ns)
     if missing:
-        notices.append(f'{missing} cycles were not recorded: their intervals are taken as nominal')
-    return moved_intervals(table, vehicles, [item['id'] for item in run.game.humans], dt_s, last_n)
+        how = 'taken as nominal' if lost_s is None else 'those that the lag of the others tells'
+        notices.append(f'{missing} cycles were not recorded: their intervals are {how}')
+    humans = [item.id for item in run.game.humans]
+    return moved_intervals(table, vehicles, humans, dt_s, last_n, lost_s)
 
 
 def _on_ticks(states: FloatArray, ns: NDArray[np.int64], intervals_s: FloatArray,
-              scheduler: ScenarioScheduler, ticks: NDArray[np.int64],
-              notices: list[str]) -> tuple[FloatArray, NDArray[np.int64]]:
+              scheduler: ScenarioScheduler, ticks: IntArray,
+              notices: list[str]) -> tuple[FloatArray, IntArray]:
     """Resample at the ticks n that every vehicle has reached on its own time; give them too."""
     found = resample(states, ns, intervals_s, scheduler.dt_s, ticks)
-    reached = int(np.isfinite(found[:, :, StateColumn.X]).all(axis=1).sum())
-    if reached < len(ticks):
-        notices.append(f'{len(ticks) - reached} scenario steps at the end are left out: the '
+    reached = np.flatnonzero(np.isfinite(found[:, :, StateColumn.X]).all(axis=1))
+    if not len(reached):
+        return found[:0], ticks[:0]
+    first, end = int(reached[0]), int(reached[-1]) + 1
+    if first:
+        notices.append(f'{first} scenario steps at the start are left out: on their own time the '
+                       'humans were ahead when the recording began')
+    if end < len(ticks):
+        notices.append(f'{len(ticks) - end} scenario steps at the end are left out: the '
                        'intervals that moved the humans add up to less than the simulated time')
-    return found[:reached], ticks[:reached]
+    return found[first:end], ticks[first:end]
 
 
-def _ks(scheduler: ScenarioScheduler, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ks(scheduler: ScenarioScheduler, ticks: IntArray) -> NDArray[np.int64]:
     return scheduler.k0 + ticks // scheduler.steps_per_tick
 
 
@@ -254,58 +281,4 @@ def run_log_of(result: OfflineResult) -> RunLog:
     return RunLog(
         setup.loaded.xml_text, game, setup.descriptions, ks, states,
         result.object_poses[:len(ks)].reshape(len(ks), -1, 3),
-        result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(notices))
-
-
-def read_cycles(path: Path, epoch: int | None = None) -> CycleTable:
-    """
-    Read the cycles of one run.
-
-    :param epoch: which run, where a recording holds several; None for the last.
-    :raises InputError: if there are none, or they are not as the contract has them.
-    """
-    with BagReader(path) as reader:
-        found = reader.topics.get(CYCLE_TOPIC)
-        if found is None or found.type_name != _ARRAY or not found.message_count:
-            raise InputError(f'no {CYCLE_TOPIC} in it', str(path), 'record this topic too')
-        tables = [table for table in _cycle_tables(reader) if len(table.rows)]
-    epochs = [table.epoch for table in tables]
-    wanted = epochs[-1] if epoch is None and epochs else epoch
-    tables = [table for table in tables if table.epoch == wanted]
-    if not tables:
-        raise InputError(f'no cycles of epoch {wanted} in it', str(path),
-                         'it has ' + (', '.join(map(str, sorted(set(epochs)))) or 'none'))
-    columns = tables[-1].columns
-    rows = np.concatenate([table.rows for table in tables if table.columns == columns])
-    table = CycleTable(columns, rows)
-    # Where n falls, a restarted simulation began the same epoch anew.
-    restarts = np.flatnonzero(np.diff(table.column('n')) <= 0)
-    return CycleTable(columns, rows[restarts[-1] + 1:]) if len(restarts) else table
-
-
-def _cycle_tables(reader: BagReader) -> Iterator[CycleTable]:
-    for _, _, _, message in reader.decoded([CYCLE_TOPIC]):
-        if len(message.layout.dim) != 2:
-            raise InputError(f'{CYCLE_TOPIC} is not labelled', str(reader.path),
-                             'record with this version')
-        yield CycleTable.from_message(message.layout.dim[1].label, message.data)
-
-
-def replay_inputs(path: Path, epoch: int | None = None) -> ReplayInputs:
-    """
-    Read what a run's drivers did and over which intervals, cycle by cycle.
-
-    :param epoch: which run, where a recording holds several; None for the last.
-    :raises InputError: if a cycle is missing, for nothing after it could be exact.
-    """
-    table = read_cycles(path, epoch)
-    expected = np.arange(1, len(table.rows) + 1)
-    wrong = np.flatnonzero(table.column('n') != expected)
-    if len(wrong):
-        raise InputError(f'cycle n = {expected[wrong[0]]} was not recorded', str(path),
-                         'a run can be repeated exactly only from a recording without gaps')
-    suffix = f'/{COMMAND_COLUMNS[0]}'
-    vehicles = [name.removesuffix(suffix) for name in table.columns if name.endswith(suffix)]
-    commands = {vehicle: table.commands(vehicle) for vehicle in vehicles}
-    return ReplayInputs({vehicle: rows for vehicle, rows in commands.items()
-                         if np.isfinite(rows).any()}, table.column('dt_eff_s').copy())
+        result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(map(one_line, notices)))

@@ -1,19 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where the messages of a recording come from: MCAP files, or SQLite and compressed ones."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-import sqlite3
 from typing import NamedTuple, Protocol
 
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader, ReaderError
-
 from crgame_ros.errors import InputError
+from crgame_ros.recording.contract_types import is_foreign
 from crgame_ros.recording.mcap_file import McapFile, Segment
 from crgame_ros.recording.metadata import BagTopic, parse_qos, TopicQos
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader
 
 _FOREVER_NS = 2 ** 64
 
@@ -68,6 +80,8 @@ class McapStorage:
     def __init__(self, paths: Sequence[Path]) -> None:
         self._files = [McapFile(path) for path in paths]
         self.damages = tuple(
+            f'{file.path.name}: what it says of its content contradicts itself, so all of it was '
+            'read; `crgame recover` mends it' if file.contradicts else
             f'{file.path.name} was not finished or is damaged ({file.useless_bytes} bytes are of '
             'no use); `crgame recover` finishes it'
             for file in self._files if not file.complete)
@@ -75,10 +89,11 @@ class McapStorage:
         filled = [tally for tally in tallies if tally.counts]
         self.start_ns = min((tally.start_ns for tally in filled), default=0)
         self.end_ns = max((tally.end_ns for tally in filled), default=0)
-        self.topics = _merge(
+        self.topics = merge_topics(
             BagTopic(channel.topic, _schema_name(file, channel.schema_id),
                      tally.counts.get(number, 0),
-                     parse_qos(channel.metadata.get('offered_qos_profiles'), channel.topic),
+                     parse_qos(channel.metadata.get('offered_qos_profiles'),
+                               f'{file.path}, {channel.topic}'),
                      channel.metadata.get('topic_type_hash', ''))
             for file, tally in zip(self._files, tallies, strict=True)
             for number, channel in file.channels.items())
@@ -142,11 +157,14 @@ def _schema_name(file: McapFile, schema_id: int) -> str:
     return file.schemas[schema_id].name if schema_id in file.schemas else ''
 
 
-def _merge(topics: Iterator[BagTopic]) -> tuple[BagTopic, ...]:
+def merge_topics(topics: Iterable[BagTopic]) -> tuple[BagTopic, ...]:
     """Join the channels of one topic: several publishers, or several files."""
     merged: dict[str, BagTopic] = {}
     for topic in topics:
         known = merged.get(topic.name, topic)
+        if is_foreign(topic.name, known.type_name):
+            # Anybody may have spoken first on a topic; the run's own type is the topic's.
+            known = replace(known, type_name=topic.type_name, type_hash=topic.type_hash)
         count = topic.message_count + (known.message_count if topic.name in merged else 0)
         qos = tuple(dict.fromkeys(known.qos + topic.qos))
         merged[topic.name] = BagTopic(topic.name, known.type_name, count, qos, known.type_hash)
@@ -172,18 +190,22 @@ class RosbagsStorage:
             self.start_ns = self._reader.start_time if filled else 0
             # rosbags counts the end as the first instant after the last message.
             self.end_ns = self._reader.end_time - 1 if filled else 0
-        self.topics = _merge(
-            BagTopic(connection.topic, connection.msgtype, connection.msgcount,
-                     _qos_of(connection), connection.digest or '')
+        self.topics = merge_topics(
+            # Metadata may give other things than text.
+            BagTopic(str(connection.topic), str(connection.msgtype), connection.msgcount,
+                     _qos_of(connection), str(connection.digest or ''))
             for connection in self._connections)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
         try:
             yield
-        except (ReaderError, OSError, sqlite3.Error, ValueError, AssertionError) as error:
-            raise InputError(f'cannot be read ({error})', str(self._path),
-                             'check it with `ros2 bag info`, or `ros2 bag reindex` it') from error
+        except InputError:
+            raise
+        except Exception as error:  # rosbags raises whatever its code stumbles over
+            raise InputError(f'cannot be read ({error or type(error).__name__})',
+                             str(self._path), 'write its metadata.yaml again with '
+                             '`crgame recover`, or check it with `ros2 bag info`') from error
 
     def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
                  end_ns: int | None = None) -> Iterator[BagMessage]:
@@ -194,7 +216,8 @@ class RosbagsStorage:
         with self._explained():
             for connection, log_time_ns, data in self._reader.messages(wanted, start_ns,
                                                                        end_ns):
-                yield BagMessage(connection.topic, connection.msgtype, log_time_ns, bytes(data))
+                yield BagMessage(str(connection.topic), str(connection.msgtype), log_time_ns,
+                                 bytes(data))
 
     def definition(self, type_name: str) -> str:
         """Return the stored `ros2msg` definition of a type, empty where there is none."""

@@ -1,23 +1,39 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """`timing.json`: what a recorded run says of its timing, planners, violations and contacts."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import header_stamp_ns
+from crgame_ros.messages.status_values import read_status
 from crgame_ros.recording.epochs import Epoch, read_epoch
-from crgame_ros.recording.reader import BagReader, DecodedMessage
+from crgame_ros.recording.export import write_text
+from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_contacts import recorded_contacts
-from crgame_ros.recording.run_log import read_cycles, stamp_of
-from crgame_ros.scenario.export import write_text
+from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.storage import BagMessage
 from crgame_ros.timing.timing_metrics import TimingMetrics
+import numpy as np
+from shapely.errors import GEOSException
 
 _DIAGNOSTICS = '/diagnostics'
 # Counts of a status `sim_node: <av> plans`, as the engine keeps them.
@@ -25,46 +41,60 @@ _PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'real
                 'steps_without_plan')
 
 
-def timing_report(bag: Path, epoch: int | None = None) -> dict[str, Any]:
+def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None,
+                  progress: Callable[[float], object] | None = None) -> dict[str, Any]:
     """
     Report on a recorded run; `docs/recordings.md` and `docs/timing.md` define the keys.
 
     :param bag: a recording, finished or cut off.
     :param epoch: which run, where the recording holds several; None for the last.
+    :param log: the run, where it has been read already.
+    :param progress: is told how much of the recording has been read, 0 to 1.
     :raises InputError: if the recording lacks its documents or cycles.
     :raises CrgameError: if it holds fewer than two cycles.
     """
-    with BagReader(bag) as reader:
+    if log is not None:
+        epoch = log.game.epoch
+    with BagReader(bag, parts=True, progress=progress) as reader:
         run = read_epoch(reader, epoch)
-        cycles = read_cycles(bag, run.game.epoch)
+        cycles = log.cycles if log is not None and log.cycles is not None \
+            else read_cycles(reader, run.game.epoch)
         metrics = TimingMetrics(run.game.scheduler.dt_s)
         metrics.add_rows(cycles.timing_rows())
         numbers = cycles.column('n')
         collected = _Collector(run)
-        for message in reader.decoded(collected.topics):
-            collected.take(message)
+        for message in reader.messages(collected.topics):
+            collected.take(message, reader)
         contacts, unknown = _contacts(reader, run, collected.verdicts)
         return {
             **metrics.summary().as_dict(),
             # The first row is that of the step to n = 1.
             'gaps': int(numbers[-1]) - len(numbers),
+            'scenario_steps': None if log is None else
+            {'first': int(log.ks[0]), 'last': int(log.ks[-1])},
             'planners': {av: collected.planner(av) for av in collected.avs},
             'drivability': {'violations': len(collected.violations),
                             'list': collected.violations},
             'contacts': contacts,
-            'benchmark_id': str(run.game.content.get('benchmark_id', '')),
+            'benchmark_id': run.game.benchmark_id,
             'epoch': run.game.epoch,
-            'notices': [*reader.notices, *unknown]}
+            'notices': [*dict.fromkeys((
+                *(() if log is None else log.notices), *reader.notices, *reader.foreign_notices,
+                *unknown))]}
 
 
-def write_timing_report(bag: Path, path: Path, epoch: int | None = None) -> dict[str, Any]:
+def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
+                        log: RunLog | None = None,
+                        progress: Callable[[float], object] | None = None) -> dict[str, Any]:
     """
     Write `timing.json`; the file is there whole or not at all.
+
+    Parameters are those of `timing_report`.
 
     :return: what was written.
     :raises InputError: as `timing_report`, and if the file cannot be written.
     """
-    report = timing_report(bag, epoch)
+    report = timing_report(bag, epoch, log, progress)
     write_text(json.dumps(report, indent=2, allow_nan=False) + '\n', path)
     return report
 
@@ -74,7 +104,8 @@ def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivabili
     """Give the entries of the contacts, or None and why they are not known."""
     try:
         return [item.as_dict() for item in recorded_contacts(reader, run, verdicts)], ()
-    except InputError as error:
+    except (InputError, ValueError, GEOSException) as error:
+        # Of states that somebody else sent there may be no outlines.
         return None, (f'contacts are not named: {error}',)
 
 
@@ -83,8 +114,8 @@ class _Collector:
 
     def __init__(self, run: Epoch) -> None:
         self._run = run
-        self.avs = [str(entry['id']) for entry in run.game.avs]
-        vehicles = [str(entry['id']) for entry in (*run.game.humans, *run.game.avs)]
+        self.avs = [av.id for av in run.game.avs]
+        vehicles = [item.id for item in run.game.vehicles]
         self._requests = {f'/{av}/plan_request': av for av in self.avs}
         self._plans = {f'/{av}/plan': av for av in self.avs}
         self._verdicts = {f'/{vehicle}/drivability': vehicle for vehicle in vehicles}
@@ -99,23 +130,29 @@ class _Collector:
         self._plan_times_ms: dict[str, list[float]] = defaultdict(list)
         self._statuses: dict[str, dict[str, str]] = {}
 
-    def take(self, recorded: DecodedMessage) -> None:
-        """Take one message; those of other runs are passed over."""
-        topic, _, log_time_ns, message = recorded
-        stamp_ns = stamp_of(message)
+    def take(self, recorded: BagMessage, reader: BagReader) -> None:
+        """Take one message; those of other runs, and those that are none, are passed over."""
+        topic, _, log_time_ns, data = recorded
+        stamp_ns = header_stamp_ns(data)
         if not self._run.holds(stamp_ns, log_time_ns):
             return
+        # Of requests and plans, which are large, the stamp is enough.
         if topic in self._requests:
             # A request that was sent again counts from the last time before its answer.
             self._asked_ns[self._requests[topic], stamp_ns] = log_time_ns
         elif topic in self._plans:
             self._take_plan(self._plans[topic], stamp_ns, log_time_ns)
-        elif topic in self._verdicts:
-            for status in message.status:
-                self._take_verdict(self._verdicts[topic], status)
         else:
+            try:
+                message = reader.decode(recorded).message
+            except InputError:
+                reader.foreign[topic] += 1
+                return
             for status in message.status:
-                self._take_status(status)
+                if topic in self._verdicts:
+                    self._take_verdict(self._verdicts[topic], status)
+                else:
+                    self._take_status(status)
 
     def _take_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1
@@ -130,7 +167,7 @@ class _Collector:
             self._latencies_ms[av].append(latency_ms)
 
     def _take_status(self, status: Any) -> None:
-        values = _values(status)
+        values = read_status(status).values
         self._statuses[status.name] = values
         if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
             self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
@@ -138,7 +175,7 @@ class _Collector:
     def _take_verdict(self, vehicle: str, status: Any) -> None:
         """Note what has begun to be violated; heartbeats repeat what lasts."""
         violated = set(status.message.split('; ')) if status.level else set()
-        values = _values(status)
+        values = read_status(status).values
         n = _count(values, 'n')
         for what in sorted(violated - self._lasting[vehicle]):
             self.violations.append({'n': n, 'vehicle': vehicle, 'what': what})
@@ -162,10 +199,6 @@ class _Collector:
         report['latency_ms'] = _spread(self._latencies_ms[av])
         report['first_latency_ms'] = self._first_latency_ms.get(av)
         return report
-
-
-def _values(status: Any) -> dict[str, str]:
-    return {str(entry.key): str(entry.value) for entry in status.values}
 
 
 def _count(values: dict[str, str], key: str) -> int | None:

@@ -1,11 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Publishers, subscriptions and services, created from the interface contract."""
 
 from collections.abc import Callable
-import importlib
 from typing import Any
+from weakref import WeakKeyDictionary
 
+from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import message_header
+from crgame_ros.messages.contract import load_contract, Qos
+from crgame_ros.ros.diagnostics import Diagnostics
+from crgame_ros.ros.intake import Intake, message_type, Refusals
 from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client
 from rclpy.node import Node
@@ -14,14 +31,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
-from crgame_ros.ros.contract import load_contract, Qos
-
-
-def message_type(type_name: str) -> Any:
-    """Import a message or service type from its name package/msg/Type."""
-    package, kind, name = type_name.split('/')
-    return getattr(importlib.import_module(f'{package}.{kind}'), name)
-
 
 def qos_profile(qos: Qos) -> QoSProfile:
     """Give the rclpy profile of a contract's QoS."""
@@ -29,6 +38,14 @@ def qos_profile(qos: Qos) -> QoSProfile:
         depth=qos.depth,
         reliability=ReliabilityPolicy[qos.reliability.upper()],
         durability=DurabilityPolicy[qos.durability.upper()])
+
+
+# Messages that cannot be used, or are of others, are passed over: so many at one look.
+MAX_PASSED_OVER = 100
+# Of a slot for one message others would take the place; so many wait where we choose.
+SHARED_DEPTH = 200
+# Of each node of this process.
+_TOLD: WeakKeyDictionary[Node, tuple[Diagnostics, Refusals]] = WeakKeyDictionary()
 
 
 class PolledGroup(CallbackGroup):
@@ -52,28 +69,49 @@ class PolledSubscription:
 
     With depth 1 it is the single slot of CRG algorithm 2. Reading an empty one costs about
     1 µs, waking an executor 200-400 µs.
+
+    :param subscription: to serialised messages.
+    :param name: of the topic.
+    :param read: makes of a serialised message what the owner wants, or raises InputError.
+    :param refuse: is told of messages that cannot be used, which are passed over; without it they
+        raise InputError.
+    :ivar wanted: decides by stamp [ns] and frame whether a message is one for the owner; others
+        are passed over before anything else is made of them. Every message, if None.
     """
 
-    def __init__(self, subscription: Subscription, raw: bool) -> None:
+    def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], Any],
+                 refuse: Callable[[str, str], None] | None) -> None:
         self.subscription = subscription
-        self._raw = raw
+        self.wanted: Callable[[int, str], bool] | None = None
+        self._name = name
+        self._read = read
+        self._refuse = refuse
 
     def take(self) -> Any | None:
         """Take the oldest waiting message (or its bytes, if raw); None if there is none."""
-        subscription = self.subscription
-        with subscription.handle:
-            taken = subscription.handle.take_message(subscription.msg_type, self._raw)
+        taken = self.take_timed()
         return None if taken is None else taken[0]
 
     def take_timed(self) -> tuple[Any, int, int] | None:
         """Take like `take`, with the times of publication and reception [ns since 1970]."""
         subscription = self.subscription
-        with subscription.handle:
-            taken = subscription.handle.take_message(subscription.msg_type, self._raw)
-        if taken is None:
-            return None
-        message, info = taken
-        return message, int(info['source_timestamp']), int(info['received_timestamp'])
+        # A flood of what cannot be used waits its turn.
+        for _ in range(MAX_PASSED_OVER):
+            with subscription.handle:
+                taken = subscription.handle.take_message(subscription.msg_type, True)
+            if taken is None:
+                return None
+            data, info = taken
+            try:
+                if self.wanted is not None and not self.wanted(*message_header(data, self._name)):
+                    continue
+                return (self._read(data), int(info['source_timestamp']),
+                        int(info['received_timestamp']))
+            except InputError as error:
+                if self._refuse is None:
+                    raise
+                self._refuse(self._name, str(error))
+        return None
 
     def latest(self) -> Any | None:
         """Take all waiting messages and give the newest; None if there is none."""
@@ -91,32 +129,59 @@ class Endpoints:
         self._contract = load_contract()
         # rclpy keeps callback groups by weak reference only.
         self._polled_group = PolledGroup()
+        # One of each for all endpoints of a node.
+        if node not in _TOLD:
+            diagnostics = Diagnostics(node, self.publisher('/diagnostics'))
+            _TOLD[node] = diagnostics, Refusals(node, diagnostics)
+        self.diagnostics, self.refusals = _TOLD[node]
 
     def publisher(self, name: str, vehicle_id: str = '') -> Publisher:
         """Create a publisher."""
         topic = self._contract.topic(name)
         return self._node.create_publisher(
-            message_type(topic.type_name), topic.name_for(vehicle_id), qos_profile(topic.qos))
+            message_type(topic.type_name), relative(topic.name_for(vehicle_id)),
+            qos_profile(topic.qos))
 
     def subscription(self, name: str, callback: Callable[[Any], None],
                      vehicle_id: str = '') -> Subscription:
         """Create a subscription whose callback an executor runs."""
         topic = self._contract.topic(name)
+        intake = Intake(topic, topic.name_for(vehicle_id))
+
+        def read(data: bytes) -> None:
+            try:
+                message = intake.read(data)
+            except InputError as error:
+                self.refusals.note(intake.name, str(error))
+                return
+            callback(message)
+
         return self._node.create_subscription(
-            message_type(topic.type_name), topic.name_for(vehicle_id), callback,
-            qos_profile(topic.qos))
+            message_type(topic.type_name), relative(intake.name), read, qos_profile(topic.qos),
+            raw=True)
 
     def polled(self, name: str, vehicle_id: str = '', *, raw: bool = False,
-               depth: int | None = None) -> PolledSubscription:
-        """Create a subscription that the node reads itself."""
+               depth: int | None = None, strict: bool = False,
+               verify: bool = False) -> PolledSubscription:
+        """
+        Create a subscription that the node reads itself.
+
+        :param raw: give serialised messages.
+        :param verify: give serialised messages of the topic's type, whatever is in them.
+        :param strict: raise InputError for a message that cannot be used, instead of passing it
+            over and counting it.
+        """
         topic = self._contract.topic(name)
         profile = qos_profile(topic.qos)
         if depth is not None:
             profile.depth = depth
+        intake = Intake(topic, topic.name_for(vehicle_id))
         subscription = self._node.create_subscription(
-            message_type(topic.type_name), topic.name_for(vehicle_id), _unused, profile,
-            callback_group=self._polled_group, raw=raw)
-        return PolledSubscription(subscription, raw)
+            message_type(topic.type_name), relative(intake.name), _unused, profile,
+            callback_group=self._polled_group, raw=True)
+        read = intake.verify if verify else intake.bound if raw else intake.read
+        return PolledSubscription(subscription, intake.name, read,
+                                  None if strict else self.refusals.note)
 
     def release(self, slot: PolledSubscription) -> None:
         """Give a subscription up."""
@@ -127,13 +192,18 @@ class Endpoints:
         """Create a service."""
         row = self._contract.services[name]
         return self._node.create_service(
-            message_type(row.type_name), name.replace('<av>', vehicle_id), callback)
+            message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback)
 
     def client(self, name: str, vehicle_id: str = '') -> Client:
         """Create a client of a service."""
         row = self._contract.services[name]
         return self._node.create_client(
-            message_type(row.type_name), name.replace('<av>', vehicle_id))
+            message_type(row.type_name), relative(name.replace('<av>', vehicle_id)))
+
+
+def relative(name: str) -> str:
+    """Give a name of the contract as one in the node's namespace, `/` if it has none."""
+    return name.removeprefix('/')
 
 
 def _unused(message: Any) -> None:

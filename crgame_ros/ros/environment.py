@@ -1,8 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The environment a ROS process needs: loopback only, and where the ROS wheels are."""
 
 from collections.abc import Iterator
+from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 import os
 from pathlib import Path
@@ -16,6 +29,7 @@ from crgame_ros.paths import config_directory
 OPEN_NETWORK = 'CRGAME_OPEN_NETWORK'
 # Fast DDS reads the first name up to version 2.x and the second from 3.0 on.
 PROFILE_VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+COMPILED_RCLPY = '_rclpy_pybind11'
 DOMAIN_IDS = range(1, 102)
 # DDSI-RTPS 9.6.1.1: the ports of a domain start at PB + DG * domain and fill DG ports.
 PORT_BASE = 7400
@@ -46,6 +60,25 @@ def ros_wheels_prefix() -> Path | None:
         return None
     prefix = Path(sys.prefix)
     return prefix if Path(spec.origin).is_relative_to(prefix) else None
+
+
+def require_ros() -> None:
+    """
+    Check that there is an rclpy for this Python; call it before the first ``import rclpy``.
+
+    :raises CrgameError: if there is none, saying what to do.
+    """
+    python = f'Python {sys.version_info.major}.{sys.version_info.minor} ({sys.executable})'
+    spec = find_spec('rclpy')
+    if spec is None or spec.origin is None:
+        raise CrgameError(f'there is no ROS 2 (rclpy) for {python}; start through ./run.sh, which '
+                          'brings it, or source /opt/ros/jazzy/setup.bash')
+    folder = Path(spec.origin).parent
+    compiled = {path.name for path in folder.glob(f'{COMPILED_RCLPY}*')}
+    if compiled and not any(f'{COMPILED_RCLPY}{suffix}' in compiled
+                            for suffix in EXTENSION_SUFFIXES):
+        raise CrgameError(f'the rclpy in {folder} is not for {python}, only {min(compiled)}; use '
+                          'that Python, or start through ./run.sh in a terminal without that ROS')
 
 
 def prepare_environment() -> None:

@@ -1,11 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The frame around every node: environment, start, clean end, one-line errors."""
 
 from collections.abc import Callable
 import ctypes
+import faulthandler
 import gc
 import os
+from pathlib import Path
 import signal
 import sys
 from types import FrameType
@@ -14,6 +28,9 @@ from typing import Protocol
 PARENT_VARIABLE = 'CRGAME_PARENT_PID'
 NICE_VARIABLE = 'CRGAME_NICE'
 PR_SET_PDEATHSIG = 1
+PR_SET_NAME = 15
+# At this signal a node prints what its threads are at.
+TELL_WHERE = signal.SIGUSR1
 
 
 class StopFlag:
@@ -55,6 +72,11 @@ def die_with_parent() -> None:
         sys.exit(f'the process {parent} that started the graph is gone')
 
 
+def name_process(name: str) -> None:
+    """Name this process for `top` and `ps -o comm`, which show the first 15 characters."""
+    ctypes.CDLL(None).prctl(PR_SET_NAME, name.encode())
+
+
 def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) -> None:
     """
     Run a node until it is done, interrupted or shut down.
@@ -66,17 +88,19 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     :param create: makes the node, once rclpy is up.
     :param args: command line, the process's own where None.
     """
+    faulthandler.register(TELL_WHERE)
+    name_process(Path(sys.argv[0]).stem)
     die_with_parent()
     # Planners and recorder give way to the simulation and the driver.
     os.nice(int(os.environ.get(NICE_VARIABLE, '0')))
     from crgame_ros.ros.environment import prepare_environment
     prepare_environment()
 
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
-
     from crgame_ros.errors import CrgameError
     from crgame_ros.ros.shared_memory import remove_half_made_ports
+    import rclpy
+    from rclpy.exceptions import ParameterException
+    from rclpy.signals import SignalHandlerOptions
 
     remove_half_made_ports()
     stop = StopFlag()
@@ -90,6 +114,9 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)
         code = error.exit_code
+    except ParameterException as error:
+        print(f'error: {" ".join(str(error).split())}', file=sys.stderr, flush=True)
+        code = 2
     finally:
         if node is not None:
             node.destroy_node()

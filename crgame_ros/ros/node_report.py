@@ -1,15 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What a companion node tells of itself once a second on /diagnostics."""
 
 from collections.abc import Mapping
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-import numpy as np
-
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import to_time
+from diagnostic_msgs.msg import DiagnosticStatus
+import numpy as np
 
 PERIOD_S = 1.0
 
@@ -23,7 +33,7 @@ class NodeReport:
     """
 
     def __init__(self, endpoints: Endpoints, name: str) -> None:
-        self._publisher = endpoints.publisher('/diagnostics')
+        self._diagnostics = endpoints.diagnostics
         self._name = name
         self._durations_s: list[float] = []
         self._sent_s = 0.0
@@ -44,9 +54,5 @@ class NodeReport:
         self._durations_s.clear()
         work = {'work_ms_median': f'{np.median(times_ms):.3f}',
                 'work_ms_worst': f'{times_ms.max():.3f}'}
-        status = DiagnosticStatus(level=DiagnosticStatus.OK, name=self._name, message=text)
-        status.values = [KeyValue(key=key, value=str(value))
-                         for key, value in {**values, **work}.items()]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = to_time(stamp_ns)
-        self._publisher.publish(message)
+        self._diagnostics.publish(self._name, DiagnosticStatus.OK, text, {**values, **work},
+                                  stamp_ns)

@@ -1,18 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What an AV's perception knows, in the types that ROS tools expect."""
 
 from array import array
 import math
+from typing import Any
 
-from nav_msgs.msg import Odometry
-import numpy as np
-from sensor_msgs.msg import LaserScan
-
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.perception.perception import Perception
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import MAP, set_time
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.ros.ros_messages import EXACT_VARIANCE, set_time
+from nav_msgs.msg import Odometry
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import LaserScan
+
+Array = NDArray[np.float64]
 
 # Places of x, y and yaw in the 6 x 6 covariance of a pose.
 POSE_PLACES = (0, 1, 5)
@@ -40,13 +56,20 @@ class LocalizationMessage:
         pose.pose.orientation.z = math.sin(0.5 * estimate.yaw)
         pose.pose.orientation.w = math.cos(0.5 * estimate.yaw)
         twist.twist.linear.x, twist.twist.angular.z = estimate.speed, estimate.yaw_rate
-        covariance = np.zeros((6, 6))
-        covariance[np.ix_(POSE_PLACES, POSE_PLACES)] = perception.covariance[:3, :3]
-        pose.covariance = covariance.ravel()
-        speeds = np.zeros(36)
-        speeds[0] = perception.covariance[3, 3]
-        twist.covariance = speeds
+        # What the filter has no state for is as the world or the vehicle's own sensors have it.
+        known, covariance = np.diag([EXACT_VARIANCE] * 6), perception.covariance
+        place = np.ix_(POSE_PLACES, POSE_PLACES)
+        pose.covariance = _at_least(known, place, covariance[:3, :3])
+        twist.covariance = _at_least(known, np.ix_((0,), (0,)), covariance[3:, 3:])
         self._publisher.publish(message)
+
+
+def _at_least(known: Array, place: tuple[Any, ...], part: Array) -> Array:
+    """Give a covariance (36) with a part that the filter has, which may know it exactly, too."""
+    covariance = known.copy()
+    covariance[place] = part
+    np.fill_diagonal(covariance, np.maximum(covariance.diagonal(), known.diagonal()))
+    return covariance.ravel()
 
 
 class ScanMessages:

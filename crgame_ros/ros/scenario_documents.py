@@ -1,18 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The run as `/scenario/xml`, `/scenario/objects` and `/scenario/game` describe it together."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.scenario.loading import LoadedScenario, parse_scenario, scenario_digest
-from crgame_ros.scenario.objects import ObjectDescription
-from crgame_ros.simulation.documents import (
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import (
     GameDocument,
     parse_game_document,
     parse_objects_document,
 )
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.scenario.loading import LoadedScenario, parse_scenario, scenario_digest
 
 # The game is read first: it is published last, so that what it speaks of is mostly there.
 KINDS = ('game', 'xml', 'objects')
@@ -58,7 +71,12 @@ class DocumentCollector:
         Take a document.
 
         :param kind: xml, objects or game.
+        :raises InputError: if it cannot be read: the one before stays.
         """
+        if kind == 'game':
+            parse_game_document(text)
+        elif kind == 'objects':
+            parse_objects_document(text)
         self._texts[kind] = text
 
     def complete(self) -> ScenarioSet | None:
@@ -74,7 +92,7 @@ class DocumentCollector:
             return None
         objects = parse_objects_document(self._texts['objects'])
         if [item.id for item in objects if item.role.is_ego] \
-                != [entry['id'] for entry in (*game.humans, *game.avs)]:
+                != [item.id for item in game.vehicles]:
             return None
         if self._loaded is None or self._loaded.sha256 != game.scenario_sha256:
             self._loaded = parse_scenario(self._texts['xml'], '/scenario/xml')
@@ -91,17 +109,24 @@ class ScenarioDocuments:
 
     def __init__(self, endpoints: Endpoints) -> None:
         self._slots = {kind: endpoints.polled(f'/scenario/{kind}') for kind in KINDS}
+        self._refusals = endpoints.refusals
         self._collector = DocumentCollector()
 
     def poll(self) -> ScenarioSet | None:
         """
         Give a new complete set; None while there is nothing new.
 
-        :raises CrgameError: if a document cannot be read, once for each time it comes.
+        A game or list of objects that cannot be read is refused and counted.
+
+        :raises CrgameError: if the scenario of a game cannot be read.
         """
         fresh = False
         for kind, slot in self._slots.items():
             if (document := slot.latest()) is not None:
-                self._collector.take(kind, document.data)
-                fresh = True
+                try:
+                    self._collector.take(kind, document.data)
+                    fresh = True
+                except InputError as error:
+                    # The one before goes on.
+                    self._refusals.note(f'/scenario/{kind}', str(error))
         return self._collector.complete() if fresh else None

@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who drives what in a live run: one source a seat, changed by orders on /seats/order."""
 
 from collections.abc import MutableMapping
 import json
 from typing import TYPE_CHECKING
 
-from crgame_ros.driver.command import DriverCommand, RELEASED
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
-from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.messages import from_joy, from_time
+from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, SHARED_DEPTH
+from crgame_ros.ros.ros_messages import from_joy
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
-# The driver's process needs neither, and they take half a second to load.
-if TYPE_CHECKING:
-    from crgame_ros.driver.replay import ReplayDriver
+if TYPE_CHECKING:  # The driver's process needs neither, and they take half a second to load.
+    from crgame_ros.driver.replay_driver import ReplayDriver
+    from crgame_ros.recording.recorded_inputs import RecordedInputs
     from crgame_ros.simulation.engine import Simulation
-    from crgame_ros.simulation.replay import RecordedInputs
     from crgame_ros.simulation.setup import Setup
 
 NS = 1e-9
@@ -27,7 +38,7 @@ GAME = 'game'
 PLANNER = 'planner'
 REPLAY = 'replay'
 MAX_SOURCE_LENGTH = 40
-# Two drivers may speak in the moment in which a seat changes hands.
+# Commands of its driver that a seat takes in one cycle.
 COMMAND_DEPTH = 10
 # Orders read in one cycle: a flood must not cost it.
 MAX_ORDERS = 10
@@ -54,6 +65,8 @@ class Seat:
         self.home = home
         self.source = home
         self.commands = commands
+        # Decided before a command takes a place among those of a cycle.
+        commands.wanted = self._is_for_us
         self.recording = recording
         # Whether an AV is driven as it was while somebody had taken it over.
         self.taken_over_again = False
@@ -64,6 +77,8 @@ class Seat:
         self._clock_offset_ns = clock_offset_ns
         self.malformed = 0
         self.outdated = 0
+        # Commands of others, who have not got the seat.
+        self.passed_over = 0
 
     @property
     def losses(self) -> int:
@@ -99,17 +114,25 @@ class Seat:
         if self._heard_ns is not None and not self._watchdog.lost:
             self._heard_ns = now_ns
 
+    def _is_for_us(self, stamp_ns: int, source: str) -> bool:
+        if (source or GAME) != self.source:
+            self.passed_over += 1
+            return False
+        if stamp_ns < self._clock_offset_ns:
+            self.outdated += 1
+            return False
+        return True
+
     def listen(self, now_ns: int) -> bool:
         """Take the latest command that has come; tell whether there was any so far."""
         for _ in range(COMMAND_DEPTH):
-            message = self.commands.take()
+            try:
+                message = self.commands.take()
+            except InputError:
+                self.malformed += 1
+                continue
             if message is None:
                 break
-            if (message.header.frame_id or GAME) != self.source:
-                continue
-            if from_time(message.header.stamp) < self._clock_offset_ns:
-                self.outdated += 1
-                continue
             try:
                 self._last = from_joy(message, self._where)
                 self._heard_ns = now_ns
@@ -171,11 +194,13 @@ class Seats:
         self._sources = sources
         self.humans = [
             Seat(human.id, human.driver, _home(human.driver),
-                 endpoints.polled('/<v>/driver_command', human.id, depth=COMMAND_DEPTH),
+                 endpoints.polled('/<v>/driver_command', human.id, depth=SHARED_DEPTH,
+                                  strict=True),
                  clock_offset_ns, drivers.get(human.id)) for human in setup.humans]
         self.avs = [
             Seat(av.id, av.spec.planner, PLANNER,
-                 endpoints.polled('/<v>/driver_command', av.id, depth=COMMAND_DEPTH),
+                 endpoints.polled('/<v>/driver_command', av.id, depth=SHARED_DEPTH,
+                                  strict=True),
                  clock_offset_ns, drivers.get(av.id)) for av in setup.avs]
         self.all = [*self.humans, *self.avs]
         self._taken_over_again: list[bool] = []
@@ -244,7 +269,8 @@ class Seats:
         if seat is None:
             raise InputError(f'there is no seat {str(name)[:MAX_SOURCE_LENGTH]!r}', '/seats/order',
                              'it has ' + ', '.join(item.id for item in self.all))
-        if not isinstance(source, str) or not 0 < len(source) <= MAX_SOURCE_LENGTH:
+        if not isinstance(source, str) or not 0 < len(source) <= MAX_SOURCE_LENGTH \
+                or not source.isprintable():
             raise InputError('the source is no name', '/seats/order', 'give game or a driver')
         if source == PLANNER != seat.home:
             raise InputError(f'{seat.id} has no planner', '/seats/order', 'give game')

@@ -1,19 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Shared-memory ports that killed processes left half-made, on which others wait for ever."""
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Shared memory that killed processes left: half-made ports that others wait for, and the rest."""
 
+from contextlib import suppress
+import fcntl
+import os
 from pathlib import Path
 import re
 import time
 
 SHARED_MEMORY = Path('/dev/shm')
 PORT = re.compile(r'fastrtps_port\d+')
+SEGMENT = re.compile(r'fastrtps_[0-9a-f]{16}')
 # Fast DDS 2.14 makes a port with boost's managed_open_or_create, which keeps a state in the first
 # four bytes: 0 uninitialised, 1 being initialised, 2 initialised, 3 corrupted. Who opens a port
 # that is not initialised waits for its maker, alive or not.
 INITIALISED = (2).to_bytes(4, 'little')
 # Far longer than making a port takes on a busy machine [s].
 PATIENCE_S = 2.0
+# Whoever makes a segment maps and locks it well within this time [s].
+YOUNG_S = 60.0
 LOOK_S = 0.05
 
 
@@ -41,6 +59,81 @@ def remove_half_made_ports(folder: Path = SHARED_MEMORY) -> list[str]:
             break
         time.sleep(LOOK_S)
     return removed
+
+
+def remove_stale(folder: Path = SHARED_MEMORY) -> tuple[int, int]:
+    """
+    Remove the segments of Fast DDS whose processes are gone.
+
+    Files of this user alone, which no process that can be seen has mapped and whose lock nobody
+    holds: the kernel lets go of both with the process, however that ended. Ports stay: they are
+    few, their names are used again, and one that somebody is just opening would be lost to the
+    others.
+
+    :param folder: where Fast DDS keeps them.
+    :return: how many were removed, and their size on the disk of memory [bytes]
+    """
+    if not folder.is_dir():
+        return 0, 0
+    left = [path for path in sorted(folder.iterdir())
+            if SEGMENT.fullmatch(path.name) and _is_left(path)]
+    # Every process is asked only where something may be left.
+    mapped = _mapped(folder) if left else set()
+    count = size = 0
+    for path in left:
+        if path.name in mapped:
+            continue
+        # Gone meanwhile, or not ours.
+        with suppress(OSError):
+            blocks = path.stat().st_blocks
+            path.unlink()
+            count, size = count + 1, size + 512 * blocks
+            _lock_of(path).unlink()
+    return count, size
+
+
+def _lock_of(segment: Path) -> Path:
+    return segment.with_name(f'{segment.name}_el')
+
+
+def _is_left(segment: Path) -> bool:
+    """Tell whether a segment is this user's, not young, and nobody holds its lock."""
+    try:
+        found = segment.stat()
+        return found.st_uid == os.getuid() and time.time() - found.st_mtime >= YOUNG_S \
+            and _is_free(_lock_of(segment))
+    except OSError:
+        return False
+
+
+def _mapped(folder: Path) -> set[str]:
+    """List the files of a folder that processes have mapped, as far as these can be seen."""
+    found: set[str] = set()
+    mark = f' {folder}/'
+    for process in Path('/proc').iterdir():
+        if not process.name.isdecimal():
+            continue
+        try:
+            lines = (process / 'maps').read_text(errors='replace').splitlines()
+        except OSError:
+            continue
+        found.update(line.partition(mark)[2].split(' ')[0] for line in lines if mark in line)
+    return found
+
+
+def _is_free(lock: Path) -> bool:
+    """Tell whether nobody holds a lock file, which a file need not have."""
+    try:
+        descriptor = os.open(lock, os.O_RDONLY | os.O_CLOEXEC)
+    except FileNotFoundError:
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return True
 
 
 def _ports(folder: Path) -> list[Path]:

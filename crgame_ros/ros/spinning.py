@@ -1,17 +1,47 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Loops of nodes: with an executor, or polling."""
 
 from collections.abc import Callable
+from pathlib import Path
 import time
+import traceback
 
+from crgame_ros.ros.node_main import StopFlag
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from crgame_ros.ros.node_main import StopFlag
-
 # A waiting executor doesn't see a signal: look at the flag so often [s].
 LOOK_S = 0.1
+# What an input causes is told so often, while it goes on [s].
+COMPLAIN_S = 1.0
+
+
+def attempt(node: Node, work: Callable[[], None]) -> None:
+    """
+    Do a piece of work, and say in one line if it fails.
+
+    What nobody thought of, in a message that somebody sent, must cost that message, not the node.
+    """
+    try:
+        work()
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        place = f'{Path(last.filename).name}:{last.lineno}'
+        node.get_logger().error(f'{type(error).__name__} at {place}: {error}'[:500],
+                                throttle_duration_sec=COMPLAIN_S)
 
 
 def spin(node: Node, stop: StopFlag) -> None:
@@ -19,7 +49,7 @@ def spin(node: Node, stop: StopFlag) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     while not stop.requested:
-        executor.spin_once(timeout_sec=LOOK_S)
+        attempt(node, lambda: executor.spin_once(timeout_sec=LOOK_S))
     executor.remove_node(node)
 
 
@@ -35,10 +65,10 @@ def poll(node: Node, stop: StopFlag, period_s: float, work: Callable[[], None]) 
     executor.add_node(node)
     served_s = time.monotonic()
     while not stop.requested:
-        work()
+        attempt(node, work)
         if time.monotonic() - served_s > LOOK_S:
-            executor.spin_once(timeout_sec=0)
+            attempt(node, lambda: executor.spin_once(timeout_sec=0))
             served_s = time.monotonic()
         time.sleep(period_s)
-    work()
+    attempt(node, work)
     executor.remove_node(node)

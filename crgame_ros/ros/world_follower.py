@@ -1,20 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The true world as sim_node publishes it, step by step, for nodes that follow it."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.messages.joints import vehicles_from_joints
+from crgame_ros.messages.world_messages import WorldMessages
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.run_time import RunTime, TimeCourse
+from crgame_ros.ros.scenario_documents import ScenarioSet
 import numpy as np
 from numpy.typing import NDArray
 from trajectory_msgs.msg import JointTrajectory
-
-from crgame_ros.planner.joints import vehicles_from_joints
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_time
-from crgame_ros.ros.scenario_documents import ScenarioSet
-from crgame_ros.scenario.objects import ObjectStates
 
 FloatArray = NDArray[np.float64]
 # Kept while their other half is on its way; both are published within a millisecond.
@@ -53,9 +67,14 @@ class WorldFollower:
 
     :param endpoints: of the node.
     :param states: topic of the vehicles, at every step or at scenario time steps alone.
+    :param begin_anew: is called where the run begins again, as in a recording that is played once
+        more, before the first of its steps is given.
     """
 
-    def __init__(self, endpoints: Endpoints, states: str) -> None:
+    def __init__(self, endpoints: Endpoints, states: str,
+                 begin_anew: Callable[[], object] = lambda: None) -> None:
+        self._begin_anew = begin_anew
+        self._time = RunTime()
         self._states = endpoints.polled(states)
         self._objects = endpoints.polled('/traffic/objects', depth=MAX_WAITING)
         self._scenario: ScenarioSet | None = None
@@ -66,13 +85,18 @@ class WorldFollower:
     def begin(self, scenario: ScenarioSet) -> None:
         """Follow another run; what has come of it already stays."""
         self._scenario = scenario
+        self._reader = WorldMessages(scenario.objects)
         self._objects_by_n.clear()
         self._latest = None
 
+    def drop(self) -> None:
+        """Let go what has come: of a run that is not known it may be the end."""
+        self._take_states()
+        self._waiting.clear()
+
     def steps(self) -> Iterator[WorldStep]:
         """Give every step that is complete, once."""
-        while (message := self._states.take()) is not None:
-            self._waiting.append(message)
+        self._take_states()
         if self._scenario is None:
             return
         self._take_objects(self._scenario)
@@ -84,24 +108,44 @@ class WorldFollower:
             if step.n >= 0:
                 yield step
 
+    def _take_states(self) -> None:
+        while (message := self._states.take()) is not None:
+            course = self._time.follow(from_time(message.header.stamp))
+            if course is TimeCourse.BACK:
+                self._waiting.clear()
+                self._objects_by_n.clear()
+                self._latest = None
+                self._begin_anew()
+            if course is not TimeCourse.BEHIND:
+                self._waiting.append(message)
+
     def _take_objects(self, scenario: ScenarioSet) -> None:
-        scheduler, count = scenario.game.scheduler, 3 * len(scenario.others)
+        scheduler = scenario.game.scheduler
         while (message := self._objects.take()) is not None:
             n = scheduler.tick_of_stamp(from_time(message.header.stamp))
-            if n is not None and message.points and len(message.points[0].positions) == count:
-                point = message.points[0]
-                self._objects_by_n[n] = ObjectStates(
-                    np.array(point.positions).reshape(-1, 3),
-                    np.array(point.velocities).reshape(-1, 3))
+            if n is None:
+                continue
+            try:
+                self._objects_by_n[n] = self._reader.object_states(message)
+            except InputError:
+                # Of the game before or after this one.
+                continue
+            # Those of a far future, which nobody has seen yet, are somebody's invention.
+            while len(self._objects_by_n) > MAX_WAITING:
+                del self._objects_by_n[max(self._objects_by_n)]
 
     def _complete(self, scenario: ScenarioSet, message: JointTrajectory) -> WorldStep | None:
         """Give a step, None if its objects are still on their way; n < 0: of another run."""
-        scheduler, count = scenario.game.scheduler, 4 * len(scenario.driven)
+        scheduler = scenario.game.scheduler
         n = scheduler.step_of_stamp(from_time(message.header.stamp))
         nothing = np.empty((0, 4))
         foreign = WorldStep(-1, False, nothing, nothing, nothing,
                             ObjectStates(nothing, nothing))
-        if n < 0 or not message.points or len(message.points[0].positions) != count:
+        try:
+            joints = self._reader.vehicle_joints(message)
+        except InputError:
+            return foreign
+        if n < 0:
             return foreign
         tick = scheduler.is_tick(n)
         if tick:
@@ -115,7 +159,4 @@ class WorldFollower:
                                   if at > n}
         if self._latest is None:
             return foreign
-        point = message.points[0]
-        positions, velocities, accelerations = (np.array(values).reshape(-1, 4) for values in (
-            point.positions, point.velocities, point.accelerations))
-        return WorldStep(n, tick, positions, velocities, accelerations, self._latest)
+        return WorldStep(n, tick, joints[0], joints[1], joints[2], self._latest)

@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The obstacles of one run: where the scenario has them, and where events have put them."""
 
 from abc import ABC, abstractmethod
 import math
 
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
+from crgame_ros.scenario.obstacles import ScenarioObstacles
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
-from crgame_ros.scenario.objects import ObjectStates
-from crgame_ros.scenario.obstacles import ScenarioObstacles
 
 FloatArray = NDArray[np.float64]
 
 _ABSENT = np.full(3, np.nan)
 
 
-class Course(ABC):
+class ObjectCourse(ABC):
     """Where one obstacle is from the time step on at which an event changed its course."""
 
     @abstractmethod
@@ -29,7 +40,7 @@ class Course(ABC):
         return self.state_at(k)[0][None, :]
 
 
-class Released(Course):
+class Released(ObjectCourse):
     """
     A recorded course, begun at another time.
 
@@ -53,7 +64,7 @@ class Released(Course):
         return self._poses[k - self._k:]
 
 
-class Braking(Course):
+class Braking(ObjectCourse):
     """
     Slows down along a path and keeps the speed that it reaches.
 
@@ -114,7 +125,7 @@ class Braking(Course):
         return path
 
 
-class Standing(Course):
+class Standing(ObjectCourse):
     """
     Stands for good.
 
@@ -139,7 +150,7 @@ class ObstacleCourses:
 
     def __init__(self, obstacles: ScenarioObstacles) -> None:
         self._obstacles = obstacles
-        self._courses: dict[int, Course] = {}
+        self._courses: dict[int, ObjectCourse] = {}
 
     @property
     def changed(self) -> list[int]:

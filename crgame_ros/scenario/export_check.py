@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whether a run in a scenario can be written, looked at before its first step."""
 
 from collections.abc import Sequence
 
-from lxml import etree
-
 from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.scenario.export_elements import planning_problem, static_obstacle
 from crgame_ros.scenario.export_goals import goals_of
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import framed, schema_errors, used_ids, write_roads
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription
+from lxml import etree
 
 _ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

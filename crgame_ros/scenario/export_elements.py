@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Obstacles and planning problems as CommonRoad 2020a XML text.
 
@@ -8,16 +20,15 @@ each of their values would take seconds. Numbers never carry an exponent, which 
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-import math
 from typing import Any
 
 from commonroad.common.util import Interval
 from commonroad.geometry.shape import Circle, Polygon, Rectangle, ShapeGroup
 from commonroad.geometry.shape import Shape as CommonRoadShape
+from crgame_ros.geometry.outline import outline, placed_at
+from crgame_ros.geometry.shape import Shape
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.geometry.shape import Shape
 
 STATIC_TYPES = frozenset({'unknown', 'parkedVehicle', 'constructionZone', 'roadBoundary'})
 DYNAMIC_TYPES = frozenset({'unknown', 'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'pedestrian',
@@ -194,9 +205,7 @@ def _placed_shape(shape: Shape, pose: Sequence[float]) -> str:
     if shape.kind == 'circle':
         return f'<circle><radius>{exact_number(0.5 * shape.length)}</radius>{center}</circle>'
     if shape.kind == 'polygon':
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        return _polygon([(x + cos * u - sin * v, y + sin * u + cos * v)
-                         for u, v in shape.vertices])
+        return _polygon(placed_at(outline(shape), x, y, yaw).tolist())
     return (f'<rectangle><length>{exact_number(shape.length)}</length>'
             f'<width>{exact_number(shape.width)}</width>'
             f'<orientation>{yaw:.4f}</orientation>{center}</rectangle>')

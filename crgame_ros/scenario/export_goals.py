@@ -1,13 +1,22 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The goals of exported planning problems."""
 
 from collections.abc import Mapping
 
 from commonroad.planning.planning_problem import PlanningProblem
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.export_elements import (
     goal_position,
@@ -16,6 +25,8 @@ from crgame_ros.scenario.export_elements import (
     lanelet_references,
     placed_rectangle,
 )
+import numpy as np
+from numpy.typing import NDArray
 
 # The place where a vehicle ended reaches so far beyond it [m], along and across.
 _MARGIN = (5.0, 1.0)

@@ -1,21 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The guard of untrusted scenario files: what it lets through can be read without harm."""
 
 from collections.abc import Iterable
 import math
 from pathlib import Path
 import re
-import stat
-
-from lxml import etree
 
 from crgame_ros.errors import InputError
+from crgame_ros.paths import irregular
+from lxml import etree
 
 MAX_BYTES = 64 * 2 ** 20
 MAX_MAGNITUDE = 1e9
 MAX_TIME_STEP = 100_000
-MIN_STEP_S, MAX_STEP_S = 0.001, 10.0
+# A planner looks seconds ahead in these steps: of 1 ms there would be thousands in every plan.
+MIN_STEP_S, MAX_STEP_S = 0.01, 10.0
+# Nothing on wheels begins faster; room and paths are made as long as a vehicle is fast [m/s].
+MAX_SPEED = 200.0
+# The largest published map has a tenth of it; a million take a minute to read.
+MAX_POINTS = 200_000
 VERSIONS = ('2018b', '2020a')
 OBSTACLE_TAGS = ('obstacle', 'staticObstacle', 'dynamicObstacle', 'environmentObstacle',
                  'phantomObstacle')
@@ -38,10 +54,8 @@ def read_text(path: Path) -> str:
     name = str(path)
     try:
         status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise InputError('is a directory', name, 'name a CommonRoad XML file')
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError('is no regular file', name, 'name a CommonRoad XML file')
+        if (other := irregular(status.st_mode)) is not None:
+            raise InputError(f'is {other}', name, 'name a CommonRoad XML file')
         if status.st_size > MAX_BYTES:
             raise _too_large(status.st_size, name)
         with path.open('rb') as stream:
@@ -99,8 +113,10 @@ def refuse_malformed(root: etree._Element, source: str) -> None:
     lanelets = root.findall('lanelet')
     if not lanelets:
         raise InputError('has no lanelets', source, 'give a scenario with a road network')
-    for lanelet in lanelets:
-        _check_bounds(lanelet, source)
+    count = sum(_check_bounds(lanelet, source) for lanelet in lanelets)
+    if count > MAX_POINTS:
+        raise InputError(f'the bounds of its lanelets have {count} points, more than '
+                         f'{MAX_POINTS}', source, 'thin them out, or cut the map')
     for element in root.iterchildren(*OBSTACLE_TAGS, 'planningProblem'):
         _check_states(element, source)
     known = {lanelet.get('id') for lanelet in lanelets}
@@ -215,7 +231,8 @@ def _check_numbers(root: etree._Element, source: str) -> None:
                 'give a finite number')
 
 
-def _check_bounds(lanelet: etree._Element, source: str) -> None:
+def _check_bounds(lanelet: etree._Element, source: str) -> int:
+    """Check the points of a lanelet, and count them."""
     counts = []
     for name in ('leftBound', 'rightBound'):
         points = lanelet.findall(f'{name}/point')
@@ -230,6 +247,7 @@ def _check_bounds(lanelet: etree._Element, source: str) -> None:
     if counts[0] != counts[1]:
         raise InputError(f'the bounds have {counts[0]} and {counts[1]} points',
                          where(lanelet, source), 'give both bounds equally many')
+    return counts[0] + counts[1]
 
 
 def _check_states(element: etree._Element, source: str) -> None:
@@ -239,6 +257,12 @@ def _check_states(element: etree._Element, source: str) -> None:
         states = element.findall('initialState')
         if not states:
             raise InputError('has no initialState', where(element, source), 'add it')
+    if element.tag == 'planningProblem':
+        for speed in element.iterfind('initialState/velocity/*'):
+            if speed.tag in _EITHER_TAGS and not abs(float(speed.text)) <= MAX_SPEED:
+                raise InputError(f'the initial velocity is {float(speed.text):g} m/s',
+                                 where(speed, source),
+                                 f'give one between -{MAX_SPEED:g} and {MAX_SPEED:g} m/s')
     states += element.findall('trajectory/state')
     for state in states:
         if state.find('position') is None:

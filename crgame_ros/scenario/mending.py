@@ -1,16 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Mending scenario files where that is safe, before commonroad-io reads them."""
 
 from collections import Counter
+import math
 import re
 
 from commonroad.scenario.scenario import ScenarioID
-from lxml import etree
-
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_ids import renumber
+from lxml import etree
 
+# A published map has a gap of 160 m that it means; paths are tabulated along it [m].
+MAX_GAP = 1000.0
+# From a lanelet to others.
+LINKS = ('successor', 'predecessor', 'adjacentLeft', 'adjacentRight')
 _LENIENT_ID = re.compile(
     r'(C-)?([A-Z]{3})[-_]([A-Za-z0-9]+)[-_](\d+)(?:[-_](\d+)(?:[-_]([STPI])((?:[-_]\d+)+))?)?')
 
@@ -25,6 +41,7 @@ def mend(root: etree._Element) -> list[str]:
     notices: list[str] = []
     _mend_header(root, notices)
     _mend_references(root, notices)
+    _mend_gaps(root, notices)
     _mend_adjacency(root, notices)
     _mend_incomings(root, notices)
     _mend_times(root, notices)
@@ -96,6 +113,11 @@ def _mend_references(root: etree._Element, notices: list[str]) -> None:
             if reference.tag != 'isLeftOf' and reference.get('ref') not in ids[target]:
                 reference.getparent().remove(reference)
                 dropped[f'<{reference.tag}> to the missing {target} {reference.get("ref")}'] += 1
+    for lanelet in root.iterchildren('lanelet'):
+        for link in _links(lanelet):
+            if link.get('ref') is None:
+                lanelet.remove(link)
+                dropped[f'<{link.tag}> of lanelet {lanelet.get("id")}, without a ref'] += 1
     if dropped:
         notices.append(f'{dropped.total()} references lead nowhere and are ignored, the first: '
                        f'{next(iter(dropped))}')
@@ -106,6 +128,38 @@ def _mend_references(root: etree._Element, notices: list[str]) -> None:
                     tag == 'trafficSign' or element.find('position') is None):
                 root.remove(element)
                 notices.append(f'{tag} {element.get("id")} belongs to no lanelet and is ignored')
+
+
+def _mend_gaps(root: etree._Element, notices: list[str]) -> None:
+    """Cut links between lanelets that lie far apart: no way leads from one to the other."""
+    ends = {lanelet.get('id'): (_middle(lanelet, 0), _middle(lanelet, -1))
+            for lanelet in root.iterchildren('lanelet')}
+    cut: list[tuple[float, str]] = []
+    for lanelet in root.iterchildren('lanelet'):
+        start, end = ends[lanelet.get('id')]
+        for link in _links(lanelet):
+            first, last = ends[link.get('ref')]
+            gap = math.dist(end, first) if link.tag == 'successor' \
+                else math.dist(start, last) if link.tag == 'predecessor' \
+                else min(math.dist(a, b) for a in (start, end) for b in (first, last))
+            if not gap <= MAX_GAP:
+                lanelet.remove(link)
+                cut.append((gap, f'<{link.tag}> of lanelet {lanelet.get("id")}'))
+    if cut:
+        notices.append(f'{len(cut)} links of lanelets more than {MAX_GAP:g} m apart are ignored, '
+                       f'the widest, {max(cut)[0]:.0f} m: {max(cut)[1]}')
+
+
+def _links(lanelet: etree._Element) -> list[etree._Element]:
+    """Give what leads from a lanelet to others."""
+    return [link for tag in LINKS for link in lanelet.findall(tag)]
+
+
+def _middle(lanelet: etree._Element, index: int) -> tuple[float, float]:
+    """Give the middle between the first, or last, points of both bounds."""
+    points = [lanelet.findall(f'{name}/point')[index] for name in ('leftBound', 'rightBound')]
+    x, y = (sum(float(point.find(axis).text) for point in points) / 2 for axis in 'xy')
+    return x, y
 
 
 def _mend_adjacency(root: etree._Element, notices: list[str]) -> None:

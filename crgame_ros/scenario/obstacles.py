@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The obstacles of a scenario: what they look like, and where they are at each time step."""
 
 from collections.abc import Collection, Sequence
@@ -13,14 +25,13 @@ from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.prediction.prediction import SetBasedPrediction, TrajectoryPrediction
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle, PhantomObstacle
 from commonroad.scenario.state import State
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.loading import exact_position, exact_value, group_outline, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
+import numpy as np
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
@@ -86,7 +97,7 @@ class ScenarioObstacles:
 
     @property
     def poses(self) -> FloatArray:
-        """All poses (last_k - first_k + 1, M, 3) from `first_k` on; NaN where absent."""
+        """Give all (last_k - first_k + 1, M, 3) poses from `first_k` on; NaN where absent."""
         return self._poses
 
     @property

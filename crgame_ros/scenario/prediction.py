@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Predictions of others on the scenario grid.
 
@@ -11,16 +23,15 @@ from collections.abc import Sequence
 import math
 from typing import Protocol
 
+from crgame_ros.game.objects import ObjectStates, Role
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.roads.lane_line import LaneLine
+from crgame_ros.roads.lane_lookup import LaneLookup
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
-
-from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.scenario.lane_line import LaneLine
-from crgame_ros.scenario.lane_lookup import LaneLookup
-from crgame_ros.scenario.objects import ObjectStates, Role
-from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.vehicle.state import StateColumn
 
 FloatArray = NDArray[np.float64]
 

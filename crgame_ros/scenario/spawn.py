@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where driven vehicles start."""
 
 from collections.abc import Iterator, Sequence
@@ -7,20 +19,21 @@ from dataclasses import dataclass
 import math
 
 from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import HumanSpec, LaneletSpawn, PoseSpawn
+from crgame_ros.game.objects import ObjectDescription, ObjectStates
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.outline import placed_polygon
+from crgame_ros.geometry.reference_point import ahead
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.lane_line import LaneLine
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import exact_position, exact_value
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 import shapely
-
-from crgame_ros.errors import InputError
-from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.game import HumanSpec, LaneletSpawn, PoseSpawn
-from crgame_ros.scenario.lane_line import LaneLine
-from crgame_ros.scenario.loading import exact_position, exact_value
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import VehicleState
 
 # The least distance behind the AV's rear axle, in lengths of the vehicle.
 _CLOSEST = 1.5
@@ -60,8 +73,7 @@ def problem_pose(problem: PlanningProblem, rear_to_center: float,
         yaw_rate = 0.0
     else:
         steering = math.atan(wheelbase * yaw_rate / speed)
-    return VehicleState(float(x) - rear_to_center * math.cos(yaw),
-                        float(y) - rear_to_center * math.sin(yaw), yaw, speed, steering,
+    return VehicleState(*ahead(float(x), float(y), yaw, -rear_to_center), yaw, speed, steering,
                         exact_value(getattr(state, 'acceleration', None)), yaw_rate)
 
 
@@ -152,27 +164,9 @@ class _Scene:
                 shapes.append(description.shape)
                 rows.append((*pose, *velocity[:2]))
         table = np.array(rows, dtype=np.float64).reshape(-1, 5)
-        outlines = [outline(s, *row[:3]) for s, row in zip(shapes, rows, strict=True)]
+        outlines = [placed_polygon(s, *row[:3]) for s, row in zip(shapes, rows, strict=True)]
         return cls(np.array(outlines, dtype=object), table[:, :2], table[:, 3:],
                    np.array([s.length for s in shapes]), np.array([s.width for s in shapes]))
-
-
-def outline(shape: Shape, x: float, y: float, yaw: float, margin: float = 0.0) -> shapely.Polygon:
-    """
-    Give the outline of a shape at a pose of its centre.
-
-    :param margin: grows a rectangle on each side, a circle or polygon all around [m]
-    """
-    if shape.kind == 'circle':
-        return shapely.Point(x, y).buffer(0.5 * shape.length + margin, quad_segs=32)
-    if shape.kind == 'polygon':
-        corners = np.array(shape.vertices)
-    else:
-        half = np.array([0.5 * shape.length + margin, 0.5 * shape.width + margin])
-        corners = half * ((1, 1), (-1, 1), (-1, -1), (1, -1))
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    polygon = shapely.Polygon(corners @ np.array([[cos, sin], [-sin, cos]]) + (x, y))
-    return polygon.buffer(margin) if margin and shape.kind == 'polygon' else polygon
 
 
 def _on_lanelet(network: RoadNetwork, spawn: LaneletSpawn, vehicle_id: str) -> VehicleState:
@@ -252,10 +246,11 @@ def _try(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lan
         return None
     state = VehicleState(*network.pose_on(lanelet, s), 0.0)
     pose = (*state.center(parameters.rear_to_center), state.yaw)
-    if not network.covers(outline(parameters.shape, *pose)):
+    if not network.covers(placed_polygon(parameters.shape, *pose)):
         return None
-    guarded = outline(parameters.shape, *pose, margin=_MARGIN)
-    return None if shapely.intersects(guarded, scene.outlines).any() else state
+    guarded = Shape.rectangle(parameters.length + 2.0 * _MARGIN, parameters.width + 2.0 * _MARGIN)
+    touched = shapely.intersects(placed_polygon(guarded, *pose), scene.outlines)
+    return None if touched.any() else state
 
 
 def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,

@@ -1,35 +1,44 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """An autonomous vehicle between its planner's answers (CRG III-A1d, III-B; algorithm 2)."""
 
 from collections import OrderedDict
 from dataclasses import dataclass
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.control.tracked_execution import TrackedExecution
 from crgame_ros.control.tracker import Reference
-from crgame_ros.driver.command import DriverCommand
 from crgame_ros.errors import InputError
+from crgame_ros.game.game import TimingSpec
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.planner.interface import Plan
-from crgame_ros.planner.joints import JointSeries, plan_from_joints
+from crgame_ros.messages.joints import JointSeries, plan_from_joints
+from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.planner.road_limit import RoadLimit
-from crgame_ros.scenario.game import TimingSpec
 from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.setup import AvSetup
 from crgame_ros.timing.progress_tracker import ProgressTracker
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
-from crgame_ros.vehicle.kinematic_single_track import integrate
 from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.stopping import braking_acceleration, moving_time, step_to_rest
+import numpy as np
+from numpy.typing import NDArray
 
-# Braking of an AV whose plan is used up [m/s^2]: firm, well within a dry road's friction.
-EXHAUSTED_DECELERATION = 4.0
 # A planner that is silent for so long is asked again [s] (semantics of the busy flag).
 BUSY_TIMEOUT_S = 1.0
 # Given back by a person, the vehicle rolls on for so long until a plan from there comes [s].
@@ -155,13 +164,27 @@ class AutonomousVehicle:
         """
         reason = self._refusal(series, n)
         if reason is not None:
-            self.counters.refused += 1
-            self.counters.last_refusal = reason
+            self._count_refusal(reason)
+        return reason
+
+    def refuse_unasked(self, stamp_ns: int) -> str | None:
+        """
+        Count an answer that answers no request, of whoever it may be.
+
+        :return: the reason for refusing it; None if a request has that stamp.
+        """
+        if stamp_ns in self._asked:
+            return None
+        reason = _answers_nothing(stamp_ns)
+        self._count_refusal(reason)
         return reason
 
     def refuse_malformed(self, reason: str) -> None:
         """Count an answer that could not even be read; the planner may be asked again."""
         self._busy_since = None
+        self._count_refusal(reason)
+
+    def _count_refusal(self, reason: str) -> None:
         self.counters.refused += 1
         self.counters.last_refusal = reason
 
@@ -169,7 +192,7 @@ class AutonomousVehicle:
         asked = self._asked.get(series.stamp_ns)
         request_n = self._scheduler.tick_of_stamp(series.stamp_ns)
         if asked is None or request_n is None:
-            return f'stamp {series.stamp_ns} ns answers no request'
+            return _answers_nothing(series.stamp_ns)
         if request_n == self._followed_request_n:
             # An answer to a request that was sent twice says nothing new.
             return None
@@ -257,7 +280,7 @@ class AutonomousVehicle:
         planned = None if self._given_back_n is not None else self._tracker.sample(n)
         self._without_plan = planned is None and not rolls
         if rolls:
-            self.state = self._rolling()
+            self.state = self._held(0.0)
         elif planned is None:
             self.counters.steps_without_plan += 1
             self.state = self._braking()
@@ -280,13 +303,13 @@ class AutonomousVehicle:
         return self._given_back_n is not None \
             and (n - self._given_back_n) * self._scheduler.dt_s <= GIVE_BACK_TIMEOUT_S
 
-    def _rolling(self) -> VehicleState:
-        """Keep speed and steering angle for one step."""
-        state, wheelbase = self.state, self.setup.vehicle.wheelbase
-        x, y, yaw, speed, angle = integrate(
-            state.x, state.y, state.yaw, state.speed, state.steering_angle, 0.0, 0.0, wheelbase,
-            self._scheduler.dt_s)
-        return VehicleState(x, y, wrap_pi(yaw), speed, angle, 0.0,
+    def _held(self, acceleration: float) -> VehicleState:
+        """Keep the steering angle for one step, at an acceleration [m/s^2], to a stop at most."""
+        state, wheelbase, dt_s = self.state, self.setup.vehicle.wheelbase, self._scheduler.dt_s
+        x, y, yaw, speed, angle = step_to_rest(
+            *state[:5], acceleration, 0.0, wheelbase,
+            moving_time(state.speed, acceleration, dt_s), dt_s)
+        return VehicleState(x, y, wrap_pi(yaw), speed, angle, acceleration,
                             speed * math.tan(angle) / wheelbase, 0.0)
 
     def _never_back(self, planned: VehicleState) -> VehicleState:
@@ -299,16 +322,11 @@ class AutonomousVehicle:
         return planned
 
     def _braking(self) -> VehicleState:
-        state, dt_s = self.state, self._scheduler.dt_s
+        state = self.state
         if state.speed == 0.0:
             return state._replace(acceleration=0.0, yaw_rate=0.0, steering_rate=0.0)
-        direction = math.copysign(1.0, state.speed)
-        driven_s = min(dt_s, abs(state.speed) / EXHAUSTED_DECELERATION)
-        wheelbase = self.setup.vehicle.wheelbase
-        x, y, yaw, speed, angle = integrate(
-            state.x, state.y, state.yaw, state.speed, state.steering_angle,
-            -direction * EXHAUSTED_DECELERATION, 0.0, wheelbase, driven_s)
-        if driven_s < dt_s:
-            speed = 0.0
-        return VehicleState(x, y, wrap_pi(yaw), speed, angle, -direction * EXHAUSTED_DECELERATION,
-                            speed * math.tan(angle) / wheelbase, 0.0)
+        return self._held(braking_acceleration(state.speed))
+
+
+def _answers_nothing(stamp_ns: int) -> str:
+    return f'stamp {stamp_ns} ns answers no request'

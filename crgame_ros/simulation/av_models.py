@@ -1,26 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What executes an AV's plans and perceives the world for it, made from what its game says."""
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.control.tracked_execution import TrackedExecution
 from crgame_ros.control.trackers import TRACKERS
 from crgame_ros.errors import InputError
+from crgame_ros.game.game import AvSpec, ModelSpec
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.messages.joints import JointSeries, vehicle_to_joints, vehicles_from_joints
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
 from crgame_ros.perception.localisation import Localisation
 from crgame_ros.perception.perception import Perception
-from crgame_ros.perception.spec import PerceptionSpec
-from crgame_ros.planner.joints import JointSeries, vehicle_to_joints, vehicles_from_joints
-from crgame_ros.scenario.game import AvSpec, ModelSpec
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
 from crgame_ros.vehicle.models import VEHICLE_MODELS, VehicleModel
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 # Of models that are made only to see whether they can be [s].
 CHECKING_STEP_S = 0.01

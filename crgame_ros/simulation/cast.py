@@ -1,23 +1,38 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Which planning problems of a scenario are driven, by which AV."""
 
 from dataclasses import replace
 import math
 
 from commonroad.planning.planning_problem import PlanningProblem
-import shapely
-
 from crgame_ros.errors import InputError
-from crgame_ros.scenario.game import AvSpec, Game
+from crgame_ros.game.game import AvSpec, Game
+from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.scenario.spawn import outline, problem_pose
+from crgame_ros.scenario.spawn import problem_pose
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
+import shapely
 
 Part = tuple[AvSpec, PlanningProblem]
 # Problems whose vehicles would touch within these times, each at its first speed, are no cast: no
 # two planners could drive them at once [s].
 _ON_ONE_SPOT_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+
+# So many alternatives are named in a notice; of five hundred nobody reads them all.
+NAMED = 8
 
 
 def cast_avs(game: Game, loaded: LoadedScenario) -> tuple[list[Part], list[str]]:
@@ -91,10 +106,11 @@ def _free_problems(named: list[Part],
         else:
             alternatives.setdefault(rival.planning_problem_id, []).append(number)
     for number, others in alternatives.items():
+        more = f' and {len(others) - NAMED} more' if len(others) > NAMED else ''
         notices.append(
-            f'planning problems {number}, {", ".join(map(str, others))} start on one spot and are '
-            f'alternatives: {number} is driven (--problem, or planning_problem of an AV in the '
-            'game, takes another)')
+            f'planning problems {number}, {", ".join(map(str, others[:NAMED]))}{more} start on '
+            f'one spot and are alternatives: {number} is driven (--problem, or planning_problem '
+            'of an AV in the game, takes another)')
     return free, notices
 
 
@@ -110,5 +126,5 @@ def _placed(problem: PlanningProblem, time_s: float) -> shapely.Polygon:
     vehicle = load_vehicle_parameters()
     state = problem_pose(problem, vehicle.rear_to_center)
     x, y = state.center(vehicle.rear_to_center)
-    return outline(vehicle.shape, x + time_s * state.speed * math.cos(state.yaw),
-                   y + time_s * state.speed * math.sin(state.yaw), state.yaw)
+    return placed_polygon(vehicle.shape, x + time_s * state.speed * math.cos(state.yaw),
+                          y + time_s * state.speed * math.sin(state.yaw), state.yaw)

@@ -1,21 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The contacts of driven vehicles in a finished run, each with the vehicle's part in it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.drivability.contact import could_avoid, Course, Kind, kind_of, Side, touched_side
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE
-from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.simulation.offline import OfflineResult
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
 
 # What anything but an AV is taken to brake with [m/s^2], and to react in [s].
 _BRAKING, _REACTION_S = 8.0, 1.0
@@ -94,9 +106,7 @@ class Motions:
         dt_s, driven = self.scheduler.dt_s, self.vehicle_states.shape[1]
         if column < driven:
             states = self.vehicle_states[:, column]
-            yaw = states[:, StateColumn.YAW]
-            ahead = item.rear_to_center * np.column_stack((np.cos(yaw), np.sin(yaw)))
-            poses = np.column_stack((states[:, [StateColumn.X, StateColumn.Y]] + ahead, yaw))
+            poses = shifted(states[:, :3], item.rear_to_center)
             speeds = states[:, StateColumn.SPEED]
         else:
             ns = np.arange(len(self.vehicle_states))

@@ -1,19 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The simulation engine that both runners drive (CRG algorithms 1 and 2)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import hashlib
 
-import numpy as np
-
-from crgame_ros.driver.command import DriverCommand, RELEASED
-from crgame_ros.planner.joints import JointSeries
-from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.messages.joints import JointSeries
+from crgame_ros.planner.planner_registry import EXTERNAL
 from crgame_ros.planner.road_limit import RoadLimit
-from crgame_ros.scenario.events import FiredEvent, PlannerRun, TrafficOrder
-from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.av_models import (
     ego_of,
@@ -22,14 +31,16 @@ from crgame_ros.simulation.av_models import (
     make_vehicle_model,
     published,
 )
-from crgame_ros.simulation.events import RunEvents
 from crgame_ros.simulation.plan_requests import PlanRequests
 from crgame_ros.simulation.route_lane import RouteLane
+from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.setup import AvSetup, Setup
 from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.publishing import steps_between_messages
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -132,6 +143,14 @@ class Simulation:
         :return: None if accepted, else the reason for refusing it.
         """
         return self._av_by_id[av_id].offer(plan, self.n + 1)
+
+    def unasked_plan(self, av_id: str, stamp_ns: int) -> str | None:
+        """
+        Look at a planner's answer by its stamp alone, and count it if it is refused.
+
+        :return: None if it answers a request, else the reason for refusing it.
+        """
+        return self._av_by_id[av_id].refuse_unasked(stamp_ns)
 
     def refuse_malformed_plan(self, av_id: str, reason: str) -> None:
         """Count a planner's answer that could not be read."""

@@ -1,13 +1,23 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Comparing a game's events with what its scenario and its vehicles are."""
 
 from collections.abc import Sequence
 
 from crgame_ros.errors import InputError
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.planner.registry import EXTERNAL
-from crgame_ros.scenario.events import (
+from crgame_ros.game.events import (
     ALL_AGENTS,
     Between,
     Brake,
@@ -21,10 +31,12 @@ from crgame_ros.scenario.events import (
     SpeedLimit,
     TrafficChange,
 )
-from crgame_ros.scenario.game import AvSpec, Game
-from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.game.game import AvSpec, Game
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.planner.planner_registry import EXTERNAL
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.road_network import RoadNetwork
 
 MAX_LISTED = 12
 

@@ -1,37 +1,44 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The offline runner: the same engine on a virtual clock, planners in lockstep."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.control.tracked_execution import TrackingErrors
-from crgame_ros.drivability.monitor import (
-    changes,
-    DrivabilityMonitor,
-    road_transforms,
-    VehicleDrivability,
-)
-from crgame_ros.driver.command import RELEASED
+from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.messages.joints import JointSeries, plan_to_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
 from crgame_ros.planner.crew import PlannerCrew
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.joints import JointSeries, plan_to_joints
 from crgame_ros.planner.request_reader import RequestReader
-from crgame_ros.scenario.events import FiredEvent
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
 from crgame_ros.simulation.av_models import make_perception, published_states
-from crgame_ros.simulation.drivers import offline_driver
 from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.observer import drivability_monitor, ObservedRun, RunObserver
+from crgame_ros.simulation.offline_driver import offline_driver
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
+from crgame_ros.vehicle.driver_command import RELEASED
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 DEFAULT_DURATION_S = 20.0
 
@@ -152,6 +159,7 @@ def run_offline(
     drivers: Mapping[str, DriverSource] | None = None,
     intervals_s: NDArray[np.float64] | None = None, check_drivability: bool = True,
     clock_s: Callable[[], float] | None = None, triggers: Sequence[tuple[int, str]] = (),
+    observers: Sequence[RunObserver] = (),
 ) -> OfflineResult:
     """
     Run a game as fast as it can.
@@ -166,6 +174,7 @@ def run_offline(
     :param clock_s: clock that times the planners, which the result doesn't depend on.
     :param triggers: simulation step n and name of the events that somebody triggers; each takes
         effect at the first tick from n on.
+    :param observers: are given every state that a live run publishes.
     :raises InputError: if a human's driver needs a person or a device, or a trigger is refused.
     """
     simulation = Simulation(setup)
@@ -175,7 +184,7 @@ def run_offline(
     takers = [drivers.get(av.id) for av in setup.avs]
     seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s)
              for index in range(len(setup.avs))]
-    trace = _Trace(setup, steps, check_drivability)
+    trace = _Trace(setup, steps, check_drivability, observers)
     dt_s = simulation.scheduler.dt_s
     effective_s, intervals = dt_s, [] if intervals_s is None else intervals_s.tolist()
     _trigger(simulation, triggers, 0)
@@ -206,6 +215,14 @@ def run_offline(
     return trace.result(simulation, {seat.id: seat.record() for seat in seats})
 
 
+def observed_run(setup: Setup) -> ObservedRun:
+    """Give what observers know of a run before it begins."""
+    return ObservedRun(
+        setup.vehicle_descriptions, setup.obstacles.descriptions, setup.loaded, setup.scheduler,
+        setup.game.drivability, setup.open_occupancy(), tuple(av.transform for av in setup.avs),
+        np.reshape([vehicle.state for vehicle in setup.vehicles], (-1, STATE_WIDTH)))
+
+
 def _perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
     """Let every perception see what is published of the present state."""
     states, objects = published_states(simulation.states), simulation.objects
@@ -233,27 +250,23 @@ def _duration(setup: Setup, duration_s: float | None) -> float:
 class _Trace:
     """Collects a run's states and violations."""
 
-    def __init__(self, setup: Setup, steps: int, check: bool) -> None:
+    def __init__(self, setup: Setup, steps: int, check: bool,
+                 observers: Sequence[RunObserver]) -> None:
         self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), STATE_WIDTH))
         self.commands = np.zeros((steps + 1, len(setup.humans), 4))
         self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
         self.object_velocities: list[NDArray[np.float64]] = []
-        self.violations: list[VehicleDrivability] = []
-        self.stop: VehicleDrivability | None = None
-        self._tick_n = 0
-        # The steps whose states a live run publishes, and so its monitor sees.
-        self._check_every = steps_between_messages(setup.game.timing.rate)
-        self._previous: tuple[VehicleDrivability, ...] = ()
-        self._monitor = DrivabilityMonitor(
-            setup.vehicle_descriptions, setup.obstacles.descriptions,
-            setup.loaded.scenario.lanelet_network, setup.game.drivability,
-            setup.open_occupancy(), road_transforms(
-                len(setup.humans), [av.transform for av in setup.avs]),
-        ) if check or setup.game.drivability.stop else None
-        if self._monitor is not None:
-            self._monitor.prepare(np.array([
-                vehicle.state for vehicle in setup.vehicles]).reshape(-1, STATE_WIDTH))
+        # The steps whose states a live run publishes, and so its observers see.
+        self._observe_every = steps_between_messages(setup.game.timing.rate)
+        self._drivability = drivability_monitor(observed_run(setup)) \
+            if check or setup.game.drivability.stop else None
+        self._observers = [*([] if self._drivability is None else [self._drivability]), *observers]
+
+    @property
+    def stop(self) -> VehicleDrivability | None:
+        """Give the violation that ends the run, once there is one."""
+        return None if self._drivability is None else self._drivability.stop
 
     def result(self, simulation: Simulation,
                planners: Mapping[str, PlannerRecord]) -> OfflineResult:
@@ -261,7 +274,8 @@ class _Trace:
         return OfflineResult(
             simulation.setup, simulation.state_hash(), self.vehicles[:count],
             np.array(self.objects), np.array(self.object_velocities), self.commands[:count],
-            self.intervals_s[:count], planners, tuple(self.violations), simulation.fired,
+            self.intervals_s[:count], planners,
+            () if self._drivability is None else self._drivability.report(), simulation.fired,
             self.stop)
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
@@ -276,12 +290,7 @@ class _Trace:
         if result.objects is not None:
             self.objects.append(result.objects.poses)
             self.object_velocities.append(result.objects.velocities)
-            self._tick_n = n
-            if self._monitor is not None:
-                self._monitor.set_objects(n, result.objects)
-        if self._monitor is not None and (result.tick or n % self._check_every == 0):
-            since_s = (n - self._tick_n) * simulation.scheduler.dt_s
-            current = self._monitor.check(n, since_s, self.vehicles[n])
-            self.violations.extend(changes(self._previous, current))
-            self._previous = current
-            self.stop = next((item for item in current if item.stop_requested), None)
+        if result.tick or n % self._observe_every == 0:
+            since_tick_s = simulation.scheduler.since_tick_s(n)
+            for observer in self._observers:
+                observer.observe(n, since_tick_s, self.vehicles[n], result.objects)

@@ -1,20 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Building plan requests: one atomic snapshot with predictions (CRG III-A1c and d)."""
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.planner.joints import (
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.messages.joints import (
     JointSeries,
     object_joint_names,
     vehicle_joint_names,
     vehicle_to_joints,
+    without_absent,
 )
 from crgame_ros.scenario.courses import ObstacleCourses
-from crgame_ros.scenario.objects import ObjectStates
 from crgame_ros.scenario.prediction import (
     LanePrediction,
     predict_constant_steering,
@@ -23,6 +33,8 @@ from crgame_ros.scenario.prediction import (
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.setup import AvSetup, Setup
 from crgame_ros.vehicle.state import StateColumn, VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Poses = NDArray[np.float64]
 
@@ -119,8 +131,8 @@ class PlanRequests:
         """
         Pack the request of one AV, in its scenario coordinates.
 
-        Point 0 is now; the AV itself is present in point 0 only. Accelerations are known of
-        driven vehicles in point 0, elsewhere they are NaN.
+        Point 0 is now; the AV itself is present in point 0 only. Objects that are nowhere are left
+        out. Accelerations are known of driven vehicles in point 0, elsewhere they are NaN.
         """
         order = self._order[av.id]
         vehicles = len(order)
@@ -143,8 +155,10 @@ class PlanRequests:
         velocities[:, width:] = forecast.object_velocities.reshape(self.points, 3 * count)
         if not av.transform.is_identity:
             _to_scenario(av, vehicles, positions, velocities, accelerations)
-        return JointSeries(stamp_ns, self._names[av.id], self._times_ns,
-                           positions, velocities, accelerations)
+        series = JointSeries(stamp_ns, self._names[av.id], self._times_ns,
+                             positions, velocities, accelerations)
+        # Who perceives may remember what is gone.
+        return series if av.spec.perception else without_absent(series, vehicles)
 
 
 def _to_scenario(av: AvSetup, vehicles: int, positions: Poses, velocities: Poses,

@@ -1,8 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who and what takes part in a game, as far as it decides which processes a run needs."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from crgame_ros.simulation.setup import Setup
@@ -18,6 +31,7 @@ class Participants:
     :param perceiving: AVs with perception.
     :param traffic: whether there are agents.
     :param occupancy: whether there is a map of permanent obstacles.
+    :param code: classes that the game names, of modules and files of the user's own.
     """
 
     humans: dict[str, str]
@@ -25,6 +39,7 @@ class Participants:
     perceiving: tuple[str, ...] = ()
     traffic: bool = False
     occupancy: bool = False
+    code: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, setup: Setup) -> 'Participants':
@@ -32,9 +47,22 @@ class Participants:
         return cls({human.id: human.driver for human in setup.humans},
                    {av.id: av.spec.planner for av in setup.avs},
                    tuple(av.id for av in setup.avs if av.spec.perception is not None),
-                   setup.traffic is not None, setup.game.occupancy is not None)
+                   setup.traffic is not None, setup.game.occupancy is not None,
+                   tuple(sorted(_code(asdict(setup.game)))))
 
     @classmethod
     def read(cls, content: dict[str, Any]) -> 'Participants':
         """Read them from what `dataclasses.asdict` gave, by way of JSON."""
-        return cls(**content | {'perceiving': tuple(content['perceiving'])})
+        return cls(**content | {'perceiving': tuple(content['perceiving']),
+                                'code': tuple(content['code'])})
+
+
+def _code(value: Any) -> set[str]:
+    """Collect every name of a class in a game, wherever it stands."""
+    if isinstance(value, str):
+        return {value} if ':' in value else set()
+    if isinstance(value, Mapping):
+        value = value.values()
+    elif not isinstance(value, list | tuple):
+        return set()
+    return {name for item in value for name in _code(item)}

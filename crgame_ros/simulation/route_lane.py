@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How far an AV is from the middle of the lane that its route follows."""
 
 from math import cos, sin
 
 from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
+from crgame_ros.roads.lane_line import LaneLine
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import shapely
-
-from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
-from crgame_ros.planner.route import find_route, goal_lanelets, start_lanelet
-from crgame_ros.scenario.lane_line import LaneLine
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.vehicle.state import VehicleState
 
 # How far the route goes on beyond its goal [m]: longer than any game.
 BEYOND_GOAL = 1500.0

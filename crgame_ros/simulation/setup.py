@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Everything that a run needs, resolved: a game with its scenario loaded and vehicles placed."""
 
 from collections.abc import Iterable, Sequence
@@ -9,21 +21,20 @@ import math
 from typing import TYPE_CHECKING
 
 from commonroad.planning.planning_problem import PlanningProblem
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.driver.source import load_timeline, parse_source
-from crgame_ros.errors import InputError
+from crgame_ros.driver.timeline_file import timeline_text
+from crgame_ros.errors import InputError, one_line
+from crgame_ros.game.game import AvSpec, Game, ModelSpec
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.export_check import refuse_unwritable
-from crgame_ros.scenario.game import AvSpec, Game, ModelSpec
 from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.scripted_objects import ScriptedObjects
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
+from crgame_ros.scripted.scripted_objects import ScriptedObjects
 from crgame_ros.simulation.av_models import check_models
 from crgame_ros.simulation.cast import cast_avs, Part
 from crgame_ros.simulation.event_check import (
@@ -33,12 +44,13 @@ from crgame_ros.simulation.event_check import (
     put_obstacles,
 )
 from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, TrafficSetup
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from crgame_ros.drivability.road_boundary import RoadBoundary
+    from crgame_ros.roads.road_boundary import RoadBoundary
 
 # A vehicle recorded this close to an AV's start is a recording of the AV [m].
 SAME_PLACE = 1.0
@@ -61,7 +73,7 @@ class HumanSetup:
     :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
     """
 
-    id: str
+    id: str  # noqa: A003
     vehicle: VehicleParameters
     state: VehicleState
     driver: str
@@ -88,8 +100,8 @@ class AvSetup:
     planning_problem: PlanningProblem
 
     @property
-    def id(self) -> str:
-        """Id of the vehicle: av0, …"""
+    def id(self) -> str:  # noqa: A003
+        """Give the id of the vehicle, such as av0."""
         return self.spec.id
 
     @property
@@ -156,13 +168,13 @@ class Setup:
 
     @cached_property
     def road(self) -> 'RoadBoundary':
-        """The boundary of the road, made at first use (3 to 50 ms): ask for it before a run."""
-        from crgame_ros.drivability.road_boundary import RoadBoundary
+        """Give the road's boundary, made at first use (3 to 50 ms): ask for it before a run."""
+        from crgame_ros.roads.road_boundary import RoadBoundary
         return RoadBoundary(self.loaded.scenario.lanelet_network)
 
     @property
     def vehicles(self) -> tuple['HumanSetup | AvSetup', ...]:
-        """The driven vehicles: humans, then AVs."""
+        """Give the driven vehicles: humans, then AVs."""
         return (*self.humans, *self.avs)
 
     @property
@@ -215,12 +227,13 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
             obstacles.states_at(k0), taken,
             [av.vehicle for av in avs] + [human.vehicle for human in humans])
         source = parse_source(spec.driver)
-        timeline = load_timeline(source, game.base).to_text() if source.has_timeline else ''
+        timeline = timeline_text(load_timeline(source, game.base)) \
+            if source.has_timeline else ''
         humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline,
                                  spec.dynamics))
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
     setup = Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler,
-                  tuple(notices))
+                  tuple(map(one_line, notices)))
     check_models([(av.spec, av.vehicle) for av in avs],
                  [(human.id, human.dynamics, human.vehicle) for human in humans])
     setup.open_occupancy()

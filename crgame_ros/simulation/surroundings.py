@@ -1,14 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What living objects react to in a run."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from crgame_ros.scenario.objects import ObjectStates
-from crgame_ros.scenario.signals import TrafficLights
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.simulation.world_reader import (
     driven_centers,
@@ -17,9 +27,10 @@ from crgame_ros.simulation.world_reader import (
     WorldReader,
 )
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
 
 if TYPE_CHECKING:
-    from crgame_ros.traffic.world import WorldView
+    from crgame_ros.traffic.world_view import WorldView
 
 
 class Surroundings:

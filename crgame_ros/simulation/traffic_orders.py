@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What events tell the agents of traffic: speed limits, and to drive otherwise."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from crgame_ros.scenario.events import EventSpec, SpeedLimit, TrafficOrder
+from crgame_ros.game.events import EventSpec, SpeedLimit, TrafficOrder
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.speed_limits import set_speed_limit, with_own_roads
 
-if TYPE_CHECKING:
-    # Imports numba: only runs with agents should wait for that.
+if TYPE_CHECKING:  # Imports numba: only runs with agents should wait for that.
     from crgame_ros.traffic.traffic import Traffic
 
 

@@ -1,25 +1,36 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Reactive traffic of a run before its first step, for both runners and for traffic_node."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from crgame_ros.game.objects import ObjectDescription, ObjectStates
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.signals import TrafficLights
 from crgame_ros.simulation.world_reader import joints_of, WorldReader
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
-from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.vehicle.state import VehicleState
 
-if TYPE_CHECKING:
-    # Both import numba: only runs with agents should wait for that.
+if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
     from crgame_ros.traffic.traffic import Traffic
-    from crgame_ros.traffic.world import WorldView
+    from crgame_ros.traffic.world_view import WorldView
 
 # Agents move at this rate, whatever the simulation's [Hz] (FS III).
 MOTION_RATE = 100.0
@@ -92,7 +103,10 @@ def place_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwor
     reader = WorldReader(descriptions, TrafficLights(loaded.scenario))
     world = reader.view(scheduler.k0, *joints_of(vehicles), objects)
 
-    def make() -> 'Traffic':
+    def fresh() -> 'Traffic':
         return make_traffic(spec, loaded, network, reader.others, obstacles, adopted, world,
                             scheduler, seed)
-    return TrafficSetup(make().descriptions, make)
+
+    # Reading the roads takes seconds on large maps: the first run gets what told the descriptions.
+    made = [fresh()]
+    return TrafficSetup(made[0].descriptions, lambda: made.pop() if made else fresh())

@@ -1,22 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Everything in a run that is no driven vehicle, tick by tick."""
 
 from collections.abc import Sequence
 from typing import Protocol, TYPE_CHECKING
 
-from crgame_ros.scenario.events import TrafficOrder
-from crgame_ros.scenario.objects import ObjectStates
-from crgame_ros.simulation.events import RunEvents
+from crgame_ros.game.events import TrafficOrder
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.simulation.surroundings import Surroundings
 from crgame_ros.simulation.traffic_orders import TrafficOrders
 from crgame_ros.vehicle.state import VehicleState
 
-if TYPE_CHECKING:
-    # Both import numba: only runs with agents should wait for that.
+if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
     from crgame_ros.traffic.traffic import Traffic
-    from crgame_ros.traffic.world import WorldView
+    from crgame_ros.traffic.world_view import WorldView
 
 
 class TrafficFeed(Protocol):

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 What traffic sees of the world, the same bits live and offline.
 
@@ -7,19 +19,18 @@ Driven vehicles are read as the joints that `/vehicles/state` carries.
 """
 
 from collections.abc import Sequence
-import math
 from typing import TYPE_CHECKING
 
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.reference_point import shifted, shifted_velocities
+from crgame_ros.messages.joints import vehicle_to_joints
+from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.planner.joints import vehicle_to_joints
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.scenario.signals import TrafficLights
-from crgame_ros.vehicle.state import VehicleState
-
 if TYPE_CHECKING:
-    from crgame_ros.traffic.world import WorldView
+    from crgame_ros.traffic.world_view import WorldView
 
 FloatArray = NDArray[np.float64]
 Joints = Sequence[Sequence[float]] | FloatArray
@@ -35,13 +46,10 @@ def driven_centers(positions: Joints, velocities: Joints,
     :param rear_to_center: (V) from the rear axle to the centre [m]
     :return: poses and velocities, both (V, 3)
     """
-    poses, rates = np.empty((len(positions), 3)), np.empty((len(positions), 3))
-    for row, (at, rate, ahead) in enumerate(zip(positions, velocities, rear_to_center,
-                                                strict=True)):
-        cos, sin = ahead * math.cos(at[2]), ahead * math.sin(at[2])
-        poses[row] = at[0] + cos, at[1] + sin, at[2]
-        rates[row] = rate[0] - sin * rate[2], rate[1] + cos * rate[2], rate[2]
-    return poses, rates
+    poses, rates = (np.array(rows, dtype=np.float64).reshape(-1, 4)[:, :3]
+                    for rows in (positions, velocities))
+    distance = np.array(rear_to_center)
+    return shifted(poses, distance), shifted_velocities(poses[:, 2], rates, distance)
 
 
 class WorldReader:
@@ -72,7 +80,7 @@ class WorldReader:
         :param objects: all objects.
         """
         # Imports numba: only runs with agents should wait for that.
-        from crgame_ros.traffic.world import WorldView
+        from crgame_ros.traffic.world_view import WorldView
         poses, rates = driven_centers(positions, velocities, self._ahead)
         return WorldView(k, np.concatenate((poses, objects.poses[self._columns])),
                          np.concatenate((rates, objects.velocities[self._columns])),

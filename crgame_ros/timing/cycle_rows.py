@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The rows of `/timing/cycle`: what each cycle measured and consumed."""
 
 from array import array
 from collections.abc import Sequence
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.driver.command import DriverCommand
 from crgame_ros.errors import InputError
 from crgame_ros.timing.time_controller import Cycle
+from crgame_ros.vehicle.driver_command import DriverCommand
+import numpy as np
+from numpy.typing import NDArray
 
 TIMING_COLUMNS = (
     'epoch', 'n', 'k', 'ideal_s', 'actual_s', 'step_error_s', 'cumulative_error_s', 'busy_s',
@@ -121,6 +132,14 @@ class CycleTable:
             raise InputError(f'{vehicle_id} took no part', '/timing/cycle',
                              'choose one of the vehicles of this recording')
         return self.rows[:, [self._place[name] for name in names]]
+
+    def commands_of(self, vehicle_ids: Sequence[str]) -> NDArray[np.float64]:
+        """Give (R, V, 4) what was consumed of several; NaN of those that took no part."""
+        values = np.full((len(self.rows), len(vehicle_ids), len(COMMAND_COLUMNS)), np.nan)
+        for place, vehicle in enumerate(vehicle_ids):
+            if f'{vehicle}/{COMMAND_COLUMNS[0]}' in self._place:
+                values[:, place] = self.commands(vehicle)
+        return values
 
     def drove(self, vehicle_id: str) -> NDArray[np.bool_]:
         """Tell for each row (R) whether somebody drove a vehicle, which may have taken no part."""

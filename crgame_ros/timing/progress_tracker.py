@@ -1,14 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where on its plan an AV is between two replannings (CRG III-A2c, equations 15-16)."""
 
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.geometry.angles import interpolate_angle
 from crgame_ros.vehicle.state import StateColumn, VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 # Further apart than this, the plan's state for now and the vehicle are not the same motion (an
 # overdue plan met a vehicle that had meanwhile braked): the plan is entered at the nearest point.

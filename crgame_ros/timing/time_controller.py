@@ -1,11 +1,23 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The global time controller: simulation time against the wall clock (CRG III-A2a)."""
 
 from dataclasses import dataclass
 
 from crgame_ros.errors import InputError
-from crgame_ros.scenario.game import TimingSpec
+from crgame_ros.game.game import TimingSpec
 
 MIN_REAL_TIME_FACTOR = 0.1
 MAX_REAL_TIME_FACTOR = 10.0
@@ -64,7 +76,7 @@ class TimeController:
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated seconds per wall second."""
+        """Give the simulated seconds per wall second."""
         return self._factor
 
     @property

@@ -1,17 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The state of all agents, one array per quantity."""
 
 from collections.abc import Sequence
 import math
 from typing import Any, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.scenario.objects import ObjectDescription
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.traffic.compiled import bare, compiled
 from crgame_ros.traffic.lane_table import FloatArray, IntArray
+import numpy as np
+from numpy.typing import NDArray
 
 # Share of its length by which a vehicle's axles are apart, and its rear axle from its centre.
 WHEELBASE = 0.6
@@ -45,6 +57,8 @@ class AgentTable:
     :param waits: ticks for which it has been standing.
     :param grant: tick at which it was let into a junction, or -1; until: the lane with which that
         one ends; grant_left: how far away that is; grant_hold: where one waits before it [m].
+    :param before: tick at which it was let into what it is in, while it has been let into the next
+        junction as well, or -1; before_until: the lane with which that ends.
     :param previous: lane before its present one, or -1.
     :param side: 1 while it changes to the left, -1 to the right.
     :param relief: how much of its desired gap it forgoes for now [m].
@@ -54,6 +68,7 @@ class AgentTable:
     :param insists_until: tick until which it goes first, having been found in a circle.
     :param late: whether it sees late that it has to yield; sees: whether it has, at the junction
         that comes next.
+    :param stops: whether it has decided to halt at a light ahead.
     """
 
     length: FloatArray
@@ -86,6 +101,8 @@ class AgentTable:
     until: IntArray
     grant_left: FloatArray
     grant_hold: FloatArray
+    before: IntArray
+    before_until: IntArray
     previous: IntArray
     side: IntArray
     relief: FloatArray
@@ -95,6 +112,7 @@ class AgentTable:
     insists_until: IntArray
     late: BoolArray
     sees: BoolArray
+    stops: BoolArray
 
 
 def empty_table(count: int) -> AgentTable:
@@ -167,7 +185,7 @@ class Agents(AgentTable):
         self.type_top: FloatArray = self.top.copy()
         self.share: FloatArray = np.ones(self.count)
         self.factor[:] = 1.0
-        for name in ('source', 'grant', 'until', 'previous'):
+        for name in ('source', 'grant', 'until', 'before', 'before_until', 'previous'):
             getattr(self, name)[:] = NOBODY
         self.leader[:] = self.blocker[:] = FREE
 
@@ -176,7 +194,7 @@ class Agents(AgentTable):
         return centers_of(self.table, np.arange(self.count))[0]
 
     def velocities(self) -> FloatArray:
-        """Give the velocities (A, 3) of the centres [m/s, rad/s]."""
+        """Give the (A, 3) velocities of the centres [m/s, rad/s]."""
         return centers_of(self.table, np.arange(self.count))[1]
 
     def states(self) -> tuple[FloatArray, FloatArray]:
@@ -195,16 +213,16 @@ class Agents(AgentTable):
         :param speed: [m/s]
         """
         self.active[slot] = True
-        self.x[slot] = pose[0] - self.rear_to_center[slot] * np.cos(pose[2])
-        self.y[slot] = pose[1] - self.rear_to_center[slot] * np.sin(pose[2])
+        self.x[slot], self.y[slot] = ahead(*pose, -self.rear_to_center[slot])
         self.yaw[slot], self.speed[slot] = pose[2], speed
         self.lane[slot], self.s[slot], self.d[slot] = lane, s, d
         for zero in (self.acceleration, self.steering, self.yaw_rate, self.relief, self.waits,
-                     self.calm_until, self.sees):
+                     self.calm_until, self.sees, self.stops):
             zero[slot] = 0
         self.content_until[slot] = self.insists_until[slot] = 0
         self.leader[slot] = self.blocker[slot] = FREE
-        for none in (self.source, self.grant, self.until, self.previous):
+        for none in (self.source, self.grant, self.until, self.before, self.before_until,
+                     self.previous):
             none[slot] = NOBODY
 
     def remove(self, slots: IntArray, k: int) -> None:

@@ -1,11 +1,23 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Where compiled code is kept; nothing here is compiled, or loads what compiles.
 
 It lies in a folder named by the contents of the function's module and of all that it imports from
-here: numba itself looks at the function's own file only, not at those of what it calls, and would
-run old code after a change.
+here and from `vehicle`, whose constants are compiled in: numba itself looks at the function's own
+file only, not at those of what it uses, and would run old code after a change.
 """
 
 from functools import cache
@@ -18,7 +30,7 @@ import subprocess
 import sys
 
 _HERE = Path(__file__).resolve().parent
-_IMPORT = re.compile(r'^from crgame_ros\.traffic\.(\w+) import', re.MULTILINE)
+_IMPORT = re.compile(r'^from crgame_ros\.((?:traffic|vehicle)\.\w+) import', re.MULTILINE)
 
 
 @cache
@@ -36,15 +48,15 @@ def cache_root() -> Path:
 @cache
 def digest(module: str) -> str:
     """Give a short digest of a module here and of all modules that it builds upon."""
-    pending, seen = [module], set[str]()
+    pending, seen = [f'traffic.{module}'], dict[str, bytes]()
     while pending:
         name = pending.pop()
         if name not in seen:
-            seen.add(name)
-            pending += _IMPORT.findall((_HERE / f'{name}.py').read_text(encoding='utf-8'))
+            seen[name] = _HERE.parent.joinpath(*name.split('.')).with_suffix('.py').read_bytes()
+            pending += _IMPORT.findall(seen[name].decode('utf-8'))
     result = hashlib.sha256(version('numba').encode())
     for name in sorted(seen):
-        result.update((_HERE / f'{name}.py').read_bytes())
+        result.update(seen[name])
     return result.hexdigest()[:12]
 
 

@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Keeping a distance to the vehicle ahead (FS M2), vectorised over agents."""
 
 from abc import ABC, abstractmethod
 import math
 from typing import ClassVar
 
+from crgame_ros.errors import InputError
+from crgame_ros.registry import ModelRegistry
+from crgame_ros.traffic.compiled import compiled, vectorized
+from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
+from crgame_ros.vehicle.standstill import STANDING
 import numpy as np
 from numpy.typing import NDArray
 
-from crgame_ros.errors import InputError
-from crgame_ros.planner.idm_model import free_acceleration, IdmParameters, interaction
-from crgame_ros.registry import ModelRegistry
-from crgame_ros.traffic.compiled import compiled, vectorized
-
 Array = NDArray[np.float64]
 
-# A standing agent stays until its model wants this much; a slower one that wants less is held.
-STANDING = 0.1
+# A standing agent stays until its model wants this much [m/s^2].
 START = 0.2
 # The guard begins at this share of the hardest deceleration and demands all of it at 1: steady
 # following needs less, and so do the gaps that are short by agreement after a lane change.

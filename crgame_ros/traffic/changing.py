@@ -1,12 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """When agents change lanes, and who makes room for them (FS M3)."""
 
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import Agents, AgentTable, centers_of, NOBODY
 from crgame_ros.traffic.compiled import compiled
@@ -28,6 +37,8 @@ from crgame_ros.traffic.neighbours import Beside, look_beside
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.wishes import Destinations, Situations, SLOWEST, TOO_NEAR, wishes
+import numpy as np
+from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 

@@ -1,20 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where lanes cross or merge, and who has the right of way there."""
 
+import heapq
 from typing import NamedTuple
 
 from commonroad.common.common_lanelet import LaneletType
-import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
-import shapely
-
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.roads.signs import sign_names
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.driving_side import DrivingSide, RIGHT_HAND
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, UNDECIDED
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+import shapely
 
 # Two vehicles meet where their lanes' centres are closer than a vehicle's width and a margin [m].
 WIDTH = 2.6
@@ -29,10 +42,13 @@ ALONGSIDE = 0.2
 TURN = 0.45
 # A sign counts for the way behind it as far as this, while no other way joins [m].
 SIGN_REACH = 80.0
-# With less room than this before a conflict nobody waits inside the junction [m].
-WAITING_ROOM = 15.0
+# The way around a roundabout is no longer [m], and its radii differ by no larger factor.
+LARGEST_ROUNDABOUT, ROUND = 200.0, 1.4
 # Neighbours whose centres come as near as this join [m].
 JOINING = 1.2
+# Ways that join are one from where their centres are as near as this; what is left is no shorter
+# than a car [m].
+JOINED, SHORTEST_MERGE = 0.8, 5.0
 _YIELDING = {'YIELD', 'STOP', 'ROUNDABOUT'}
 _PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
 
@@ -46,10 +62,12 @@ class ConflictTable(NamedTuple):
     :param start, end: (2, C) arc lengths between which cars, or wide vehicles, touch [m]
     :param distance: (C) between the centre lines where they are nearest [m]
     :param margin: (C) between the sides of vehicles that pass each other there [m]
-    :param priority: (C) 1: this lane goes first, -1: the other, 0: whoever comes first.
+    :param priority: (C) 1: this lane goes first, -1: the other, 0: whoever comes first; 2 and -2
+        the same where a roundabout is entered: also if the other stands.
     :param merges: (C) whether the lanes join for good.
-    :param entry, leave: (2, L) where the first conflict of a lane begins and the last ends, for
-        narrow and for wide vehicles; inf and 0 without one [m]
+    :param entry, leave: (2, L) where the first conflict of a lane begins, and where one is out of
+        everybody's way behind the last, for narrow and for wide vehicles; inf and 0 without one
+        [m]
     """
 
     first: IntArray
@@ -109,18 +127,25 @@ class Conflicts:
         self.count: IntArray = np.bincount(self.lane, minlength=len(graph)).astype(np.int64)
         self.first: IntArray = np.cumsum(self.count) - self.count
         self.rank: IntArray = np.array([_rank(graph, i) for i in range(len(graph))])
+        ring = roundabouts(graph)
         self.priority: IntArray = np.array(
-            [_priority(movements, side, self.rank, r[0], r[1]) for r in rows], dtype=np.int64)
+            [_priority(movements, side, self.rank, ring, r[0], r[1]) for r in rows],
+            dtype=np.int64)
         # The ways join for good: one goes on behind the other.
         last = self.end > graph.length[self.lane] - 1.0
         self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
+        # Who has got that far is out of everybody's way.
+        clear = end.copy()
+        joined = np.array([r[2].joined for r in rows], dtype=np.float64)[self.merges]
+        clear[:, self.merges] = np.minimum(end[:, self.merges], np.maximum(
+            joined, start[:, self.merges] + SHORTEST_MERGE))
         distance = np.array([r[2].distance for r in rows], dtype=np.float64)
         margin = np.array([r[2].margin for r in rows], dtype=np.float64)
         entry, leave = np.full((2, len(graph)), np.inf), np.zeros((2, len(graph)))
         for wide, width in enumerate((NARROW, WIDEST)):
             counts = distance < 0.5 * (width + WIDEST) + margin
             np.minimum.at(entry[wide], self.lane[counts], start[1][counts])
-            np.maximum.at(leave[wide], self.lane[counts], end[1][counts])
+            np.maximum.at(leave[wide], self.lane[counts], clear[1][counts])
         self.table = ConflictTable(
             self.first, self.count, self.lane, self.other, start, end, distance, margin,
             self.priority, self.merges, entry, leave)
@@ -156,18 +181,23 @@ def _same_way(graph: LaneGraph, i: int, j: int) -> bool:
 
 
 class _Stretch(NamedTuple):
-    """Where a lane is within reach of another: for cars and for wide vehicles [m]."""
+    """
+    Where a lane is within reach of another: for cars and for wide vehicles [m].
+
+    :param joined: from there on both are one up to their ends: whoever is on one is ahead of, or
+        behind, whoever is on the other, and nobody has to have left it before the next goes there.
+    """
 
     start: tuple[float, float]
     end: tuple[float, float]
     distance: float
     margin: float
+    joined: float
 
 
 def _stretch(graph: LaneGraph, i: int, j: int) -> _Stretch | None:
     """Find where lane i is within reach of lane j, as arc lengths on i."""
-    a = slice(int(graph.first[i]), int(graph.first[i] + graph.count[i]))
-    b = slice(int(graph.first[j]), int(graph.first[j] + graph.count[j]))
+    a, b = graph.rows_of(i), graph.rows_of(j)
     there = cKDTree(np.stack((graph.x[b], graph.y[b]), axis=-1))
     distance, nearest = there.query(np.stack((graph.x[a], graph.y[a]), axis=-1))
     turn = np.abs(np.angle(np.exp(1j * (graph.yaw[a] - graph.yaw[b][nearest]))))
@@ -183,9 +213,11 @@ def _stretch(graph: LaneGraph, i: int, j: int) -> _Stretch | None:
     near = np.flatnonzero(distance < min(reach, WIDTH))
     near = near if len(near) else close
     step = float(graph.step[i])
+    apart = np.flatnonzero((distance > JOINED) | (turn > ALONGSIDE))
+    joined = step * (apart[-1] + 1 if len(apart) else 0)
     return _Stretch((float(near[0] * step), float(close[0] * step)),
                     (float(near[-1] * step), float(close[-1] * step)),
-                    float(distance.min()), margin)
+                    float(distance.min()), margin, float(joined))
 
 
 def _is_fork(graph: LaneGraph, i: int, j: int, first: _Stretch, second: _Stretch) -> bool:
@@ -206,12 +238,7 @@ def _rank(graph: LaneGraph, lane: int) -> int:
     current, distance, seen = lane, 0.0, {lane}
     while True:
         lanelet = roads.find_lanelet_by_id(graph.ids[current])
-        signs = set(lanelet.traffic_signs)
-        if lanelet.stop_line is not None:
-            signs |= lanelet.stop_line.traffic_sign_ref or set()
-        found = {element.traffic_sign_element_id.name for sign_id in sorted(signs)
-                 if (sign := roads.find_traffic_sign_by_id(sign_id)) is not None
-                 for element in sign.traffic_sign_elements}
+        found = sign_names(lanelet, roads)
         if found & _YIELDING or LaneletType.ACCESS_RAMP in lanelet.lanelet_type:
             return 0
         if found & _PRIORITY:
@@ -224,10 +251,50 @@ def _rank(graph: LaneGraph, lane: int) -> int:
         seen.add(current)
 
 
-def _priority(movements: Movements, side: DrivingSide, rank: IntArray, i: int, j: int) -> int:
-    """Decide between two lanes: signs, then the turn across yields, then priority to the right."""
+def roundabouts(graph: LaneGraph) -> NDArray[np.bool_]:
+    """Tell which lanes (L) go around in a small circle."""
+    result = np.zeros(len(graph), dtype=bool)
+    for lane in range(len(graph)):
+        way = () if result[lane] else _way_around(graph, lane)
+        if not way:
+            continue
+        rows = [graph.rows_of(i) for i in way]
+        x, y = (np.concatenate([of[i] for i in rows]) for of in (graph.x, graph.y))
+        middle = [0.5 * (float(of.max()) + float(of.min())) for of in (x, y)]
+        radius = np.hypot(x - middle[0], y - middle[1])
+        result[list(way)] |= bool(radius.max() < ROUND * radius.min())
+    return result
+
+
+def _way_around(graph: LaneGraph, lane: int) -> tuple[int, ...]:
+    """Give the lanes of the shortest way from a lane back to it; none if that is long."""
+    heap: list[tuple[float, tuple[int, ...]]] = [(float(graph.length[lane]), (lane,))]
+    seen = {lane}
+    while heap:
+        length, way = heapq.heappop(heap)
+        for onward in (int(i) for i in graph.successors[way[-1]] if i >= 0):
+            if onward == lane:
+                return way
+            further = length + float(graph.length[onward])
+            if onward not in seen and further <= LARGEST_ROUNDABOUT:
+                seen.add(onward)
+                heapq.heappush(heap, (further, (*way, onward)))
+    return ()
+
+
+def _priority(movements: Movements, side: DrivingSide, rank: IntArray, ring: NDArray[np.bool_],
+              i: int, j: int) -> int:
+    """
+    Decide between two lanes.
+
+    Signs, then who goes around, then the turn across yields, then priority to the right.
+    """
+    inside = 2 if ring[i] != ring[j] else 1
     if rank[i] != rank[j]:
-        return 1 if rank[i] > rank[j] else -1
+        first = rank[i] > rank[j]
+        return (inside if ring[i] == first else 1) * (1 if first else -1)
+    if ring[i] != ring[j]:
+        return 2 if ring[i] else -2
     # Between the ways over the whole junction: a lanelet may be the end of a turn only.
     turn = wrap_pi(float(movements.heading[j] - movements.heading[i]))
     if abs(turn) > 2.2:

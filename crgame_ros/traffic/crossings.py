@@ -1,32 +1,45 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Crossing and merging: who goes first, by right of way and gap acceptance."""
 
 import math
 
-import numpy as np
-
 from crgame_ros.traffic.agents import Agents, AgentTable, FREE, NOBODY
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.conflicts import Conflicts, ConflictTable
+from crgame_ros.traffic.exit_room import is_full, promise, Promises
 from crgame_ros.traffic.junctions import Arrivals, Passages
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.leaders import Pairs, Ways
-from crgame_ros.traffic.meetings import BoolArray, CrossingRules, meet, Meetings, Situation
-from crgame_ros.traffic.placement import Entries
+from crgame_ros.traffic.leaders import Ways
+from crgame_ros.traffic.meetings import (
+    BoolArray,
+    CrossingRules,
+    is_let_in,
+    meet,
+    Meetings,
+    Situation,
+)
+from crgame_ros.vehicle.standstill import STANDING
+import numpy as np
 
-STANDING = 0.05
-# A leader that is faster drives on [m/s].
-DRIVES_ON = 3.0
-# Between those who queue [m].
-QUEUE_GAP = 2.0
+# Nearer to where one waits is first there [m].
+AT_LINE = 3.0
 # Who can halt with this lets somebody go who has waited very long [m/s^2].
 MERCY = 1.5
 # A grant ends so far behind its junction [m].
 PASSED = 1.0
-# What others are expected to bear at most [m/s^2], and how fast agents get to and out of
-# conflicts when they hurry, go steadily, and take their time [m/s^2].
-HURRY, TIMID = 1.8, 0.7
 
 
 class Crossings:
@@ -51,86 +64,64 @@ class Crossings:
             rules.patience, rules.zipper, 1.0, rules.mercy)])
 
     def halts(self, k: int, agents: Agents, way: Ways, passage: Passages, arrivals: Arrivals,
-              situation: Situation, elapsed_s: float) -> FloatArray:
+              situation: Situation, elapsed_s: float) -> tuple[FloatArray, BoolArray]:
         """
         Let agents (A) in, and tell where the others halt.
 
         :param elapsed_s: time since the last call [s]
         :return: (A) distance of the front from where it has to halt, or inf [m]; for whom is
-            noted in `Agents.blocker`.
+            noted in `Agents.blocker`. And (A) who is first before a junction behind which there
+            is no room.
         """
         return _halts(self._conflicts, self._rules, self._ticks, elapsed_s, k,
                       agents.table, way, passage, arrivals, situation)
 
 
 @compiled
-def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
-           passage: Passages) -> tuple[FloatArray, FloatArray]:
-    """
-    Look at who is ahead of agents (A), before a junction or behind it.
-
-    Whoever drives on makes room, but no farther than to where it waits before its next junction,
-    and those in between queue behind it.
-
-    :return: `Situation.rear_stop` and `Situation.queued`
-    """
-    rear_stop, queued = np.full(len(slots), math.inf), np.full(len(slots), math.inf)
-    between = np.zeros(len(slots))
-    row = np.full(len(agents.x), -1, np.int64)
-    for i, slot in enumerate(slots):
-        row[slot] = i
-    for p in range(len(pairs.agent)):
-        i, n = pairs.agent[p], pairs.entry[p]
-        speed, owner = max(entries.speed[n], 0.0), entries.owner[n]
-        stops = pairs.distance[p] + speed**2 / 6.0 if speed <= DRIVES_ON else math.inf
-        if owner >= 0 and not entries.crosses[n]:
-            stops = min(stops, pairs.distance[p] + max(passage.hold[row[owner]], 0.0))
-        rear_stop[i] = min(rear_stop[i], stops - between[i])
-        if not entries.crosses[n]:
-            between[i] += entries.front[n] - entries.rear[n] + QUEUE_GAP
-            if agents.grant[owner] < 0 if owner >= 0 else speed < DRIVES_ON:
-                queued[i] = min(queued[i], pairs.gap[p])
-    return rear_stop, queued
-
-
-@compiled
 def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s: float, k: int,
            agents: AgentTable, way: Ways, passage: Passages, arrivals: Arrivals,
-           at: Situation) -> FloatArray:
+           at: Situation) -> tuple[FloatArray, BoolArray]:
     slots, count = at.slots, len(at.slots)
     _release(agents, slots, way, dt_s)
     _look(rules, agents, slots, passage, dt_s)
+    promised = Promises(np.zeros(len(conflicts.first)), np.zeros(len(conflicts.first)))
+    for i, slot in enumerate(slots):
+        if agents.grant[slot] >= 0:
+            promise(promised, agents, slot, way, passage, i)
     stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     halt = np.full(count, math.inf)
-    for i in range(count):
+    for i, slot in enumerate(slots):
         # Nobody is let in past somebody who waits before the same junction.
         stopped[i] = min(at.light[i], at.queued[i]) < passage.hold[i] + 2.0
-        full[i] = at.rear_stop[i] < passage.end[i] + 0.5 * agents.length[slots[i]] + rules.room
-    stays = stopped | full
-    for i, slot in enumerate(slots):
-        # For who has waited very long others leave the room behind the junction.
-        if agents.waits[slot] > ticks[3] and not stopped[i]:
-            stays[i] = False
-    meeting = meet(conflicts, rules, agents, way, passage, arrivals, at, stays)
+        full[i] = is_full(rules, promised, agents, slot, way, passage, at, i)
+    # For who has waited very long others leave the room behind the junction.
+    first = full & ~stopped
+    next_in = first & (agents.waits[slots] > ticks[3])
+    meeting = meet(conflicts, rules, agents, way, passage, arrivals, at, stopped | full, first,
+                   next_in)
     for i, slot in enumerate(slots):
         agents.blocker[slot] = FREE
         if agents.grant[slot] >= 0 and _withdraws(rules, ticks, k, agents, passage, meeting, at,
                                                   i):
-            agents.grant[slot] = NOBODY
+            agents.grant[slot] = agents.before[slot] = NOBODY
             halt[i] = agents.grant_hold[slot]
     for i in _in_turn(k, agents, slots):
         slot = slots[i]
-        if passage.first[i] >= 0 and halt[i] == math.inf and (
-                passage.hold[i] < -1.0 or _may_enter(
-                    rules, ticks, k, agents, passage, meeting, at, stopped, full, i)):
+        if passage.first[i] < 0 or halt[i] < math.inf:
+            continue
+        # Those let in before it take room as well.
+        full[i] = full[i] or is_full(rules, promised, agents, slot, way, passage, at, i)
+        if passage.hold[i] < -1.0 or _may_enter(
+                rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
             _grant(k, agents, slot, way, passage, i)
+            promise(promised, agents, slot, way, passage, i)
     for i, slot in enumerate(slots):
         if agents.grant[slot] >= 0:
             halt[i] = min(halt[i], _inside_halt(k, agents, passage, meeting, at, i))
         if passage.first[i] >= 0 and _is_near(agents.speed[slot], passage.hold[i]) and (
                 stopped[i] or full[i] or _heeds(agents, slot)):
             halt[i] = min(halt[i], passage.hold[i])
-    return halt
+    return halt, full & ~stopped & (passage.first >= 0) & (passage.hold < AT_LINE)
 
 
 @compiled
@@ -138,6 +129,10 @@ def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, 
     """Let an agent into its next junction: it holds no more before that."""
     if agents.grant[slot] < 0:
         agents.grant_hold[slot] = passage.hold[i]
+    else:
+        # It stays the first where it is already.
+        agents.before[slot], agents.before_until[slot] = agents.grant[slot], agents.until[slot]
+        passage.before[i] = passage.granted[i]
     agents.grant[slot] = k
     agents.until[slot] = way.lane[i, passage.last[i]]
     agents.grant_left[slot] = passage.end[i] + 0.5 * agents.length[slot]
@@ -164,6 +159,7 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
             ahead |= way.lane[i, step] == agents.until[slot]
         if not ahead or agents.grant_left[slot] < -PASSED:
             agents.grant[slot], agents.sees[slot] = NOBODY, False
+            agents.before[slot] = NOBODY
 
 
 @compiled
@@ -205,7 +201,7 @@ def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
         return False
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         if meeting.who[n] < 0 and meeting.step[n] <= passage.granted[i] and _yields(
-                ticks, k, agents, meeting, at, i, n):
+                ticks, k, agents, passage, meeting, at, i, n):
             return True
     return False
 
@@ -228,8 +224,8 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
     easily = speed**2 < 2.0 * MERCY * passage.hold[i]
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         if meeting.step[n] > passage.granted[i] and (
-                _yields(ticks, k, agents, meeting, at, i, n)
-                or (easily and _has_mercy(ticks, agents, meeting, at, i, n))):
+                _yields(ticks, k, agents, passage, meeting, at, i, n)
+                or (easily and _has_mercy(ticks, k, agents, meeting, at, i, n))):
             who = meeting.who[n]
             agents.blocker[slot] = at.slots[who] if who >= 0 else who
             return False
@@ -237,19 +233,19 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
 
 
 @compiled
-def _has_mercy(ticks: IntArray, agents: AgentTable, meeting: Meetings, at: Situation, i: int,
-               n: int) -> bool:
+def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
+               i: int, n: int) -> bool:
     """Tell whether an agent lets somebody go first who has waited very long."""
     who = meeting.who[n]
-    if who < 0 or meeting.apart[n]:
+    if who < 0 or meeting.apart[n] or agents.insists_until[at.slots[i]] > k:
         return False
     waits = agents.waits[at.slots[who]]
     return bool(waits > ticks[3] and waits > agents.waits[at.slots[i]])
 
 
 @compiled
-def _yields(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
-            i: int, n: int) -> bool:
+def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
+            at: Situation, i: int, n: int) -> bool:
     """Tell whether an agent lets the other of a meeting go first."""
     if meeting.apart[n]:
         return False
@@ -261,12 +257,12 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: 
     them = at.slots[who]
     if agents.insists_until[slot] > k and agents.speed[them] < 1.0:
         return False
-    if agents.grant[them] >= 0:
+    if is_let_in(agents, them, passage, who, meeting.theirs[n]):
         return True
     waits, theirs = agents.waits[slot], agents.waits[them]
     # Among those who stand, whoever has stood for longest goes first.
     longer = waits > theirs or (waits == theirs and i < who)
-    patient = waits > ticks[0] and theirs > 0 and longer
+    patient = meeting.priority[n] > -2 and waits > ticks[0] and theirs > 0 and longer
     patient |= meeting.courteous[n] and waits > (ticks[1] if meeting.joins[n] else ticks[3])
     return bool(meeting.priority[n] < 0 and not patient)
 
@@ -288,7 +284,9 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
         if who < 0:
             stops = meeting.inside[n] or meeting.committed[n]
         else:
-            stops = meeting.inside[n] or _is_senior(k, agents, at, i, who)
+            stops = meeting.inside[n] or (
+                is_let_in(agents, at.slots[who], passage, who, meeting.theirs[n])
+                and _is_senior(k, agents, passage, meeting, at, i, n))
         if stops:
             result = meeting.into[n]
             agents.blocker[slot] = at.slots[who] if who >= 0 else who
@@ -296,13 +294,23 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
 
 
 @compiled
-def _is_senior(k: int, agents: AgentTable, at: Situation, i: int, who: int) -> bool:
-    """Tell whether another who was let in goes before an agent that was."""
+def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings, at: Situation,
+               i: int, n: int) -> bool:
+    """Tell whether the other of a meeting, who was let in, goes before an agent that was."""
+    who = meeting.who[n]
     slot, them = at.slots[i], at.slots[who]
-    grant, theirs = agents.grant[slot], agents.grant[them]
+    grant = _let_in_at(agents, slot, passage, i, meeting.step[n])
+    theirs = _let_in_at(agents, them, passage, who, meeting.theirs[n])
     # Who stands behind the agent, or waits for it, lets it go.
-    if theirs < 0 or agents.leader[them] == slot:
+    if agents.leader[them] == slot:
         return False
     if agents.insists_until[slot] > k and agents.speed[them] < 1.0:
         return False
     return bool(theirs < grant or (theirs == grant and them < slot))
+
+
+@compiled
+def _let_in_at(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> int:
+    """Give the tick at which an agent was let into the junction at a step of its way."""
+    in_first = agents.before[slot] >= 0 and step <= passage.before[i]
+    return int(agents.before[slot] if in_first else agents.grant[slot])

@@ -1,15 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What drivers make of what they have decided: late, not quite, or not at all."""
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.scenario.events import TrafficChange
+from crgame_ros.game.events import TrafficChange
+from crgame_ros.game.traffic_spec import MAX_REACTION_TIME, TrafficSpec
 from crgame_ros.traffic.agents import Agents
 from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.spec import BOUNDS, TrafficSpec
+import numpy as np
+from numpy.typing import NDArray
 
 # [m/s]
 WALKING = 2.0
@@ -40,7 +51,7 @@ class Drivers:
         self._imperfection = np.full(count, spec.imperfection)
         self._delay = np.full(count, self._ticks(spec.reaction_time))
         # What was decided at the last ticks; NaN for those who were not there.
-        self._decided = np.full((self._ticks(BOUNDS['reaction_time'][1]) + 1, count), np.nan)
+        self._decided = np.full((self._ticks(MAX_REACTION_TIME) + 1, count), np.nan)
         self._last_k = -2**62
 
     def _some(self, share: float) -> NDArray[np.bool_]:

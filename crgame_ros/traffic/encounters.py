@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who is really in the way of whom, and how hard one has to brake for that."""
 
 import math
@@ -14,9 +26,10 @@ from crgame_ros.traffic.lane_table import (
     point_on,
     project_on,
 )
-from crgame_ros.traffic.leaders import Corridors, first_from, LONGEST, Pairs, swing, Ways
+from crgame_ros.traffic.leaders import Corridors, first_from, LONGEST, Pairs, Ways
 from crgame_ros.traffic.motion import onward
 from crgame_ros.traffic.placement import Entries
+from crgame_ros.traffic.pursuit import curve_shift, swing_out
 
 # Harder than this is braked only where it takes that to halt behind somebody [m/s^2].
 FIRMEST = 3.9
@@ -127,11 +140,8 @@ def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: in
     agents.blocker[slot] = other
     if agents.speed[slot] < CREEP:
         return -1.0
-    for braking in TRIED:
-        if _touch(lanes, following, agents, slot, speed, other, braking, BRUSH_TIME,
-                  BRUSH_BESIDE) == math.inf:
-            return -braking
-    return -TRIED[-1]
+    braking = _gentlest(lanes, following, agents, slot, speed, other, BRUSH_TIME, BRUSH_BESIDE)
+    return -min(braking, TRIED[-1])
 
 
 @bare
@@ -173,18 +183,28 @@ def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap:
 
 @bare
 def needed_braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
-             other: int) -> float:
+                   other: int) -> float:
     """Give the gentlest braking with which two agents miss each other, -inf if none is needed."""
     speed = agents.speed[slot]
     soon = _touch(lanes, following, agents, slot, speed, other, 0.0, FORESEEN, BESIDE)
     if soon == math.inf:
         return -math.inf
-    for braking in TRIED:
-        if _touch(lanes, following, agents, slot, speed, other, braking, FORESEEN,
-                  BESIDE) == math.inf:
-            return braking
+    braking = _gentlest(lanes, following, agents, slot, speed, other, FORESEEN, BESIDE)
+    if braking < math.inf:
+        return braking
     # Nothing that this one does helps now; the other may do something.
     return TRIED[-1] if soon < LAST_MOMENT else FIRMEST
+
+
+@bare
+def _gentlest(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, speed: float,
+              other: int, foreseen: float, beside: float) -> float:
+    """Give the gentlest of `TRIED` with which two agents don't touch, or inf; see `_touch`."""
+    for braking in TRIED:
+        if _touch(lanes, following, agents, slot, speed, other, braking, foreseen,
+                  beside) == math.inf:
+            return braking
+    return math.inf
 
 
 @bare
@@ -234,9 +254,9 @@ def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, floa
 @inlined
 def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float) -> float:
     """Give how far to the left of a bend's middle the rear axle runs [m]."""
-    bend = lanes.line[nearest_row(lanes, lane, s)].curvature
-    shift = swing(bend, agents.rear_to_center[slot] + 0.5 * agents.length[slot])
-    return shift if bend > 0.0 else -shift
+    front = agents.rear_to_center[slot] + 0.5 * agents.length[slot]
+    at = lanes.line[nearest_row(lanes, lane, s)]
+    return curve_shift(at.curvature, front) + swing_out(at.swing, at.swing_long, front)
 
 
 @bare

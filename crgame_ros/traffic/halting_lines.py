@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where traffic lights and stop signs want agents to halt."""
 
 from collections.abc import Mapping
@@ -7,26 +19,34 @@ import math
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
-from commonroad.scenario.traffic_light import TrafficLight, TrafficLightDirection
-import numpy as np
-from numpy.typing import NDArray
-
+from commonroad.scenario.traffic_light import TrafficLight
+from crgame_ros.roads.signals import LightCycle
+from crgame_ros.roads.signs import (
+    has_arrow,
+    has_stop_sign,
+    lights_for,
+    lights_of,
+    stop_line_middle,
+)
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, STRAIGHT, UNDECIDED
+import numpy as np
+from numpy.typing import NDArray
 
 YELLOW, RED = 1, 2
 LEVELS = {'yellow': YELLOW, 'red': RED, 'redYellow': RED}
+RED_STATES = [state for state, level in LEVELS.items() if level == RED]
 ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
 # Cycles of several lights are compared over so many time steps.
 LONGEST_CYCLE = 20_000
 # Hardest braking for a light that is red, and for one that turns yellow [m/s^2].
 RED_BRAKING = 4.0
 YELLOW_BRAKING = 3.4
-# Who brakes already doesn't drive on because that has become harder than wanted: at a yellow, at
-# a red light [m/s^2].
-BRAKES, STILL_BRAKING, STILL_FOR_RED = -1.0, 4.0, 7.0
+# Who has decided to halt doesn't drive on because that has become harder than wanted: at a yellow,
+# at a red light [m/s^2].
+STILL_BRAKING, STILL_FOR_RED = 4.0, 7.0
 # Time until braking has set in [s].
 REACTION = 0.1
 
@@ -76,9 +96,9 @@ class HaltingLines:
         for lane, lanelet_id in enumerate(graph.ids):
             lanelet = roads.find_lanelet_by_id(lanelet_id)
             if lanelet.stop_line is not None:
-                self.line[lane] = self.at[lane] = self._position(lane, lanelet.stop_line)
-                self.stop_sign[lane] = _has_stop_sign(lanelet, roads)
-            lights = _lights(lanelet, roads)
+                self.line[lane] = self.at[lane] = self._position(lane, lanelet)
+                self.stop_sign[lane] = has_stop_sign(lanelet, roads)
+            lights = lights_of(lanelet, roads)
             if lights:
                 self._lights[lane] = {movement: _governing(lights, arrow)
                                       for movement, arrow in ARROWS.items()}
@@ -91,13 +111,11 @@ class HaltingLines:
         self._states: Mapping[int, str] | None = None
         self._any_shown = False
 
-    def _position(self, lane: int, line: object) -> float:
-        start, end = getattr(line, 'start', None), getattr(line, 'end', None)
-        length = float(self._graph.length[lane])
-        if start is None or end is None:
+    def _position(self, lane: int, lanelet: Lanelet) -> float:
+        middle, length = stop_line_middle(lanelet), float(self._graph.length[lane])
+        if middle is None:
             return length
-        middle = 0.5 * (np.asarray(start) + np.asarray(end))
-        s, _ = self._graph.nearest(lane, middle[:1], middle[1:2])
+        s, _ = self._graph.nearest(lane, middle[:1], middle[1:])
         return float(np.clip(s[0], 0.0, length))
 
     def show(self, signals: Mapping[int, str]) -> None:
@@ -115,29 +133,27 @@ class HaltingLines:
         self._any_shown = bool(self.shown.any())
 
     def halts(self, way: Ways, speed: FloatArray, length: FloatArray,
-              acceleration: FloatArray | None = None) -> FloatArray:
+              stops: NDArray[np.bool_]) -> FloatArray:
         """
         Give the distance (A) of each agent's front from the first line with a light to heed [m].
 
         Red holds unless braking hard would not suffice, yellow if gentle braking does.
 
-        :param acceleration: (A) so far; who brakes goes on to [m/s^2]
+        :param stops: (A) who has decided to halt before, and goes on to.
         """
-        if acceleration is None:
-            acceleration = np.zeros(len(speed))
         if not self._any_shown:
             return np.full(len(speed), np.inf)
         return _halts(LightTable(self.at, self.number, self.shown, self.movement), way, speed,
-                      length, acceleration)
+                      length, stops)
 
 
 @compiled
 def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
-           acceleration: FloatArray) -> FloatArray:
+           stops: NDArray[np.bool_]) -> FloatArray:
     result = np.full(len(speed), np.inf)
     for i in range(len(speed)):
-        gentle = STILL_BRAKING if acceleration[i] < BRAKES else YELLOW_BRAKING
-        firm = STILL_FOR_RED if acceleration[i] < BRAKES else RED_BRAKING
+        gentle = STILL_BRAKING if stops[i] else YELLOW_BRAKING
+        firm = STILL_FOR_RED if stops[i] else RED_BRAKING
         for step in range(way.depth[i]):
             lane = way.lane[i, step]
             if lights.number[lane] < 0:
@@ -145,7 +161,7 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
             shown = lights.shown[lane, movement_of(lights, way, i, step)]
             away = way.offset[i, step] + lights.at[lane] - 0.5 * length[i]
             # Braking takes a moment to set in.
-            late = REACTION * speed[i] if shown == YELLOW and acceleration[i] >= BRAKES else 0.0
+            late = REACTION * speed[i] if shown == YELLOW and not stops[i] else 0.0
             needed = speed[i]**2 / (2.0 * max(away - late, 0.1))
             heeds = (shown == RED and needed < firm) or (
                 shown == YELLOW and needed < gentle)
@@ -165,28 +181,11 @@ def movement_of(lights: LightTable, way: Ways, i: int, step: int) -> int:
     return UNDECIDED
 
 
-def _has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
-    signs = set(lanelet.traffic_signs) | (lanelet.stop_line.traffic_sign_ref or set())
-    return any(element.traffic_sign_element_id.name == 'STOP' for sign_id in signs
-               if (sign := roads.find_traffic_sign_by_id(sign_id)) is not None
-               for element in sign.traffic_sign_elements)
-
-
-def _lights(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:
-    """List the lights of a lanelet and of its stop line."""
-    ids = set(lanelet.traffic_lights)
-    if lanelet.stop_line is not None:
-        ids |= lanelet.stop_line.traffic_light_ref or set()
-    found = (roads.find_traffic_light_by_id(i) for i in sorted(ids))
-    return [light for light in found if light is not None]
-
-
 def _governing(lights: list[TrafficLight], arrow: str) -> tuple[int, ...]:
     """Give the ids of the lights that are for a movement."""
-    everybody = [x for x in lights if x.direction in (None, TrafficLightDirection.ALL)]
-    arrows = [x for x in lights if x not in everybody and arrow in x.direction.value.lower()]
-    chosen = everybody + arrows or lights
-    if everybody and arrows and _is_never_free(chosen):
+    chosen = lights_for(lights, arrow)
+    arrows = [light for light in chosen if has_arrow(light)]
+    if 0 < len(arrows) < len(chosen) and _is_never_free(chosen):
         chosen = arrows
     return tuple(x.traffic_light_id for x in chosen)
 
@@ -200,10 +199,4 @@ def _is_never_free(lights: list[TrafficLight]) -> bool:
 
 def _red_steps(light: TrafficLight) -> NDArray[np.bool_]:
     """Tell for the time steps of a light's cycle whether it is red."""
-    cycle = light.traffic_light_cycle
-    elements = cycle.cycle_elements if cycle is not None and light.active else []
-    steps = np.repeat([LEVELS.get(x.state.value, 0) == RED for x in elements],
-                      [max(x.duration, 0) for x in elements])
-    if not len(steps):
-        return np.zeros(1, dtype=bool)
-    return np.asarray(np.roll(steps, int(cycle.time_offset or 0)))
+    return np.isin(LightCycle(light).states_over(), RED_STATES)

@@ -1,12 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who will be in which conflict when: the passages of agents, and the ways of all others."""
 
 import math
 from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
@@ -15,9 +24,13 @@ from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import LaneTable
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.placement import Entries
+import numpy as np
+from numpy.typing import NDArray
 
 # With less room than this before a conflict nobody waits inside the junction [m].
 WAITING_ROOM = 15.0
+# But with more than this, besides its own length, in a junction too long to be seen whole [m].
+BETWEEN = 3.0
 # How far ahead others are expected, at their present speed [s]; and how much farther [m].
 OTHERS_TIME = 8.0
 OTHERS_REACH = 15.0
@@ -52,7 +65,8 @@ class Passages(NamedTuple):
     """
     The next junction on the way of each agent (A) that it was not let into yet.
 
-    :param granted: (A) step of the way at which what it was let into ends, -1 without that.
+    :param granted: (A) step of the way at which what it was let into ends, -1 without that;
+        `before` the same of what it was let into before, while it is still in there.
     :param first: (A) step of the way at which it begins, -1 without one.
     :param last: (A) at which it ends.
     :param hold: (A) distance of the agent's front from where it waits [m]
@@ -60,6 +74,7 @@ class Passages(NamedTuple):
     """
 
     granted: IntArray
+    before: IntArray
     first: IntArray
     last: IntArray
     hold: FloatArray
@@ -77,30 +92,39 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
     count = len(slots)
     result = Passages(
         np.full(count, -1, np.int64), np.full(count, -1, np.int64), np.full(count, -1, np.int64),
-        np.full(count, math.inf), np.full(count, -math.inf))
+        np.full(count, -1, np.int64), np.full(count, math.inf), np.full(count, -math.inf))
     for i, slot in enumerate(slots):
         wide = 1 if agents.width[slot] > NARROW else 0
         entry, leave = conflicts.entry[wide], conflicts.leave[wide]
         half = 0.5 * agents.length[slot]
         if agents.grant[slot] >= 0:
             for step in range(way.depth[i]):
+                if agents.before[slot] >= 0 and way.lane[i, step] == agents.before_until[slot]:
+                    result.before[i] = step
                 if way.lane[i, step] == agents.until[slot]:
                     result.granted[i] = step
                     break
+        widest, last, end = agents.length[slot] + BETWEEN, -1, 0.0
         for step in range(result.granted[i] + 1, way.depth[i]):
             lane = way.lane[i, step]
             if not math.isfinite(entry[lane]):
                 continue
+            room = way.offset[i, step] + entry[lane] - result.end[i]
             if result.first[i] < 0:
                 if way.offset[i, step] + leave[lane] + half > 0.0:
                     result.first[i] = result.last[i] = step
                     result.hold[i] = _hold(entry[lane], lines, way, i, step) - half
                     result.end[i] = way.offset[i, step] + leave[lane]
-            elif way.offset[i, step] + entry[lane] - result.end[i] < WAITING_ROOM:
+            elif room < WAITING_ROOM:
+                if room > widest:
+                    widest, last, end = room, result.last[i], result.end[i]
                 result.last[i] = step
                 result.end[i] = way.offset[i, step] + leave[lane]
             else:
                 break
+        if last >= 0 and result.end[i] + WAITING_ROOM > way.horizon[i]:
+            # It may go on behind what is seen: better to wait where most room is than anywhere.
+            result.last[i], result.end[i] = last, end
     return result
 
 

@@ -1,16 +1,27 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Which lanes are near a point: a grid over the map, made once."""
 
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
-
-from crgame_ros.traffic.compiled import bare, compiled
+from crgame_ros.traffic.compiled import bare
 from crgame_ros.traffic.lane_graph import FloatArray, heading_difference, IntArray, LaneGraph
+from crgame_ros.traffic.lane_table import first_at_least
+import numpy as np
+from scipy.spatial import cKDTree
 
 CELL = 3.0
 # How far from a centre line a body's centre may be and still reach into the lane [m].
@@ -52,26 +63,9 @@ def cell_of(cells: CellTable, x: float, y: float) -> int:
     if not (0 <= row < cells.rows and 0 <= column < cells.columns):
         return -1
     key = int(row) * cells.columns + int(column)
-    low, high = cells.row_starts[int(row)], cells.row_starts[int(row) + 1]
-    while low < high:
-        middle = (low + high) // 2
-        if cells.keys[middle] < key:
-            low = middle + 1
-        else:
-            high = middle
+    low = first_at_least(cells.keys, cells.row_starts[int(row)], cells.row_starts[int(row) + 1],
+                         key)
     return int(low) if low < len(cells.keys) and cells.keys[low] == key else -1
-
-
-@compiled
-def cells_of(cells: CellTable, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray]:
-    """Give where the lanes near points (N) begin in the table, and how many there are."""
-    first, size = np.zeros(len(x), np.int64), np.zeros(len(x), np.int64)
-    for i in range(len(x)):
-        cell = cell_of(cells, x[i], y[i])
-        if cell >= 0:
-            first[i] = cells.starts[cell]
-            size[i] = cells.starts[cell + 1] - first[i]
-    return first, size
 
 
 class LaneCells:
@@ -92,7 +86,7 @@ class LaneCells:
         shift = (around[:, None] * self._columns + around[None, :]).ravel()
         keys, lanes, guesses = [], [], []
         for lane in range(len(graph)):
-            rows = slice(int(graph.first[lane]), int(graph.first[lane] + graph.count[lane]))
+            rows = graph.rows_of(lane)
             points = np.stack((graph.x[rows], graph.y[rows]), axis=-1)
             cells = np.unique((np.unique(self._cells(points))[:, None] + shift).ravel())
             distance, nearest = cKDTree(points).query(self._centers(cells))
@@ -119,17 +113,6 @@ class LaneCells:
                                  graph.yaw[rows] - graph.yaw[first]))
         return float(np.ptp(turned))
 
-    def near(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """
-        List the lanes near points (N, 2).
-
-        :return: for each pair of a point and a lane the point's row, the lane, and the arc length
-            about which the point is
-        """
-        first, size = cells_of(self.table, points[:, 0].copy(), points[:, 1].copy())
-        rows, place = spans(first, size)
-        return rows, self.table.lanes[place], self.table.guesses[place]
-
     def _cells(self, points: FloatArray) -> IntArray:
         cell = np.floor((points - self._origin) / CELL).astype(np.int64)
         inside = ((cell >= 0) & (cell < (self._rows, self._columns))).all(axis=1)
@@ -138,14 +121,3 @@ class LaneCells:
     def _centers(self, cells: IntArray) -> FloatArray:
         both = np.stack((cells // self._columns, cells % self._columns), axis=-1)
         return np.asarray(self._origin + (both + 0.5) * CELL)
-
-
-def spans(starts: NDArray[np.int64], sizes: NDArray[np.int64]) -> tuple[IntArray, IntArray]:
-    """
-    Write out ranges one behind the other.
-
-    :return: for each element the number of its range, and its value start, start + 1, …
-    """
-    rows = np.repeat(np.arange(len(starts)), sizes)
-    before = np.cumsum(sizes) - sizes
-    return rows, np.arange(len(rows)) - before[rows] + starts[rows]

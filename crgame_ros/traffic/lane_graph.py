@@ -1,21 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The lanes of a road network as flat arrays, for many agents at once."""
 
 from commonroad.scenario.lanelet import Lanelet
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
-from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.traffic.lane_table import LaneTable, point_records, poses_on, project_all
-from crgame_ros.traffic.tracking import PURSUIT_TIME
+from crgame_ros.traffic.pursuit import PURSUIT_TIME
+import numpy as np
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 STEP = 0.5
+# Tables and conflicts of so many lanes are made in 10 s, in half a gigabyte [m].
+MAX_LENGTH = 4e5
 # Published maps hold successors that begin elsewhere: such a link is no way to drive on [m].
 MAX_GAP = 1.0
 # Headings of published centre lines jump from vertex to vertex; smoothed over this length [m].
@@ -34,7 +47,7 @@ class LaneGraph:
     :param network: the road network.
     :param lateral_acceleration: comfortable in curves [m/s^2]
     :param default_speed: where there is no speed limit [m/s]
-    :raises InputError: if no lanelet is for cars.
+    :raises InputError: if no lanelet is for cars, or there are too many kilometres of them.
     """
 
     def __init__(self, network: RoadNetwork, lateral_acceleration: float = 2.0,
@@ -50,6 +63,7 @@ class LaneGraph:
         self._default_speed = default_speed
         self.limit: FloatArray = np.zeros(len(self.ids))
         self.read_speed_limits(network)
+        self.lateral_acceleration = lateral_acceleration
         curve = np.sqrt(lateral_acceleration / np.maximum(np.abs(self.curvature), 1e-4))
         # What a curve allows of itself; a limit is scaled by each driver's own factor.
         self.curve_speed: FloatArray = np.maximum(curve, 2.0)
@@ -70,6 +84,10 @@ class LaneGraph:
     def _tabulate(self, network: RoadNetwork) -> None:
         lines = [network.line(i) for i in self.ids]
         self.length: FloatArray = np.array([line.length for line in lines])
+        if not self.length.sum() <= MAX_LENGTH:
+            raise InputError(f'{self.length.sum() / 1e3:.0f} km of lanes are more than '
+                             f'{MAX_LENGTH / 1e3:.0f} km', 'traffic',
+                             'use a part of the map, or run it without traffic')
         self.count: IntArray = np.maximum(np.ceil(self.length / STEP - 1e-9), 1).astype(int) + 1
         self.first: IntArray = np.cumsum(self.count) - self.count
         self.step: FloatArray = self.length / (self.count - 1)
@@ -150,7 +168,7 @@ class LaneGraph:
         return np.asarray(self.first[lane] + np.clip(row, 0, self.count[lane] - 1))
 
     def poses(self, lane: IntArray, s: FloatArray, d: FloatArray) -> FloatArray:
-        """Give the poses (N, 3) at arc length s and offset d to the left; straight beyond."""
+        """Give the (N, 3) poses at arc length s and offset d to the left; straight beyond."""
         return poses_on(self.table, lane, s, d)
 
     def project(self, lane: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray,
@@ -165,9 +183,13 @@ class LaneGraph:
         return project_all(self.table, np.array(lane), np.array(x), np.array(y),
                            np.array(guess, dtype=np.float64), rounds)
 
+    def rows_of(self, lane: int) -> slice:
+        """Give the table rows of a lane."""
+        return slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))
+
     def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Find points (N) in the coordinates of one lane, wherever on it; s, d [m]."""
-        rows = slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))
+        rows = self.rows_of(lane)
         away = (x[:, None] - self.x[None, rows]) ** 2 + (y[:, None] - self.y[None, rows]) ** 2
         guess = np.argmin(away, axis=1) * self.step[lane]
         s, d, _ = self.project(np.full(len(x), lane), x, y, guess)

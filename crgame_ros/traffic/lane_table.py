@@ -1,14 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The lanes as flat tables, and the curvilinear frame of a lane, for compiled loops."""
 
 import math
-from typing import cast, NamedTuple, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, cast, NamedTuple, Protocol
 
 from crgame_ros.traffic.compiled import compiled, inlined
+import numpy as np
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -21,6 +32,9 @@ class Point(Protocol):
     :param x, y, yaw: [m, rad]
     :param curvature: [1/m]
     :param half_width: of the lane [m]
+    :param swing, swing_long: where a bend is too tight, how far to the left cars and long
+        vehicles swing out for the square of the distance from rear axle to front [1/m]; see
+        `tightness`.
     """
 
     x: float
@@ -30,6 +44,8 @@ class Point(Protocol):
     sin: float
     curvature: float
     half_width: float
+    swing: float
+    swing_long: float
 
 
 class Points(Protocol):
@@ -42,12 +58,17 @@ def point_records(x: FloatArray, y: FloatArray, yaw: FloatArray, curvature: Floa
                   half_width: FloatArray) -> Points:
     """Put the columns of points into records."""
     columns = {'x': x, 'y': y, 'yaw': yaw, 'cos': np.cos(yaw), 'sin': np.sin(yaw),
-               'curvature': curvature, 'half_width': half_width}
-    # Filled up to 64 bytes.
-    result = np.zeros(len(x), dtype=[(name, 'f8') for name in (*columns, 'unused')])
+               'curvature': curvature, 'half_width': half_width, 'swing': np.zeros(len(x)),
+               'swing_long': np.zeros(len(x))}
+    result = np.zeros(len(x), dtype=[(name, 'f8') for name in columns])
     for name, column in columns.items():
         result[name] = column
     return cast(Points, result)
+
+
+def column_of(points: Points, name: str) -> FloatArray:
+    """Give a column of points, to read and to write."""
+    return cast(FloatArray, cast(Any, points)[name])
 
 
 class LaneTable(NamedTuple):
@@ -74,6 +95,18 @@ class LaneTable(NamedTuple):
     successors: IntArray
     predecessors: IntArray
     line: Points
+
+
+@inlined
+def first_at_least(values: FloatArray | IntArray, low: int, high: int, least: float) -> int:
+    """Give the first row from `low` on with no less than a value, `high` if none before it has."""
+    while low < high:
+        middle = (low + high) // 2
+        if values[middle] < least:
+            low = middle + 1
+        else:
+            high = middle
+    return int(low)
 
 
 @inlined

@@ -1,17 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who is ahead of whom: the ways of all agents over several lanes, and what is on them."""
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.traffic.agents import AgentTable, FREE
 from crgame_ros.traffic.compiled import bare, compiled, inlined
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.lane_table import LaneTable, nearest_row
+from crgame_ros.traffic.lane_table import first_at_least, LaneTable, nearest_row
 from crgame_ros.traffic.placement import Entries, rear_within
+from crgame_ros.traffic.pursuit import curve_shift, swing_out
+import numpy as np
+from numpy.typing import NDArray
 
 MAX_LANES = 40
 # Of what is in the way ahead so many are answered to, and so many that drive the same way.
@@ -19,8 +31,6 @@ MAX_AHEAD, MAX_LEADERS = 6, 2
 # A vehicle this far behind the beginning of a body may still be beside it [m].
 LONGEST = 25.0
 SIDE_MARGIN = 0.15
-# In a curve the corners of a vehicle swing out by at most this, its front keeps that in lane [m].
-MAX_SWING = 1.0
 
 
 class Ways(NamedTuple):
@@ -150,25 +160,7 @@ def own_corridors(lanes: LaneTable, agents: AgentTable, slots: IntArray,
 @inlined
 def first_from(entries: Entries, lane: int, rear: float) -> int:
     """Give the first row of a lane whose entry begins at an arc length or behind it."""
-    low, high = entries.begin[lane], entries.begin[lane + 1]
-    while low < high:
-        middle = (low + high) // 2
-        if entries.rear[middle] < rear:
-            low = middle + 1
-        else:
-            high = middle
-    return int(low)
-
-
-@inlined
-def swing(curvature: float, front: float) -> float:
-    """
-    Give by how much more than half its width a vehicle takes on either side in a curve [m].
-
-    With its rear axle f^2 / (4 R) inside the middle, f the distance to its front, the rear's
-    inner and the front's outer corner are equally far out.
-    """
-    return min(0.25 * abs(curvature) * front * front, MAX_SWING)
+    return first_at_least(entries.rear, entries.begin[lane], entries.begin[lane + 1], rear)
 
 
 @compiled
@@ -222,8 +214,11 @@ def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: f
     if middle + offset <= 0.0 or entries.owner[n] == corridor.owner[i]:
         return np.inf
     row = nearest_row(lanes, lane, min(max(middle, 0.0), lanes.length[lane]))
-    shift = reference[row] if len(reference) else 0.0
-    margin = SIDE_MARGIN + swing(lanes.line[row].curvature, corridor.front[i])
+    at = lanes.line[row]
+    shift = swing_out(at.swing, at.swing_long, corridor.front[i])
+    if len(reference):
+        shift += reference[row]
+    margin = SIDE_MARGIN + abs(curve_shift(at.curvature, corridor.front[i]))
     return float(rear_within(entries, n, corridor.low[i] + shift - margin,
                              corridor.high[i] + shift + margin))
 

@@ -1,11 +1,20 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How fast agents want to drive, and how they accelerate behind whatever is ahead (FS M2)."""
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
 from crgame_ros.traffic.compiled import bare, compiled
@@ -17,6 +26,9 @@ from crgame_ros.traffic.lane_table import LaneTable, nearest_row
 from crgame_ros.traffic.leaders import Corridors, Pairs, Ways
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
+from crgame_ros.vehicle.standstill import QUEUEING
+import numpy as np
+from numpy.typing import NDArray
 
 # With which agents slow down for a curve or a lower limit ahead [m/s^2].
 COASTING = 1.2
@@ -26,7 +38,7 @@ LOOKS = (0.3, 0.6, 1.0)
 # out of: at full speed as far as can be, for gaps are found there.
 AT_LINE, AT_END = 1.6, 3.0
 # Lines are halted at with this gap [m], and a standing agent this near stays [m].
-LINE_GAP, AT_REST = 0.5, 0.3
+LINE_GAP, NEAR = 0.5, 0.3
 # Room before a standing obstacle from which one gets into the next lane [m].
 SWING_OUT = 10.0
 # Of a short lane that ends this share is left to change lanes in.
@@ -34,6 +46,8 @@ REST_SHARE = 0.2
 # Comfortable jerk [m/s^3]: of braking more, of braking less or accelerating; what is wanted beyond
 # `EMERGENCY` is done at once [m/s^2].
 JERK, RELEASE, EMERGENCY = 3.0, 4.0, 3.0
+# Whoever takes a bend with more than this share of what is comfortable gets to that within [s].
+ALMOST, STRAIGHTENING = 0.8, 0.5
 
 
 @compiled
@@ -64,23 +78,29 @@ def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: 
 
 
 @compiled
-def _speeds(lanes: LaneTable, envelope: FloatArray, way: Ways, agents: AgentTable,
-            slots: IntArray) -> tuple[FloatArray, FloatArray]:
+def _speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Ways,
+            agents: AgentTable, slots: IntArray) -> tuple[FloatArray, FloatArray]:
     """Give what is allowed now (A), and the acceleration (A) that keeps to what is ahead."""
     desired, limit = np.empty(len(slots)), np.full(len(slots), math.inf)
-    _fill_speeds(lanes, envelope, way, agents, slots, desired, limit)
+    _fill_speeds(lanes, envelope, lateral, way, agents, slots, desired, limit)
     return desired, limit
 
 
 @bare
-def _fill_speeds(lanes: LaneTable, envelope: FloatArray, way: Ways, agents: AgentTable,
-                 slots: IntArray, desired: FloatArray, limit: FloatArray) -> None:
+def _fill_speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Ways,
+                 agents: AgentTable, slots: IntArray, desired: FloatArray,
+                 limit: FloatArray) -> None:
     for i, slot in enumerate(slots):
         factor, top, speed = agents.factor[slot], agents.top[slot], agents.speed[slot]
         desired[i] = _allowed(lanes, envelope, way, i, factor, top, 0.0)
         for look in LOOKS:
             there = _allowed(lanes, envelope, way, i, factor, top, speed * look)
             limit[i] = min(limit[i], (there - speed) / look)
+        # Whoever comes out of a bend speeds up only as the wheels straighten.
+        bend = abs(math.tan(agents.steering[slot])) / agents.wheelbase[slot]
+        if speed * speed * bend > ALMOST * lateral:
+            steady = (math.sqrt(lateral / bend) - speed) / STRAIGHTENING
+            limit[i] = min(limit[i], max(steady, -COASTING))
         # Whoever is much too fast, because a limit has changed, takes its time.
         limit[i] = max(limit[i], -2.0 * COASTING)
 
@@ -95,7 +115,7 @@ def halt_before(speed: float, distance: float, braking: float) -> float:
     """
     if distance >= math.inf:
         return math.inf
-    if speed < AT_REST and distance < AT_REST:
+    if speed < QUEUEING and distance < NEAR:
         return -1.0
     result = math.inf
     for look in LOOKS:
@@ -146,7 +166,7 @@ def before_lines(speed: FloatArray, light: FloatArray) -> FloatArray:
     result = np.empty(len(speed))
     for i in range(len(speed)):
         # Nearer to the line before one brakes hard for that.
-        easily = min(speed[i] * speed[i] / (2.0 * FIRMEST), light[i] - AT_REST)
+        easily = min(speed[i] * speed[i] / (2.0 * FIRMEST), light[i] - NEAR)
         result[i] = max(light[i] - LINE_GAP, easily)
     return result
 
@@ -162,6 +182,9 @@ def smooth(agents: AgentTable, slots: IntArray, wanted: FloatArray, hardest: flo
         low, high = before - JERK * dt_s, before + RELEASE * dt_s
         if wanted[i] < -EMERGENCY:
             low = wanted[i]
+        if speed < 1.0:
+            # Who has just begun to roll stops again at once.
+            low = min(low, -EMERGENCY)
         if before < -EMERGENCY or speed < 1.0:
             high = math.inf
         if speed > 0.0 or wanted[i] >= 0.0:
@@ -183,6 +206,7 @@ class Longitudinal:
         self._following = routes.next
         self._followers = followers
         self._envelope = envelope_of(graph.table, graph.curve_speed)
+        self._lateral = graph.lateral_acceleration
 
     def slow_for(self, speed: FloatArray) -> None:
         """Take over what else limits speeds, at each point of the lanes [m/s]: swerves."""
@@ -191,11 +215,12 @@ class Longitudinal:
     def speeds(self, way: Ways, agents: Agents,
                slots: IntArray) -> tuple[FloatArray, FloatArray]:
         """
-        Give the speeds (A) that limits and curves allow [m/s], those ahead in time.
+        Give the (A) speeds that limits and curves allow [m/s], those ahead in time.
 
         :return: and the accelerations (A) with which nobody gets too fast [m/s^2]
         """
-        desired, limit = _speeds(self._graph.table, self._envelope, way, agents.table, slots)
+        desired, limit = _speeds(self._graph.table, self._envelope, self._lateral, way,
+                                 agents.table, slots)
         return desired, limit
 
     def allowed(self, lane: int, s: float, factor: float) -> float:

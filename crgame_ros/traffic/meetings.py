@@ -1,12 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who meets whom at conflicts, and whether both pass at different times anyway."""
 
 import math
 from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
@@ -14,6 +23,9 @@ from crgame_ros.traffic.conflicts import ConflictTable, touch
 from crgame_ros.traffic.junctions import Arrivals, Passages, time_to
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.leaders import Ways
+from crgame_ros.vehicle.standstill import QUEUEING
+import numpy as np
+from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 
@@ -84,6 +96,7 @@ class Meetings(NamedTuple):
     :param begin: (A + 1) rows of each agent.
     :param who: (M) row of the other agent, or -1 - n for the n-th of the others.
     :param step: (M) of the agent's way.
+    :param theirs: (M) step of the other's way.
     :param into: (M) distance of the agent's front from the conflict [m]
     :param priority: (M) of the agent.
     :param apart: (M) whether both pass at different times anyway.
@@ -96,6 +109,7 @@ class Meetings(NamedTuple):
     begin: IntArray
     who: IntArray
     step: IntArray
+    theirs: IntArray
     into: FloatArray
     priority: IntArray
     apart: BoolArray
@@ -107,8 +121,16 @@ class Meetings(NamedTuple):
 
 @compiled
 def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way: Ways,
-          passage: Passages, arrivals: Arrivals, at: Situation, stays: BoolArray) -> Meetings:
-    """Pair agents with everybody whose conflicts are theirs, and compare their times."""
+         passage: Passages, arrivals: Arrivals, at: Situation, stays: BoolArray,
+         first: BoolArray, next_in: BoolArray) -> Meetings:
+    """
+    Pair agents with everybody whose conflicts are theirs, and compare their times.
+
+    :param stays: (A) who waits before a red light or a full junction: it comes to no conflict.
+    :param first: (A) of these, who is first before a full junction: it goes on around, and nobody
+        gets into a roundabout before it.
+    :param next_in: (A) whose the next room behind a full junction is: nobody takes it.
+    """
     room = 64
     found = _empty(len(at.slots), room)
     used = 0
@@ -126,9 +148,11 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                 if who == i or not touch(conflicts, conflict, agents.width[slot],
                                          arrivals.width[theirs]):
                     continue
-                # Who waits before a red light or a full junction comes to no conflict.
-                if who >= 0 and stays[who] and agents.grant[at.slots[who]] < 0 \
-                        and arrivals.into[theirs] > 0.0:
+                if who >= 0 and stays[who] and arrivals.into[theirs] > 0.0 \
+                        and not is_let_in(agents, at.slots[who], passage, who,
+                                          arrivals.step[theirs]) \
+                        and not (conflicts.merges[conflict] and (next_in[who] or (
+                            first[who] and conflicts.priority[conflict] < -1))):
                     continue
                 if used == len(found.who):
                     found = _grown(found)
@@ -136,6 +160,12 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                 used += 1
         found.begin[i + 1] = used
     return found
+
+
+@compiled
+def is_let_in(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> bool:
+    """Tell whether an agent was let in so far on its way: not only into a junction before."""
+    return bool(agents.grant[slot] >= 0 and step <= passage.granted[i])
 
 
 class _Rows(NamedTuple):
@@ -164,9 +194,9 @@ def _rows_of(arrivals: Arrivals, count: int) -> _Rows:
 def _empty(agents: int, room: int) -> Meetings:
     return Meetings(
         np.zeros(agents + 1, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
-        np.empty(room), np.empty(room, np.int64), np.empty(room, np.bool_),
+        np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64),
         np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_),
-        np.empty(room, np.bool_))
+        np.empty(room, np.bool_), np.empty(room, np.bool_))
 
 
 @compiled
@@ -174,7 +204,7 @@ def _grown(found: Meetings) -> Meetings:
     more, size = _empty(len(found.begin) - 1, 2 * len(found.who)), len(found.who)
     more.begin[:] = found.begin
     more.who[:size], more.into[:size] = found.who, found.into
-    more.step[:size] = found.step
+    more.step[:size], more.theirs[:size] = found.step, found.theirs
     more.priority[:size], more.apart[:size] = found.priority, found.apart
     more.inside[:size], more.committed[:size] = found.inside, found.committed
     more.courteous[:size], more.joins[:size] = found.courteous, found.joins
@@ -188,7 +218,7 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     who, conflict = arrivals.who[theirs], arrivals.conflict[mine]
     into, out, speed = arrivals.into[theirs], arrivals.out[theirs], arrivals.speed[theirs]
     if who < 0:
-        early = math.inf if speed < 0.3 and into > 0.0 else time_to(
+        early = math.inf if speed < QUEUEING and into > 0.0 else time_to(
             into, speed, rules.acceleration, speed)
         late = max(out, 0.0) / max(speed, 0.1)
     else:
@@ -198,7 +228,7 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     there = time_to(arrivals.into[mine], arrivals.speed[mine], HURRY, desired[i])
     gone = time_to(arrivals.out[mine], arrivals.speed[mine], rules.acceleration, desired[i])
     found.who[n], found.into[n] = who, arrivals.into[mine]
-    found.step[n] = arrivals.step[mine]
+    found.step[n], found.theirs[n] = arrivals.step[mine], arrivals.step[theirs]
     found.priority[n] = conflicts.priority[conflict]
     found.apart[n] = there > late + rules.gap_after or gone + rules.gap_before < early
     found.inside[n] = into <= 0.0 and out > 0.0

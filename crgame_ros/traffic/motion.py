@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Moving all agents along their lanes between two decisions."""
 
 import math
@@ -9,15 +21,19 @@ from crgame_ros.traffic.compiled import bare, inlined
 from crgame_ros.traffic.lane_change import offset_at
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row, project_on, segment
+from crgame_ros.traffic.pursuit import (
+    curve_shift,
+    drive,
+    pursuit_distance,
+    steer_towards,
+    swing_out,
+)
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.tracking import drive, pursuit_distance, steer_towards
 
 MAX_STEERING = 0.7
 MAX_STEERING_RATE = 1.0
 # A target point is at most this many lanes ahead.
 LANES_AHEAD = 12
-# In a curve the front swings out: the rear axle keeps inside by at most this [m].
-MAX_CURVE_SHIFT = 1.0
 
 
 class Motion:
@@ -45,7 +61,7 @@ class Motion:
         """
         agents.acceleration[slots] = acceleration
         move(self._graph.table, self._routes.next, agents.table, slots, reference, substeps,
-              self._dt_s)
+             self._dt_s)
 
 
 @bare
@@ -58,7 +74,7 @@ def move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntAr
         rear = agents.s[slot] - agents.rear_to_center[slot]
         for n in range(3):
             lane, there = onward(lanes, following, agents.destination[slot], agents.lane[slot],
-                                  rear + 0.5 * n * reach)
+                                 rear + 0.5 * n * reach)
             bend = max(bend, abs(lanes.line[nearest_row(lanes, lane, there)].curvature))
         distance = pursuit_distance(agents.speed[slot], bend)
         _drive(lanes, following, agents, slot, reference, distance, substeps, dt_s)
@@ -73,8 +89,6 @@ def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     wheelbase, middle = agents.wheelbase[i], agents.rear_to_center[i]
     lane, s, d = agents.lane[i], agents.s[i], agents.d[i]
     length = lanes.length[lane]
-    # The corners of a vehicle whose front is f ahead of its rear axle stay equally far from
-    # the middle of a curve if that axle runs f^2 / (4 R) inside.
     front = middle + 0.5 * agents.length[i]
     cos, sin, half_turn = math.cos(yaw), math.sin(yaw), 0.0
     for _ in range(substeps):
@@ -112,7 +126,9 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     here, after = lanes.line[row], lanes.line[row + 1]
     d = reference[row] + share * (reference[row + 1] - reference[row])
     curvature = here.curvature + share * (after.curvature - here.curvature)
-    d += min(max(0.25 * curvature * front * front, -MAX_CURVE_SHIFT), MAX_CURVE_SHIFT)
+    d += curve_shift(curvature, front) + swing_out(
+        here.swing + share * (after.swing - here.swing),
+        here.swing_long + share * (after.swing_long - here.swing_long), front)
     if agents.source[i] != NOBODY:
         d += offset_at(agents.curve[i], along - agents.from_s[i], agents.span[i])
     cos = here.cos + share * (after.cos - here.cos)
@@ -123,16 +139,16 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
 
 @inlined
 def onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
-            s: float) -> tuple[int, float]:
+           s: float) -> tuple[int, float]:
     """Give the lane on a route, and the arc length there, for an arc length of an earlier one."""
     for _ in range(LANES_AHEAD):
         if s <= lanes.length[lane]:
             break
-        onward = following[destination, lane]
-        if onward < 0:
+        onto = following[destination, lane]
+        if onto < 0:
             break
         s -= lanes.length[lane]
-        lane = onward
+        lane = onto
     return lane, s
 
 
@@ -141,12 +157,12 @@ def _go_over(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, 
              x: float, y: float) -> tuple[int, float, float]:
     """Take an agent over to the next lane where its own has ended; give it, s and d there [m]."""
     lane = agents.lane[i]
-    length, onward = lanes.length[lane], following[agents.destination[i], lane]
-    agents.previous[i], agents.lane[i] = lane, onward
+    length, onto = lanes.length[lane], following[agents.destination[i], lane]
+    agents.previous[i], agents.lane[i] = lane, onto
     agents.from_s[i] -= length
-    s, d, _ = project_on(lanes, onward, x, y, s - length, 3)
+    s, d, _ = project_on(lanes, onto, x, y, s - length, 3)
     if agents.source[i] != NOBODY:
         # A change in progress goes on even where the lane that it leaves has ended.
-        beside = lanes.right[onward] if agents.side[i] > 0 else lanes.left[onward]
-        agents.source[i] = beside if beside >= 0 else onward
-    return onward, s, d
+        beside = lanes.right[onto] if agents.side[i] > 0 else lanes.left[onto]
+        agents.source[i] = beside if beside >= 0 else onto
+    return onto, s, d

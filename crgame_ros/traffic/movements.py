@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Straight on, left or right: the movement that a way through a junction belongs to."""
 
 from collections.abc import Iterable, Iterator
@@ -7,12 +19,11 @@ import math
 from typing import NamedTuple
 
 from commonroad.scenario.intersection import IntersectionIncomingElement
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 import numpy as np
 from numpy.typing import NDArray
 import shapely
-
-from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 
 UNDECIDED, STRAIGHT, LEFT, RIGHT = range(4)
 # Less than this is no turn [rad].
@@ -29,7 +40,7 @@ APPROACH, LONGEST = 60.0, 150.0
 MAX_PASSAGES = 64
 
 
-class Passage(NamedTuple):
+class LanePassage(NamedTuple):
     """
     One way through a junction.
 
@@ -43,7 +54,7 @@ class Passage(NamedTuple):
     """
 
     lanes: tuple[int, ...]
-    exit: int
+    exit: int  # noqa: A003
     movement: int
     turn: int
     heading: float
@@ -75,7 +86,7 @@ class Movements:
                 self._read(incoming)
         self._first: set[int] = {lane for names in self._named.values() for lane in names}
         self.turn: IntArray = np.zeros(len(graph), dtype=np.int64)
-        found: list[Passage] = []
+        found: list[LanePassage] = []
         for lane in range(len(graph)):
             if lane in self._named or not self._inside[lane]:
                 found += [passage for follower in self._following(lane)
@@ -125,7 +136,7 @@ class Movements:
         return follower in names or (
             bool(self._inside[follower]) and follower not in self._named)
 
-    def _ahead(self, lane: int) -> Iterator[Passage]:
+    def _ahead(self, lane: int) -> Iterator[LanePassage]:
         """List the ways through the next junction from a lane on, at most `APPROACH` before it."""
         if self.is_first(lane):
             before = [int(i) for i in self._graph.predecessors[lane] if i >= 0]
@@ -145,7 +156,7 @@ class Movements:
                     pending.append((follower, self._named.get(follower, names), beyond))
 
     def _through(self, before: int, first: int,
-                 names: dict[int, set[int]] | None = None) -> list[Passage]:
+                 names: dict[int, set[int]] | None = None) -> list[LanePassage]:
         """List the ways through a junction that begin with a lane; what comes before, or -1."""
         names = self._named.get(before, {}) if names is None else names
         named = sorted(names.get(first, ()))
@@ -162,7 +173,7 @@ class Movements:
                 # A lanelet that leads to several exits may be named for one of them only.
                 movement = best if plausible or len(ways) == 1 else movement
                 turn = best if plausible else turn
-            result.append(Passage(lanes, behind, movement, turn, heading, angle))
+            result.append(LanePassage(lanes, behind, movement, turn, heading, angle))
         return result
 
     def _ways(self, first: int) -> Iterator[tuple[tuple[int, ...], int]]:

@@ -1,11 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who drives in the lane beside an agent: the gap it would change into."""
 
 import math
 from typing import NamedTuple
-
-import numpy as np
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import bare, compiled
@@ -13,6 +23,7 @@ from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import LaneTable, project_on
 from crgame_ros.traffic.leaders import first_from
 from crgame_ros.traffic.placement import Entries, front_within, rear_within
+import numpy as np
 
 LOOK_BEHIND = 120.0
 MAX_LANES_BEHIND = 32

@@ -1,12 +1,23 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whether there is room for a newcomer, and how fast it may be."""
-
-import numpy as np
 
 from crgame_ros.traffic.agents import Agents, NOBODY
 from crgame_ros.traffic.lane_graph import FloatArray
 from crgame_ros.traffic.placement import Bodies
+import numpy as np
 
 # Between agents at the start, besides s0 [m] and at their speeds [s].
 START_GAP = 3.0
@@ -22,7 +33,7 @@ CLOSE_TIME = 0.25
 
 
 def safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
-                others: Bodies) -> float:
+               others: Bodies) -> float:
     """Give the speed from which a newcomer gets behind everybody ahead with firm braking."""
     here = np.flatnonzero(agents.active)
     poses = np.concatenate((agents.centers()[here], others.poses))
@@ -42,7 +53,7 @@ def safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
 
 
 def is_free(pose: FloatArray, speed: float, length: float, width: float, agents: Agents,
-             others: Bodies, close: bool = False) -> bool:
+            others: Bodies, close: bool = False) -> bool:
     """
     Tell whether a place is free, with a gap to the front and the rear.
 

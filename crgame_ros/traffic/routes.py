@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where agents can go, and which lane leads there."""
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csr_matrix, diags_array
-from scipy.sparse.csgraph import connected_components, dijkstra
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags_array
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 # A lane change counts as this detour [m], more where the lane is shorter than it wants to be.
 CHANGE_COST = 20.0
@@ -148,6 +159,14 @@ class Routes:
         if long and not len(choice):
             choice = self.reachable(lane)
         return int(choice[generator.integers(len(choice))]) if len(choice) else 0
+
+    def elsewhere(self, lane: int, destination: int, generator: np.random.Generator,
+                  long: bool = False) -> int:
+        """Draw a destination to which another way leads on from a lane, else the present one."""
+        choice = self.reachable(lane, long)
+        other = choice[(self.next[choice, lane] != self.next[destination, lane])
+                       & (self.change[choice, lane] == 0)]
+        return int(other[generator.integers(len(other))]) if len(other) else destination
 
     def towards(self, lane: int, target: int, long: bool = False) -> int | None:
         """Find a destination behind a lane that the way from another leads through, if any."""

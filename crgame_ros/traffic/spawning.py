@@ -1,14 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How agents come onto the road: placed at random, arriving at its edges, or from a recording."""
 
 from collections.abc import Sequence
 import math
 
-import numpy as np
-
+from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.objects import ObjectDescription, Role
 from crgame_ros.traffic.adoption import Adopted, fits
 from crgame_ros.traffic.agents import Agents
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
@@ -31,9 +41,12 @@ from crgame_ros.traffic.room import (
     STOP_GAP,
 )
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.world import with_agents
+from crgame_ros.traffic.world_view import with_agents
+import numpy as np
 
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
+# Recorded cars are larger now and then.
+LARGE_CAR = Shape.rectangle(5.0, 1.9)
 TRIES = 40
 # Longer vehicles take wide ways [m].
 LONG = 6.5
@@ -225,7 +238,7 @@ class Spawner:
         speed = float(np.hypot(velocity[0], velocity[1]))
         safe = safe_speed(pose, agents.length[slot], agents.width[slot], agents, others)
         if not is_free(pose, min(speed, safe), agents.length[slot], agents.width[slot], agents,
-                        others, close=True):
+                       others, close=True):
             return False
         speed = min(speed, safe)
         recorded = np.hypot(found.velocities[:, 0], found.velocities[:, 1])
@@ -298,7 +311,7 @@ class Spawner:
              others: Bodies) -> bool:
         x, y, yaw = self._graph.poses(np.array([lane]), np.array([s]), np.zeros(1))[0]
         if not is_free(np.array((x, y, yaw)), speed, agents.length[slot], agents.width[slot],
-                        agents, others):
+                       agents, others):
             return False
         agents.put(slot, lane, s, 0.0, (float(x), float(y), float(yaw)), speed)
         return True

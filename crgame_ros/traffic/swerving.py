@@ -1,16 +1,27 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """One reference per lane around what stands in it, shared by all agents there (FS M1)."""
-
-import numpy as np
-from scipy.signal import bilinear, lfilter
 
 from crgame_ros.traffic.elastic_band import ElasticBand
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries
+from crgame_ros.traffic.pursuit import pursuit_distance
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.tracking import pursuit_distance
+import numpy as np
+from scipy.signal import bilinear, lfilter
 
 # A swerve begins and ends within this distance of its obstacle [m].
 REACH = 80.0
@@ -92,7 +103,7 @@ class Swerving:
         cut = self._lateral_acceleration / cutting_speed(d, step, obstacles)**2
         for i, begin in zip(chain, starts, strict=False):
             if i not in planned:
-                rows = slice(int(graph.first[i]), int(graph.first[i] + graph.count[i]))
+                rows = graph.rows_of(i)
                 own = np.arange(int(graph.count[i])) * graph.step[i] + begin
                 self.reference[rows] = np.interp(own, grid, d)
                 self.curvature[rows] = np.interp(own, grid, curvature)

@@ -1,27 +1,38 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Reactive traffic: agents that see each other and everybody else (FS section III)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from commonroad.scenario.scenario import Scenario
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.scenario.events import ALL_AGENTS, TrafficChange
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.game.events import ALL_AGENTS, TrafficChange
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.agents import Agents, centers_of, FREE, NOBODY
 from crgame_ros.traffic.changing import LaneChanges
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fading, note_leaders
-from crgame_ros.traffic.crossings import Crossings, queues
+from crgame_ros.traffic.crossings import AT_LINE, Crossings
 from crgame_ros.traffic.desired_speeds import DesiredSpeeds
 from crgame_ros.traffic.drivers import Drivers
 from crgame_ros.traffic.driving_side import driving_side
 from crgame_ros.traffic.encounters import brush
+from crgame_ros.traffic.exit_room import queues
 from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
@@ -29,6 +40,7 @@ from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import (
     ahead,
+    Corridors,
     corridors,
     nearest,
     obstacles,
@@ -44,8 +56,7 @@ from crgame_ros.traffic.motion import Motion
 from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import leaving, Routes
-from crgame_ros.traffic.spawning import CAR, is_long, slot_descriptions, Spawner, TRUCK
-from crgame_ros.traffic.spec import TrafficSpec
+from crgame_ros.traffic.spawning import CAR, is_long, LARGE_CAR, slot_descriptions, Spawner, TRUCK
 from crgame_ros.traffic.swerving import Swerving
 from crgame_ros.traffic.tightness import tight_lanes
 from crgame_ros.traffic.waiting import (
@@ -54,10 +65,13 @@ from crgame_ros.traffic.waiting import (
     INSISTS,
     LAST_RESORT,
     note_standing,
+    TURNS_OFF,
     WAITS,
 )
 from crgame_ros.traffic.wishes import Situations
-from crgame_ros.traffic.world import Others, standing_entries, with_agents, WorldView
+from crgame_ros.traffic.world_view import Others, standing_entries, with_agents, WorldView
+import numpy as np
+from numpy.typing import NDArray
 
 # Slots for arrivals, where the game says nothing: one for so much lane, and at most so many [m].
 LANE_PER_SLOT = 15.0
@@ -100,10 +114,10 @@ class Traffic:
         side, movements = driving_side(scenario), Movements(self._graph)
         self._conflicts = Conflicts(self._graph, movements, side)
         self._cells = LaneCells(self._graph)
+        for_cars, for_trucks = tight_lanes(self._graph, CAR, LARGE_CAR, TRUCK)
         self._routes = Routes(
-            self._graph, np.where(self._conflicts.tapers() | tight_lanes(
-                self._graph, CAR), TAPER_COST, 0.0),
-            tight_lanes(self._graph, TRUCK), side.keeps_left)
+            self._graph, np.where(self._conflicts.tapers() | for_cars, TAPER_COST, 0.0),
+            for_trucks, side.keeps_left)
         self._lines = HaltingLines(self._graph, scenario.lanelet_network, movements)
         self._followers = Followers(spec.model, spec.options, len(adopted) + self._capacity())
         self._longitudinal = Longitudinal(self._graph, self._routes, self._followers)
@@ -111,8 +125,8 @@ class Traffic:
         self._swerving = Swerving(self._graph, self._routes, spec.lateral_acceleration,
                                   keeps_left=side.keeps_left)
         self._slowed = self._swerving.version
-        self._waiting, self._insisting, self._last_resort = (
-            round(seconds / time_step_s) for seconds in (WAITS, INSISTS, LAST_RESORT))
+        self._waiting, self._insisting, self._turning_off, self._last_resort = (
+            round(seconds / time_step_s) for seconds in (WAITS, INSISTS, TURNS_OFF, LAST_RESORT))
         self._fading = fading(time_step_s)
         # Agents taken off the road because they stood in a circle that nobody could open.
         self.taken_off = 0
@@ -208,15 +222,12 @@ class Traffic:
                 standing: NDArray[np.bool_]) -> FloatArray:
         """Give the accelerations (A) of the agents; begin lane changes, enter junctions."""
         agents, long, lanes = self._agents, self._longitudinal, self._graph.table
-        way = own_ways(lanes, self._routes.next, agents.table, slots)
+        way, corridor, pairs = self._look_ahead(slots, entries)
         desired, limit = long.speeds(way, agents, slots)
-        corridor = own_corridors(lanes, agents.table, slots, self._swerving.reference)
-        pairs = ahead(lanes, entries, way, corridor, self._swerving.reference)
         gap, leader, _ = nearest(pairs, entries.owner, len(slots))
-        note_leaders(agents.table, slots, gap, leader, np.asarray(
-            self._followers.of(slots).desired_gap(agents.speed[slots]), dtype=float),
-            self._fading,
-            self._spec.cooperative)
+        wanted = np.asarray(self._followers.of(slots).desired_gap(agents.speed[slots]), float)
+        note_leaders(agents.table, slots, gap, leader, wanted, self._fading,
+                     self._spec.cooperative)
         acceleration = np.minimum(limit, long.behind(agents, desired, pairs, entries, corridor))
         self._mind_left_lanes(slots, desired, entries, standing, acceleration)
         blocked = obstacles(pairs, standing, len(slots))
@@ -235,19 +246,24 @@ class Traffic:
 
     def _adopt(self, k: int, bodies: Bodies) -> None:
         """Let recorded obstacles appear, no faster than they can halt where they must."""
-        agents, lanes = self._agents, self._graph.table
+        agents = self._agents
         newcomers = self._spawner.adopt(k, agents, bodies)
         if not newcomers:
             return
         slots = np.flatnonzero(agents.active)
-        entries = place(lanes, self._cells.table, with_agents(bodies, agents.table))
-        way = own_ways(lanes, self._routes.next, agents.table, slots)
+        entries = place(self._graph.table, self._cells.table, with_agents(bodies, agents.table))
+        way, _, pairs = self._look_ahead(slots, entries)
         desired, _ = self._longitudinal.speeds(way, agents, slots)
-        pairs = ahead(lanes, entries, way, own_corridors(
-            lanes, agents.table, slots, self._swerving.reference), self._swerving.reference)
         gap, _, _ = nearest(pairs, entries.owner, len(slots))
         halts = self._junctions(k, slots, way, entries, pairs, desired, gap, 0.0)
         self._spawner.slow_down(agents, slots, desired, halts, newcomers)
+
+    def _look_ahead(self, slots: IntArray, entries: Entries) -> tuple[Ways, Corridors, Pairs]:
+        """Give the agents' (A) ways, the room that they take on them, and who is in it."""
+        agents, lanes, reference = self._agents, self._graph.table, self._swerving.reference
+        way = own_ways(lanes, self._routes.next, agents.table, slots)
+        corridor = own_corridors(lanes, agents.table, slots, reference)
+        return way, corridor, ahead(lanes, entries, way, corridor, reference)
 
     def _mind_left_lanes(self, slots: IntArray, desired: FloatArray, entries: Entries,
                          standing: NDArray[np.bool_], acceleration: FloatArray) -> None:
@@ -274,24 +290,40 @@ class Traffic:
         """Give the distances (A) of the fronts from lights and junctions to halt at, or inf."""
         agents, graph, conflicts = self._agents, self._graph, self._conflicts
         light = self._lines.halts(way, agents.speed[slots], agents.length[slots],
-                                  agents.acceleration[slots])
+                                  agents.stops[slots])
         light[self._drivers.run_lights[slots]] = np.inf
+        agents.stops[slots] = np.isfinite(light)
+        before_light = before_lines(agents.speed[slots], light)
         if not len(conflicts):
-            return before_lines(agents.speed[slots], light)
+            return before_light
         passage = passages(conflicts.table, self._lines.line, way, agents.table, slots)
         before = way.lane[np.arange(len(slots)), np.maximum(passage.first - 1, 0)]
         sign = self._lines.stop_sign[before] & (passage.first > 0)
         coming = arrivals(graph.table, conflicts.table, way, agents.table, slots, entries,
                           self._others.drives, self._others.widths)
         rear_stop, queued = queues(agents.table, slots, pairs, entries, passage)
-        halt = self._crossings.halts(k, agents, way, passage, coming, Situation(
+        halt, shut = self._crossings.halts(k, agents, way, passage, coming, Situation(
             slots, desired, rear_stop, light, sign, queued), elapsed_s)
         behind = (agents.blocker[slots] == FREE) & (gap < QUEUE)
         agents.blocker[slots[behind]] = agents.leader[slots[behind]]
-        agents.blocker[slots[np.isfinite(light)]] = FREE
+        # Who stands at a red light waits for nobody; who stands before that does.
+        at_light = np.isfinite(light) & (light < np.minimum(gap, halt + AT_LINE))
+        agents.blocker[slots[at_light]] = FREE
         if (agents.waits[slots] > self._waiting).any():
-            break_circles(k, agents.table, slots, self._waiting, self._insisting)
-        return np.minimum(before_lines(agents.speed[slots], light), halt)
+            stuck = break_circles(k, agents.table, slots, self._waiting, self._insisting)
+            self._turn_off(np.union1d(slots[shut], stuck))
+        return np.minimum(before_light, halt)
+
+    def _turn_off(self, slots: IntArray) -> None:
+        """Let those of agents turn off elsewhere who have stood for long, not beside a fork."""
+        agents, routes = self._agents, self._routes
+        waits = agents.waits[slots]
+        before = agents.s[slots] + 0.5 * agents.length[slots] < self._graph.length[
+            agents.lane[slots]]
+        for slot in slots[before & (waits > 0) & (waits % self._turning_off == 0)].tolist():
+            agents.destination[slot] = routes.elsewhere(
+                int(agents.lane[slot]), int(agents.destination[slot]), self._random,
+                is_long(float(agents.length[slot])))
 
     def _leave(self, k: int, slots: IntArray) -> None:
         """Take away who has left the map, and give new destinations to who needs one."""

@@ -1,17 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who waits for whom: circles of waiting are found, and one of each goes first."""
-
-import numpy as np
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.vehicle.standstill import QUEUEING
+import numpy as np
 
-# Slower is standing [m/s], for who does not want to accelerate by more than this [m/s^2].
-STANDING, STARTS = 0.3, 0.5
+# Who wants to accelerate by more than this does not wait [m/s^2].
+STARTS = 0.5
 # Standing for so many seconds is waiting; who insists does so for so long [s].
 WAITS, INSISTS = 2.0, 6.0
+# Who has stood this long before a way that is full, or in a circle, turns off elsewhere, if there
+# is a way [s].
+TURNS_OFF = 15.0
 # Who has stood this long in a circle that nobody can open is taken off the road [s].
 LAST_RESORT = 45.0
 
@@ -20,12 +35,13 @@ LAST_RESORT = 45.0
 def note_standing(agents: AgentTable, slots: IntArray, acceleration: FloatArray) -> None:
     """Count the ticks for which agents (A) have been standing."""
     for i, slot in enumerate(slots):
-        stands = agents.speed[slot] < STANDING and acceleration[i] < STARTS
+        stands = agents.speed[slot] < QUEUEING and acceleration[i] < STARTS
         agents.waits[slot] = agents.waits[slot] + 1 if stands else 0
 
 
 @compiled
-def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int, insists: int) -> int:
+def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int,
+                  insists: int) -> IntArray:
     """
     Let one agent of each circle of waiting go first.
 
@@ -34,18 +50,25 @@ def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int, insis
 
     :param waits: ticks of standing that count as waiting.
     :param insists: ticks for which it goes first.
-    :return: how many circles there are.
+    :return: who is in circles.
     """
     seen = np.full(len(agents.x), -1, np.int64)
-    circles = 0
+    members = np.empty(len(slots), np.int64)
+    count = 0
     for slot in slots:
-        current = _in_circle(agents, slot, seen, waits)
-        if current >= 0:
-            circles += 1
-            chosen = _least_insistent(k, agents, current)
-            if chosen >= 0:
-                agents.insists_until[chosen] = k + insists
-    return circles
+        current = first = _in_circle(agents, slot, seen, waits)
+        if current < 0:
+            continue
+        chosen = _least_insistent(k, agents, current)
+        if chosen >= 0:
+            agents.insists_until[chosen] = k + insists
+        while True:
+            members[count] = current
+            count += 1
+            current = agents.blocker[current]
+            if current == first:
+                break
+    return members[:count]
 
 
 @compiled

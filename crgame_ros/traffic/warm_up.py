@@ -1,8 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Compile everything that traffic runs, before it is needed: `python -m …traffic.warm_up`."""
 
 from collections.abc import Callable
+from functools import cache
 import sys
 import time
 
@@ -15,16 +28,15 @@ from commonroad.scenario.traffic_light import (
     TrafficLightCycleElement,
     TrafficLightState,
 )
-import numpy as np
-
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.cache import marker
-from crgame_ros.traffic.spec import TrafficSpec
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
+from crgame_ros.traffic.world_view import WorldView
+import numpy as np
 
 TICKS = 200
 LIGHT = 9001
@@ -46,8 +58,13 @@ def ensure_compiled(say: Callable[[str], None]) -> None:
     say(f'compiled traffic in {time.monotonic() - start:.0f} s')
 
 
+@cache
 def drive_everything() -> None:
-    """Drive where all happens: a light, a crossing, a wreck, a parked car, people, a recording."""
+    """
+    Drive where all happens: a light, a crossing, a wreck, a parked car, people, a recording.
+
+    Compiled code is loaded when it is first run: a second that no tick has. Once in a process.
+    """
     scenario = crossroads()
     others = [ObjectDescription('wreck', 'parkedVehicle', Role.STATIC, Shape.rectangle(4.5, 1.8)),
               ObjectDescription('edge', 'parkedVehicle', Role.STATIC, Shape.rectangle(4.0, 1.0)),

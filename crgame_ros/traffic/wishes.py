@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who wants to change lanes, and to which side."""
 
 import math
 from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from crgame_ros.traffic.agents import AgentTable, NOBODY
 from crgame_ros.traffic.compiled import bare, compiled, inlined
 from crgame_ros.traffic.lane_change import urgency
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import LaneTable
+import numpy as np
+from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 
@@ -46,7 +57,7 @@ class Destinations(NamedTuple):
     :param narrow: width of the widest that is narrow [m]
     """
 
-    next: IntArray
+    next: IntArray  # noqa: A003
     change: IntArray
     remaining: FloatArray
     cost: FloatArray
@@ -114,6 +125,12 @@ def _no_change(speed: float) -> float:
     return NO_CHANGE + speed**2 / (2.0 * BEFORE_JUNCTION)
 
 
+@inlined
+def _is_inside(to: Destinations, agents: AgentTable, slot: int, lane: int) -> bool:
+    """Tell whether a lane is in a junction, for a vehicle as wide as an agent."""
+    return bool(to.inside[1 if agents.width[slot] > to.narrow else 0, lane])
+
+
 @bare
 def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slot: int,
              at: Situations, i: int) -> bool:
@@ -129,11 +146,16 @@ def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slo
         # Where a lane ends there is no other place. Nor is the road left: what is too fast for
         # the rest brakes instead.
         return bool(rest > SWERVE_TIME * speed)
-    wide = 1 if agents.width[slot] > to.narrow else 0
-    if to.inside[wide, lane] or at.halt[i] < _no_change(speed):
+    if _is_inside(to, agents, slot, lane) or at.halt[i] < _no_change(speed):
         return False
+    # Short lanelets may lie between a lane and its junction.
     onto = to.next[agents.destination[slot], lane]
-    return not (onto >= 0 and to.inside[wide, onto] and rest <= _no_change(speed))
+    while onto >= 0 and rest <= _no_change(speed):
+        if _is_inside(to, agents, slot, onto):
+            return False
+        rest += lanes.length[onto]
+        onto = to.next[agents.destination[slot], onto]
+    return True
 
 
 @bare
@@ -145,6 +167,9 @@ def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots:
         lane, destination = agents.lane[slot], agents.destination[slot]
         beside = lanes.left[lane] if side > 0 else lanes.right[lane]
         if not free[i] or beside < 0 or not math.isfinite(to.cost[destination, beside]):
+            continue
+        # Who gets into a junction from the side was not let in.
+        if _is_inside(to, agents, slot, beside) and not to.drops[lane]:
             continue
         speed, s = agents.speed[slot], agents.s[slot]
         needs, remaining = to.change[destination, lane], to.remaining[destination, lane] - s

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How a vehicle answers commands of steering angle and acceleration."""
 
 from abc import ABC, abstractmethod
@@ -11,6 +23,7 @@ from crgame_ros.vehicle.kinematic_single_track import integrate
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.powertrain import Powertrain
 from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.steering import steering_rate
 
 
 class VehicleModel(ABC):
@@ -80,7 +93,7 @@ class KinematicSingleTrack(VehicleModel):
         else:
             acceleration = self._powertrain.lag(state.acceleration, commanded, dt_s)
         target = clipped(steering_angle_command, vehicle.max_steering_angle)
-        rate = clipped((target - state.steering_angle) / dt_s, vehicle.max_steering_rate)
+        rate = steering_rate(target, state.steering_angle, dt_s, vehicle.max_steering_rate)
         driven_s, acceleration = self._within_speed_limits(speed, acceleration, direction, dt_s)
         x, y, yaw, new_speed, angle = integrate(
             state.x, state.y, state.yaw, speed, state.steering_angle,

@@ -1,66 +1,123 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Vehicle parameters, read from `config/vehicles/`."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 import functools
-import math
 from pathlib import Path
-import sys
-from typing import Any
-
-import yaml
+from typing import Annotated, ClassVar
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import config_directory
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Named, Within
+from crgame_ros.schema.reading import read
+from crgame_ros.yaml_text import read_yaml
 
 DEFAULT_VEHICLE = 'bmw_320i'
-# Switched off by 0, and without a limit, respectively; all others divide or bound something.
-MAY_BE_ZERO = {'rear_to_center', 'max_reverse_speed', 'drag_coefficient', 'frontal_area',
-               'rolling_resistance', 'air_density', 'friction', 'max_brake_force'}
-MAY_BE_INFINITE = {'max_steering_rate'}
+# No road vehicle has more; beyond, arithmetic runs out of numbers.
+LARGEST, SMALLEST = 1e9, 1e-6
+Positive = Annotated[float, Within(SMALLEST, LARGEST)]
+Share = Annotated[float, Within(SMALLEST, LARGEST, or_zero=True)]
+Length = Annotated[float, Within(SMALLEST, 100.0)]
+
+
+class _Beside(Named):
+    """A file that lies beside the vehicle's, whatever it is called."""
+
+    def resolved(self, name: str, base: Path) -> str:
+        return str(base / name)
 
 
 @dataclass(frozen=True)
 class VehicleParameters:
     """
-    Parameters of one vehicle type; units and sources stand in its file in `config/vehicles/`.
+    Parameters of one vehicle type; what is switched off is 0.
 
-    Lengths [m], speeds [m/s], accelerations [m/s^2], angles [rad], forces [N], power [W].
+    :param name: of the vehicle type.
+    :param length: of its rectangle [m]
+    :param width: of its rectangle [m]
+    :param wheelbase: between the axles [m]
+    :param rear_to_center: from the rear axle forward to the centre [m]
+    :param mass: [kg]
+    :param max_speed: forwards [m/s]
+    :param max_reverse_speed: backwards [m/s]
+    :param max_acceleration: a_max of CRG 24 [m/s^2]
+    :param switching_speed: above which power limits acceleration [m/s]
+    :param max_steering_angle: of the front wheels [rad]
+    :param max_steering_rate: of the front wheels; infinite in the paper [rad/s]
+    :param max_steering_wheel_angle: to either side [rad]
+    :param steering_ratio: file of the ratio table R(v, theta_sw) of CRG 26, beside the vehicle's.
+    :param throttle_shape: k_th of CRG 20 [-]
+    :param brake_shape: k_br of CRG 20 [-]
+    :param max_power: of the engine [W]
+    :param speed_regularization: epsilon_v of CRG 21 [m/s]
+    :param friction: peak friction of tyres and road [-]
+    :param max_brake_force: of all wheels [N]
+    :param drag_coefficient: c_w [-]
+    :param frontal_area: [m^2]
+    :param rolling_resistance: coefficient [-]
+    :param air_density: [kg/m^3]
+    :param gravity: [m/s^2]
+    :param longitudinal_lag: tau_long of CRG 25: drivetrain and brakes [s]
     """
 
+    FORM: ClassVar[Form] = Form('see config/vehicles/bmw_320i.yaml')
+
     name: str
-    length: float
-    width: float
-    wheelbase: float
-    rear_to_center: float
-    mass: float
-    max_speed: float
-    max_reverse_speed: float
-    max_acceleration: float
-    switching_speed: float
-    max_steering_angle: float
-    max_steering_rate: float
-    max_steering_wheel_angle: float
-    steering_ratio: str
-    throttle_shape: float
-    brake_shape: float
-    max_power: float
-    speed_regularization: float
-    friction: float
-    max_brake_force: float
-    drag_coefficient: float
-    frontal_area: float
-    rolling_resistance: float
-    air_density: float
-    gravity: float
-    longitudinal_lag: float
+    length: Length
+    width: Annotated[float, Within(SMALLEST, 20.0)]
+    wheelbase: Length
+    rear_to_center: Annotated[float, Within(SMALLEST, 100.0, or_zero=True)]
+    mass: Positive
+    max_speed: Annotated[float, Within(SMALLEST, 200.0)]
+    max_reverse_speed: Annotated[float, Within(SMALLEST, 200.0, or_zero=True)]
+    max_acceleration: Positive
+    switching_speed: Positive
+    max_steering_angle: Annotated[float, Within(SMALLEST, 1.5)]
+    max_steering_rate: Annotated[float, Within(SMALLEST, endless=True)]
+    max_steering_wheel_angle: Positive
+    steering_ratio: Annotated[str, _Beside()]
+    throttle_shape: Positive
+    brake_shape: Positive
+    max_power: Positive
+    speed_regularization: Positive
+    friction: Share
+    max_brake_force: Share
+    drag_coefficient: Share
+    frontal_area: Share
+    rolling_resistance: Share
+    air_density: Share
+    gravity: Positive
+    longitudinal_lag: Positive
 
     @property
     def shape(self) -> Shape:
         """Footprint of the vehicle around its centre."""
         return Shape.rectangle(self.length, self.width)
+
+    @property
+    def front(self) -> float:
+        """How far ahead of the rear axle the front bumper is [m]."""
+        return self.rear_to_center + 0.5 * self.length
+
+    @property
+    def rear(self) -> float:
+        """How far ahead of the rear axle the rear bumper is: negative, behind it [m]."""
+        return self.rear_to_center - 0.5 * self.length
 
 
 @functools.cache
@@ -74,43 +131,7 @@ def load_vehicle_parameters(name: str = DEFAULT_VEHICLE) -> VehicleParameters:
     path = config_directory() / 'vehicles' / f'{name}.yaml'
     if name.endswith('.yaml'):
         path = Path(name)
-    try:
-        values = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise InputError(f'cannot read the vehicle ({error.strerror})', str(path),
-                         'name a file of config/vehicles without its ending') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f'is no YAML ({error})', str(path), 'mend the file') from error
-    if not isinstance(values, dict):
-        raise InputError('is no mapping', str(path), 'see config/vehicles/bmw_320i.yaml')
-    return VehicleParameters(**_checked(values, path))
-
-
-def _checked(values: dict[str, Any], path: Path) -> dict[str, Any]:
-    texts = {'name', 'steering_ratio'}
-    known = {field.name for field in fields(VehicleParameters)}
-    for key in sorted(known - values.keys()):
-        raise InputError(f'"{key}" is missing', str(path), 'see config/vehicles/bmw_320i.yaml')
-    for key in sorted(values.keys() - known):
-        raise InputError(f'"{key}" is unknown', str(path), 'remove it')
-    checked: dict[str, Any] = {}
-    for key, value in values.items():
-        if key in texts:
-            checked[key] = str(value)
-            continue
-        checked[key] = _number(key, value, path)
-    table = Path(checked['steering_ratio'])
-    checked['steering_ratio'] = str(table if table.is_absolute() else path.parent / table)
-    return checked
-
-
-def _number(key: str, value: Any, path: Path) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f'"{key}" is {value!r}', str(path), 'give a number')
-    largest = math.inf if key in MAY_BE_INFINITE else sys.float_info.max
-    if key in MAY_BE_ZERO and value == 0:
-        return 0.0
-    if not 0 < value <= largest:
-        least = 'at least 0' if key in MAY_BE_ZERO else 'above 0'
-        raise InputError(f'"{key}" is {value!r}', str(path), f'give a finite number {least}')
-    return float(value)
+    if not path.exists():
+        raise InputError('there is no such vehicle', str(path),
+                         'name a file of config/vehicles without its ending')
+    return read(VehicleParameters, read_yaml(path, 'vehicle'), str(path), path.parent)

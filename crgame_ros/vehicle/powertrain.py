@@ -1,10 +1,22 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Pedals to acceleration: CRG equations 20-25, with the signs of a real car."""
 
 from math import exp
 
-from crgame_ros.driver.command import DriverCommand
+from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.parameters import VehicleParameters
 
 
@@ -68,7 +80,7 @@ class Powertrain:
 
     def lag(self, acceleration: float, commanded: float, dt_s: float) -> float:
         """
-        Filter the commanded acceleration by the first-order lag (CRG 25).
+        Filter the commanded acceleration by the lag of first order (CRG 25).
 
         :param acceleration: delivered acceleration a_n [m/s^2]
         :param commanded: a_cmd [m/s^2]

@@ -1,10 +1,23 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The state of a driven vehicle: rear axle, frame map, SI units and radians."""
 
 from enum import IntEnum
-import math
 from typing import NamedTuple
+
+from crgame_ros.geometry.reference_point import ahead
 
 
 class VehicleState(NamedTuple):
@@ -37,8 +50,7 @@ class VehicleState(NamedTuple):
         :param rear_to_center: distance l_r from the rear axle forward to the centre [m]
         :return: (x, y) of the centre in the same frame [m]
         """
-        return (self.x + rear_to_center * math.cos(self.yaw),
-                self.y + rear_to_center * math.sin(self.yaw))
+        return ahead(self.x, self.y, self.yaw, rear_to_center)
 
 
 class StateColumn(IntEnum):

@@ -1,18 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Steering wheel to front wheels: CRG equations 26-27 with the ratio table R(v, theta_sw)."""
 
 from bisect import bisect_right
 from dataclasses import dataclass
 import functools
-import math
 from pathlib import Path
-from typing import Any
-
-import yaml
+from typing import Annotated, ClassVar
 
 from crgame_ros.errors import InputError
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Called, Within
+from crgame_ros.schema.reading import read
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.yaml_text import read_yaml
 
 
 @dataclass(frozen=True)
@@ -25,9 +38,12 @@ class SteeringRatioTable:
     :param ratios: R at each speed and steering-wheel angle [-]
     """
 
-    speeds: tuple[float, ...]
-    wheel_angles: tuple[float, ...]
-    ratios: tuple[tuple[float, ...], ...]
+    FORM: ClassVar[Form] = Form('see config/vehicles/steering_ratio.yaml')
+
+    speeds: Annotated[tuple[float, ...], Called('speed')]
+    wheel_angles: Annotated[tuple[float, ...], Called('steering_wheel_angle')]
+    ratios: Annotated[tuple[tuple[Annotated[float, Within(0.0, above=True)], ...], ...],
+                      Called('ratio')]
 
     def ratio(self, speed: float, wheel_angle: float) -> float:
         """Look the ratio up at a signed speed [m/s] and steering-wheel angle [rad]."""
@@ -52,17 +68,7 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
 
     :raises InputError: if the file is missing or is no ascending grid of positive ratios.
     """
-    try:
-        values = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f'cannot read the steering ratios ({error})', path) from error
-    try:
-        table = SteeringRatioTable(
-            _numbers(values, 'speed', path), _numbers(values, 'steering_wheel_angle', path),
-            tuple(tuple(float(value) for value in row) for row in values.get('ratio', ())))
-    except (TypeError, ValueError) as error:
-        raise InputError(f'holds something that is no number ({error})', path,
-                         'see config/vehicles/steering_ratio.yaml') from error
+    table = read(SteeringRatioTable, read_yaml(Path(path), 'table of steering ratios'), path)
     for name, grid in (('speed', table.speeds), ('steering_wheel_angle', table.wheel_angles)):
         if len(grid) < 2 or any(not b > a for a, b in zip(grid, grid[1:], strict=False)):
             raise InputError(f'"{name}" does not ascend', path, 'give at least two grid points')
@@ -70,15 +76,7 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
             len(row) != len(table.wheel_angles) for row in table.ratios):
         raise InputError('"ratio" does not fit the grid', path,
                          'give one row for each speed, one column for each angle')
-    if not all(math.isfinite(value) and value > 0.0 for row in table.ratios for value in row):
-        raise InputError('"ratio" holds a value that is not positive', path)
     return table
-
-
-def _numbers(values: Any, key: str, path: str) -> tuple[float, ...]:
-    if not isinstance(values, dict) or not isinstance(values.get(key), list):
-        raise InputError(f'"{key}" is missing', path, 'give a list of numbers')
-    return tuple(float(value) for value in values[key])
 
 
 class Steering:
@@ -101,14 +99,15 @@ class Steering:
         angle = wheel_angle / self._table.ratio(speed, wheel_angle)
         return min(limit, max(-limit, angle))
 
-    def rate(self, target_angle: float, angle: float, dt_s: float) -> float:
-        """
-        Find the steering rate that reaches the target within the step (CRG 27), within limits.
 
-        :param target_angle: delta* [rad]
-        :param angle: delta [rad]
-        :param dt_s: Delta t_eff [s]
-        :return: steering rate [rad/s]
-        """
-        limit = self._vehicle.max_steering_rate
-        return min(limit, max(-limit, (target_angle - angle) / dt_s))
+def steering_rate(target_angle: float, angle: float, dt_s: float, limit: float) -> float:
+    """
+    Find the steering rate that reaches the target within the step (CRG 27), within a limit.
+
+    :param target_angle: delta* [rad]
+    :param angle: delta [rad]
+    :param dt_s: Delta t_eff [s]
+    :param limit: the vehicle's largest steering rate; infinite in the paper [rad/s]
+    :return: steering rate [rad/s]
+    """
+    return min(limit, max(-limit, (target_angle - angle) / dt_s))

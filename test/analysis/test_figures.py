@@ -1,16 +1,27 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Pictures of runs show who drives in them."""
 
+from crgame_ros.analysis.figures import colour_of, draw_run
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
 from matplotlib.colors import to_hex
 from matplotlib.patches import Polygon
 import numpy as np
-
-from crgame_ros.analysis.figures import colour_of, draw_run
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.offline import run_offline
-from crgame_ros.simulation.setup import build_setup
 
 
 def test_every_driven_vehicle_is_within_each_snapshot() -> None:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A running graph, the pages that people have open on it, and what their hands do there."""
 
 from collections.abc import Iterator
@@ -22,7 +34,7 @@ from selenium.webdriver.common.by import By
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'live'))
 
-from live_peer import Peer  # noqa: E402 - importable from here on
+from live_peer import Peer  # noqa: E402, I100 - importable from here on
 from live_support import is_node, Launcher, SCENARIOS, wait_until  # noqa: E402
 
 __all__ = ['Graph', 'live_graph', 'LivePage', 'PATIENCE_S', 'SCENARIOS']
@@ -42,7 +54,7 @@ class Graph(NamedTuple):
     address: str
 
     def commands(self, vehicle: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Give n (R) and the commands (R, 4) that a vehicle obeyed since the last `forget`."""
+        """Give n (R) and the (R, 4) commands that a vehicle obeyed since the last `forget`."""
         self.peer.listen()
         table = self.peer.cycles()
         return table.column('n'), table.commands(vehicle)
@@ -103,7 +115,7 @@ class LivePage:
         self.driver = browser.driver
         self.open()
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: A003
         """Load the page, and wait until all its parts are there and it shows the scene."""
         self.browser.open(self.graph.address)
         self.wait('window.crgame?.ready && crgame.world.shown && crgame.store.status'

@@ -1,22 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Poses of a recording at every step, and between the steps as the page shows them."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names
+from crgame_ros.messages.cdr import stamp_of
+from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC, WorldMessages
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import (
-    first_point,
-    OBJECT_STATES_TOPIC,
-    stamp_of,
-    VEHICLES_TOPIC,
-)
+import numpy as np
+from numpy.typing import NDArray
 
 # Of a simulation step and of a scenario step of the games used here [s].
 DT_S, DT_C_S = 0.01, 0.1
@@ -47,21 +53,17 @@ def read_recorded(bag: Path, epoch: int) -> Recorded:
     with BagReader(bag) as reader:
         run = read_epoch(reader, epoch)
         scheduler = run.game.scheduler
-        names = {
-            VEHICLES_TOPIC: [name for item in run.descriptions if item.role.is_ego
-                             for name in vehicle_joint_names(item.id)],
-            OBJECT_STATES_TOPIC: [name for item in run.descriptions if not item.role.is_ego
-                                  for name in object_joint_names(item.id)]}
+        world = WorldMessages(run.descriptions)
         recorded = Recorded(scheduler.k0, {}, {})
-        orders: dict[tuple[str, ...], list[int]] = {}
-        for topic, _, log_time_ns, message in reader.decoded(names):
+        for topic, _, log_time_ns, message in reader.decoded(
+                [VEHICLES_TOPIC, OBJECT_STATES_TOPIC]):
             stamp_ns = stamp_of(message)
             if not run.holds(stamp_ns, log_time_ns):
                 continue
             n = scheduler.step_of_stamp(stamp_ns)
-            point: Any = first_point(message, names[topic], topic, reader, orders)
             if topic == VEHICLES_TOPIC:
-                recorded.vehicles[n] = point[0].reshape(-1, 4)[:, :3]
+                recorded.vehicles[n] = world.vehicle_states(message)[:, :3]
             else:
-                recorded.objects[scheduler.k(n)] = point[:2].reshape(2, -1, 3)
+                objects = world.object_states(message)
+                recorded.objects[scheduler.k(n)] = np.stack((objects.poses, objects.velocities))
     return recorded

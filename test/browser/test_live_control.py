@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Several people and an experimenter at their pages: seats, run control, planners and events."""
 
 from collections.abc import Iterator
@@ -201,7 +213,8 @@ def test_a_trigger_lets_the_pedestrian_go(new_run: LivePage) -> None:
 def plan_color(page: LivePage) -> int:
     """Give how blue the picture is where the AV's plan leads in a second's time."""
     page.wait('crgame.store.plans.size > 0 && crgame.store.status.n === crgame.world.shown.n'
-              ' && !crgame.world.camera.moves', 'a plan')
+              ' && !crgame.world.camera.moves && crgame.store.plans.get(1).t'
+              ' + crgame.store.plans.get(1).points.at(-1) > crgame.world.shown.t + 1', 'a plan')
     red, _, blue = page.run("""
         const { camera, shown } = crgame.world;
         const { t, points } = crgame.store.plans.get(1);

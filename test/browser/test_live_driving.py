@@ -1,11 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A person drives in a browser: real keys, a real graph, and every way to take the hands off."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from browser_support import Browser
+from crgame_ros.recording.run_folder import run_folder
 from live_browser_support import (
     BRAKE,
     Graph,
@@ -20,8 +33,6 @@ from numpy.typing import NDArray
 import pytest
 from recorded_poses import DT_C_S, DT_S, read_recorded
 from selenium.webdriver.common.keys import Keys
-
-from crgame_ros.recording.run_folder import run_folder
 
 pytestmark = pytest.mark.alone
 
@@ -83,7 +94,7 @@ def test_the_run_waits_for_a_person_and_shows_what_will_be_driven(only_page: Liv
     """Opened: no error, the vehicles of step 0; driven and started by the two buttons."""
     page = only_page
     assert page.browser.console_errors() == []
-    assert page.run('return crgame.store.status.run') == 'paused'
+    page.wait_for_run('paused')
     x, y, yaw, speed = page.vehicle(0)[:4]
     assert (x, y, abs(yaw), speed) == pytest.approx((560.0, 1.75, np.pi, 0.0), abs=1e-6)
     assert 'Waits for somebody' in page.text('li[data-seat="hv0"]')
@@ -157,6 +168,12 @@ def _click_into_the_page(page: LivePage) -> None:
     page.run("document.querySelector('#other').remove();")
 
 
+def _claim_again(page: LivePage) -> None:
+    # The page is back before the server has noticed that it was gone, and the seat is free.
+    page.wait('crgame.store.seats.hv0.holder === null', 'the seat to be free')
+    page.claim('hv0')
+
+
 LEAVINGS = {
     'hidden tab': Leaving('hidden', lambda page: page.driver.switch_to.new_window('tab'),
                           _show_first_tab),
@@ -165,7 +182,7 @@ LEAVINGS = {
                            lambda page: page.click('dialog[open] button:not(.danger)')),
     'closed socket': Leaving('connection',
                              lambda page: page.run('crgame.connection.interrupt();'),
-                             lambda page: page.claim('hv0')),
+                             _claim_again),
 }
 # Notes at which step the hands leave, and what the page says of its hands.
 WATCH = """

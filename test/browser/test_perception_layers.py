@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Perception in the page: of a recording at any time, and its layers pixel by pixel."""
 
 from collections.abc import Iterator
@@ -9,19 +21,18 @@ import sys
 from typing import Any
 
 from browser_support import Browser
+from crgame_ros.cockpit.frames import encode_occupancy, encode_scan, encode_seen
+from crgame_ros.cockpit.replay_backend import ReplayBackend
+from crgame_ros.paths import scenarios_directory
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
 
-from crgame_ros.cockpit.frames import encode_occupancy, encode_scan, encode_seen
-from crgame_ros.cockpit.replay import ReplayBackend
-from crgame_ros.paths import scenarios_directory
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'cockpit'))
 
-from perception_recording import Perceived, record_perceiving  # noqa: E402 - importable now
+from perception_recording import Perceived, record_perceiving  # noqa: E402, I100 - importable now
 
 DURATION_S = 12.0
 IS_DRAWN = '!crgame.replay.loading && crgame.world.shown?.t === crgame.replay.t'
@@ -161,7 +172,8 @@ def test_frames_are_read_as_they_were_written(page: Served, browser: Browser) ->
         -3.0, 8.5, 0.25, 13, 7]
     assert read['cells'] == occupied.ravel().astype(int).tolist()
     assert read['seen'] == [0, 1, 4]
-    assert browser.run(said) == 'not seen by av0'
+    # The legend is written anew with a picture of the map.
+    browser.wait(f'(() => {{ {said} }})() === "not seen by av0"')
 
 
 def test_a_fan_is_built_once_for_each_scan(page: Served, browser: Browser) -> None:

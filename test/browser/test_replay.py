@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A recording in the page: scrubbed, stepped and played, it shows what is in the bag."""
 
 from collections.abc import Iterator
@@ -8,6 +20,9 @@ import sys
 from typing import Any
 
 from browser_support import Browser
+from crgame_ros.cockpit.replay_backend import ReplayBackend
+from crgame_ros.recording.run_log import read_run_log, RunLog
+from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import pytest
 from selenium.webdriver.common.action_chains import ActionChains
@@ -15,13 +30,9 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from world_support import served
 
-from crgame_ros.cockpit.replay import ReplayBackend
-from crgame_ros.recording.run_log import read_run_log, RunLog
-from crgame_ros.simulation.offline import OfflineResult
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'cockpit'))
 
-from replay_support import (  # noqa: E402 - importable from here on
+from replay_support import (  # noqa: E402, I100 - importable from here on
     CUT_IN,
     drive,
     happenings,

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The world's camera, what can be seen of vehicles and plans, and how long drawing takes."""
 
 from collections.abc import Callable, Iterator
@@ -8,14 +20,13 @@ from pathlib import Path
 import time
 
 from browser_support import Browser
+from crgame_ros.paths import scenarios_directory
 import numpy as np
 import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from world_support import RecordedRun, RunBackend, Served, served
-
-from crgame_ros.paths import scenarios_directory
 
 NORTH = math.pi / 2
 # A colour of the canvas may be blended with its neighbours' by at most this at a pixel's edge.

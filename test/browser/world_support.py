@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The real server of the cockpit in front of a run that was computed before."""
 
 import asyncio
@@ -11,19 +23,19 @@ import threading
 import time
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.frames import encode_objects, encode_plan, encode_state
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import game_document, parse_game_document
+from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.game_file import load_game
+from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
+import numpy as np
+from numpy.typing import NDArray
 
 HOST = '127.0.0.1'
 FloatArray = NDArray[np.float64]

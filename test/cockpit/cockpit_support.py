@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What the tests of the cockpit's server share: a backend that pumps, a listening server."""
 
 import asyncio
@@ -13,9 +25,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
-import numpy as np
-import pytest
-
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.frames import encode_state
@@ -23,6 +32,8 @@ from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.server import create_app, HUB, listen
 from crgame_ros.errors import InputError
+import numpy as np
+import pytest
 
 # Long, because other work may share the machine; nothing waits for it but a failure.
 PATIENCE_S = 30.0

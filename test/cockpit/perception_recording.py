@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A recording of an offline run whose AV perceives with two sensors, and what it perceived."""
 
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-from replay_support import Message, N, PARKED, recorder, samples, series, START, STEP_NS, TICK_NS
-
+from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
+from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.perception.perception import Perception
-from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
-from crgame_ros.planner.joints import JointSeries, object_joint_names, vehicle_joint_names
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
 from crgame_ros.simulation.av_models import make_perception
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
+from replay_support import Message, N, PARKED, recorder, samples, series, START, STEP_NS, TICK_NS
 
 # The second scans every other tick.
 SENSORS = (SensorSpec('front', rays=121), SensorSpec('rear', yaw=np.pi, x=-1.0, rays=61, rate=5.0))

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Recordings of offline runs in which something happens, and their frames read back."""
 
 from collections.abc import Sequence
@@ -9,15 +21,14 @@ from pathlib import Path
 import struct
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.driver.replay import ReplayDriver
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+import numpy as np
+from numpy.typing import NDArray
 
 START = 1_700_000_000_000_000_000
 STEP_NS, TICK_NS, N = 10_000_000, 100_000_000, 10

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """One client: order, slots, throttle, limits; and the messages it may send."""
 
 import asyncio
@@ -9,11 +21,10 @@ from typing import Any
 
 from aiohttp import WSMsgType
 from cockpit_support import in_loop
-import pytest
-
 from crgame_ros.cockpit.client import Client, MAX_WAITING, STALL_S, TokenBucket
-from crgame_ros.cockpit.messages import clean_text, MAX_BYTES, parse_message
+from crgame_ros.cockpit.page_messages import clean_text, MAX_BYTES, parse_message
 from crgame_ros.errors import InputError
+import pytest
 
 
 class Wire:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """All clients: what a new one is given, what is sent to whom, what JSON cannot hold."""
 
 import asyncio
@@ -8,11 +20,10 @@ import math
 from typing import Any
 
 from cockpit_support import cockpit, in_loop, next_text, wait_until
-import numpy as np
-
 from crgame_ros import __version__
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
+import numpy as np
 
 
 class Sink:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The library over HTTP: what is listed, how a game begins, what may be uploaded and chosen."""
 
 import asyncio
@@ -11,15 +23,14 @@ import shutil
 from typing import Any
 
 from cockpit_support import Cockpit, cockpit, get, in_loop, PATIENCE_S
-import pytest
-import yaml
-
 from crgame_ros.cockpit import library as library_module
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.scenario_reader import ScenarioReader
+from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.setup import build_setup
+import pytest
+import yaml
 
 HEADER = {'X-Crgame': '1'}
 SCENARIOS = scenarios_directory()

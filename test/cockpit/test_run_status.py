@@ -1,12 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Status and alarms, from what the nodes say."""
 
+from collections.abc import Mapping
+
 from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.messages.status_values import Status
 
 
 def _kinds(status: RunStatus) -> list[str]:
     return [alarm.id for alarm in status.alarms]
+
+
+def _take(status: RunStatus, name: str, level: int, text: str, values: Mapping[str, str],
+          t: float) -> None:
+    status.take(Status(name, level, text, dict(values)), t)
 
 
 def _begun() -> RunStatus:
@@ -20,8 +40,8 @@ def test_collision_and_road_are_alarms_while_they_last() -> None:
     status = _begun()
     values = {'collision': 'true', 'road_compliance': 'false', 'hit': 'av0,o12', 'n': '70',
               'stop': 'false'}
-    status.take('hv0/drivability', 2, 'collision', values, 0.7)
-    status.take('hv0/drivability', 2, 'collision', values, 1.7)
+    _take(status, 'hv0/drivability', 2, 'collision', values, 0.7)
+    _take(status, 'hv0/drivability', 2, 'collision', values, 1.7)
     assert status.alarms_document()['active'] == [
         {'id': 'collision:hv0', 'kind': 'collision', 'subject': 'hv0',
          'text': 'collision with av0, o12', 'since_t': 0.7},
@@ -29,7 +49,7 @@ def test_collision_and_road_are_alarms_while_they_last() -> None:
          'since_t': 0.7}]
     assert status.document()['drivability']['hv0'] == {
         'collision': True, 'off_road': True, 'hit': ['av0', 'o12']}
-    status.take('hv0/drivability', 0, 'valid', {
+    _take(status, 'hv0/drivability', 0, 'valid', {
         'collision': 'false', 'road_compliance': 'true', 'hit': ''}, 2.0)
     assert _kinds(status) == []
 
@@ -37,19 +57,20 @@ def test_collision_and_road_are_alarms_while_they_last() -> None:
 def test_checks_that_are_off_give_no_alarm() -> None:
     """`off` is neither true nor false."""
     status = _begun()
-    status.take('hv0/drivability', 0, 'valid', {'collision': 'off', 'road_compliance': 'off'}, 0.0)
+    _take(status, 'hv0/drivability', 0, 'valid',
+          {'collision': 'off', 'road_compliance': 'off'}, 0.0)
     assert _kinds(status) == []
 
 
 def test_plans_and_planner() -> None:
     """Counts of the simulation and times of the planner join in one row; braking is an alarm."""
     status = _begun()
-    status.take('sim_node: av0 plans', 2, 'no plan: braking', {
+    _take(status, 'sim_node: av0 plans', 2, 'no plan: braking', {
         'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1',
         'latency_ms': '10.0', 'age_ms': '', 'last_refusal': 'late'}, 3.0)
-    status.take('planner_node: av0', 0, 'planning', {
+    _take(status, 'planner_node: av0', 0, 'planning', {
         'plan_time_ms': '4.5', 'fallbacks': '2', 'planner': 'reactive'}, 3.0)
-    status.take('sim_node: av0 plans', 2, 'no plan: braking', {
+    _take(status, 'sim_node: av0 plans', 2, 'no plan: braking', {
         'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1',
         'latency_ms': '10.0', 'age_ms': '', 'last_refusal': 'late'}, 4.0)
     assert status.document()['planners']['av0'] == {
@@ -65,12 +86,12 @@ def test_tracking_errors_of_tracked_avs() -> None:
     errors = {f'{when}{name}_error': str(value) for value, (when, name) in enumerate(
         (when, name) for when in ('', 'worst_') for name in ('lane', 'lateral', 'along',
                                                              'heading', 'speed'))}
-    status.take('sim_node: av0 plans', 0, 'following its plan', errors, 1.0)
+    _take(status, 'sim_node: av0 plans', 0, 'following its plan', errors, 1.0)
     assert status.document()['planners']['av0']['tracking'] == {
         'lane_error': 0.0, 'lateral_error': 1.0, 'along_error': 2.0, 'heading_error': 3.0,
         'speed_error': 4.0, 'worst_lane_error': 5.0, 'worst_lateral_error': 6.0,
         'worst_along_error': 7.0, 'worst_heading_error': 8.0, 'worst_speed_error': 9.0}
-    status.take('sim_node: av0 plans', 0, 'following its plan', {'accepted': '1'}, 2.0)
+    _take(status, 'sim_node: av0 plans', 0, 'following its plan', {'accepted': '1'}, 2.0)
     assert status.document()['planners']['av0']['tracking'] is None
 
 
@@ -78,16 +99,16 @@ def test_late_traffic_is_an_alarm_until_it_is_not_told_for_two_seconds() -> None
     """Nobody tells that agents are in time again."""
     status = _begun()
     for t in (1.0, 2.5):
-        status.take('sim_node: traffic', 1, 'agents are 2 scenario steps late',
-                    {'n': '100', 'k': '10', 'agents_k': '8'}, t)
+        _take(status, 'sim_node: traffic', 1, 'agents are 2 scenario steps late',
+              {'n': '100', 'k': '10', 'agents_k': '8'}, t)
     assert status.alarms_document()['active'] == [
         {'id': 'late_traffic:traffic', 'kind': 'late_traffic', 'subject': 'traffic',
          'text': 'agents are 2 scenario steps late', 'since_t': 1.0}]
-    status.take('sim_node: run', 0, 'running', {}, 4.4)
+    _take(status, 'sim_node: run', 0, 'running', {}, 4.4)
     assert _kinds(status) == ['late_traffic:traffic']
-    status.take('sim_node: run', 0, 'running', {}, 4.6)
+    _take(status, 'sim_node: run', 0, 'running', {}, 4.6)
     assert _kinds(status) == []
-    status.take('sim_node: traffic', 1, 'agents are 1 scenario steps late', {}, 5.0)
+    _take(status, 'sim_node: traffic', 1, 'agents are 1 scenario steps late', {}, 5.0)
     status.begin(('hv0', 'av0'))
     assert _kinds(status) == []
 
@@ -95,13 +116,13 @@ def test_late_traffic_is_an_alarm_until_it_is_not_told_for_two_seconds() -> None
 def test_lost_driver_and_lost_device() -> None:
     """A silent seat shows at the seat and as an alarm; a device's own words come with it."""
     status = _begun()
-    status.take('sim_node: hv0 seat', 1, 'driver lost', {'losses': '1'}, 5.0)
+    _take(status, 'sim_node: hv0 seat', 1, 'driver lost', {'losses': '1'}, 5.0)
     assert status.document()['seats_lost'] == {'hv0': True}
     assert _kinds(status) == ['lost_device:hv0']
-    status.take('driver_node: hv0', 2, 'G29 is unplugged', {}, 5.1)
+    _take(status, 'driver_node: hv0', 2, 'G29 is unplugged', {}, 5.1)
     assert status.alarms[0].text == 'G29 is unplugged'
-    status.take('driver_node: hv0', 0, 'device found', {}, 6.0)
-    status.take('sim_node: hv0 seat', 0, 'driven', {'losses': '1'}, 6.0)
+    _take(status, 'driver_node: hv0', 0, 'device found', {}, 6.0)
+    _take(status, 'sim_node: hv0 seat', 0, 'driven', {'losses': '1'}, 6.0)
     assert _kinds(status) == []
 
 
@@ -109,11 +130,11 @@ def test_recording() -> None:
     """Its size while it goes, its last words when it fails; a new run doesn't hide a failure."""
     status = _begun()
     assert status.document()['recording']['state'] == 'none'
-    status.take('recorder_node: recording', 0, 'recording into bag',
-                {'messages': '120', 'bytes': '2500000'}, 1.0)
+    _take(status, 'recorder_node: recording', 0, 'recording into bag',
+          {'messages': '120', 'bytes': '2500000'}, 1.0)
     assert status.document()['recording'] == {
         'state': 'recording', 'messages': 120, 'megabytes': 2.5, 'text': 'recording into bag'}
-    status.take('recorder_node: recording', 2, 'no space left', {}, 2.0)
+    _take(status, 'recorder_node: recording', 2, 'no space left', {}, 2.0)
     status.begin(('hv0',))
     assert status.document()['recording']['state'] == 'failed'
     assert _kinds(status) == ['recording:recorder']
@@ -122,7 +143,7 @@ def test_recording() -> None:
 def test_timing_numbers() -> None:
     """Strings become numbers, what is no number null; skipped frames are an alarm."""
     status = _begun()
-    status.take('timesync_node: table I', 1, 'late', {
+    _take(status, 'timesync_node: table I', 1, 'late', {
         'mean_step_error_ms': '0.05', 'real_time_ratio_min': 'nan', 'frame_skipping': 'True'}, 4.0)
     assert status.document()['timing'] == {
         'mean_step_error_ms': 0.05, 'real_time_ratio_min': None, 'frame_skipping': True}
@@ -132,7 +153,7 @@ def test_timing_numbers() -> None:
 def test_run_state() -> None:
     """What sim_node says of itself."""
     status = _begun()
-    status.take('sim_node: run', 0, 'paused', {'real_time_factor': '0.5'}, 0.0)
+    _take(status, 'sim_node: run', 0, 'paused', {'real_time_factor': '0.5'}, 0.0)
     assert (status.document()['run'], status.document()['real_time_factor']) == ('paused', 0.5)
 
 
@@ -141,7 +162,7 @@ def test_others_are_ignored() -> None:
     status = _begun()
     before = status.document()
     for name in ('sim_node: av9 plans', 'my_node: hello', 'planner_node: av9', ''):
-        status.take(name, 2, 'broken', {}, 0.0)
+        _take(status, name, 2, 'broken', {}, 0.0)
     assert status.document() == before and _kinds(status) == []
 
 
@@ -151,12 +172,12 @@ def test_vehicles_that_take_no_part_leave_nothing() -> None:
     values = {'collision': 'true', 'road_compliance': 'false', 'hit': 'av0'}
     for name in ('hv1/drivability', '/drivability', 'hv0/x/drivability',
                  'x' * 500 + '/drivability'):
-        status.take(name, 2, 'collision', values, 0.0)
+        _take(status, name, 2, 'collision', values, 0.0)
     assert status.document()['drivability'] == {} and _kinds(status) == []
 
 
 def _verdict(status: RunStatus, vehicle: str, hit: str, off_road: bool, t: float) -> None:
-    status.take(f'{vehicle}/drivability', 2 if hit or off_road else 0, '', {
+    _take(status, f'{vehicle}/drivability', 2 if hit or off_road else 0, '', {
         'collision': str(bool(hit)).lower(), 'road_compliance': str(not off_road).lower(),
         'hit': hit}, t)
 
@@ -183,9 +204,9 @@ def test_the_end_of_a_run_leaves_no_alarm_but_a_failed_recording() -> None:
     """What stood then is its result; drivers that fall silent afterwards are nobody's worry."""
     status = _begun()
     _verdict(status, 'hv0', 'av0', True, 1.0)
-    status.take('recorder_node: recording', 2, 'disk full', {}, 1.0)
-    status.take('sim_node: run', 0, 'ended', {'reason': 'duration'}, 2.0)
-    status.take('sim_node: hv0 seat', 1, 'driver lost', {}, 2.1)
+    _take(status, 'recorder_node: recording', 2, 'disk full', {}, 1.0)
+    _take(status, 'sim_node: run', 0, 'ended', {'reason': 'duration'}, 2.0)
+    _take(status, 'sim_node: hv0 seat', 1, 'driver lost', {}, 2.1)
     _verdict(status, 'av0', 'hv0', False, 2.1)
     assert _kinds(status) == ['recording:recorder']
     document = status.document()
@@ -198,7 +219,7 @@ def test_the_end_of_a_run_leaves_no_alarm_but_a_failed_recording() -> None:
 def test_a_recording_that_is_done_says_so() -> None:
     """Its size stays to be seen."""
     status = _begun()
-    status.take('recorder_node: recording', 0, 'recorded', {
+    _take(status, 'recorder_node: recording', 0, 'recorded', {
         'messages': '12', 'bytes': '2500000', 'closed': 'True'}, 1.0)
     assert status.recording == {
         'state': 'recorded', 'text': 'recorded', 'messages': 12, 'megabytes': 2.5}
@@ -207,9 +228,9 @@ def test_a_recording_that_is_done_says_so() -> None:
 def test_a_silent_simulation_is_no_end_that_it_told_itself() -> None:
     """The page tells the two apart."""
     status = _begun()
-    status.take('sim_node: run', 0, 'running', {}, 2.0)
+    _take(status, 'sim_node: run', 0, 'running', {}, 2.0)
     status.lose()
     assert (status.run, status.reason) == ('ended', 'silence')
-    status.take('sim_node: run', 0, 'ended', {'reason': 'stop'}, 2.0)
+    _take(status, 'sim_node: run', 0, 'ended', {'reason': 'stop'}, 2.0)
     status.lose()
     assert status.reason == 'stop'

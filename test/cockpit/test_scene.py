@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The scene document: true to the files, valid JSON for every scenario."""
 
 from dataclasses import replace
@@ -8,18 +20,18 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pytest
-import shapely
-
 from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import game_document, parse_game_document
+from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup, Setup
+import numpy as np
+import pytest
+import shapely
 
 GAMES = sorted(path for path in scenarios_directory().glob('*.yaml')
                if path.suffixes == ['.yaml'])

@@ -1,23 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where a sensor looked from: as perception itself places it, also between received states."""
 
 from collections import OrderedDict
 import copy
-from dataclasses import asdict
-from typing import Any
-
-import numpy as np
-import pytest
 
 from crgame_ros.cockpit.sensor_mounts import SensorMounts
+from crgame_ros.game.driven_vehicle import DrivenAv
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.perception.mounted_sensor import MountedSensor
-from crgame_ros.perception.spec import perception_entry, PerceptionSpec, SensorSpec
-from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import pytest
 
 DT_S = 0.01
 SENSORS = (SensorSpec('front'), SensorSpec('left', x=0.5, y=0.8, yaw=1.4))
@@ -34,11 +44,10 @@ def vehicle() -> VehicleParameters:
 @pytest.fixture
 def mounts(vehicle: VehicleParameters) -> SensorMounts:
     """Mount two sensors on av0, the second of two vehicles."""
-    entry: dict[str, Any] = {
-        'id': 'av0', 'vehicle': asdict(vehicle),
-        'perception': perception_entry(PerceptionSpec(sensors=SENSORS))}
-    return SensorMounts((entry, {'id': 'av1', 'vehicle': asdict(vehicle)}),
-                        {'hv0': 0, 'av0': 1}, DT_S)
+    state = VehicleState(0.0, 0.0, 0.0, 0.0)
+    avs = (DrivenAv('av0', vehicle, state, perception=PerceptionSpec(sensors=SENSORS)),
+           DrivenAv('av1', vehicle, state))
+    return SensorMounts(avs, {'hv0': 0, 'av0': 1}, DT_S)
 
 
 def replaced(mounts: SensorMounts) -> SensorMounts:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Gains of the LQR against independent computations, and closed loops with FS 2."""
 
 from collections.abc import Callable
@@ -7,18 +19,17 @@ import math
 
 import control_support as support
 from control_support import DT, VEHICLE
+from crgame_ros.control.lqr import error_model, gain_table, LqrTracker, TABLE_SPEEDS, weights
+from crgame_ros.control.tracker import Reference
+from crgame_ros.errors import InputError
+from crgame_ros.vehicle.control_settings import control_settings
+from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle
+from crgame_ros.vehicle.models import KinematicSingleTrack
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from scipy.linalg import solve_continuous_are
-
-from crgame_ros.control.lqr import error_model, gain_table, LqrTracker, TABLE_SPEEDS, weights
-from crgame_ros.control.settings import control_settings
-from crgame_ros.control.tracker import Reference
-from crgame_ros.errors import InputError
-from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle
-from crgame_ros.vehicle.models import KinematicSingleTrack
-from crgame_ros.vehicle.state import VehicleState
 
 Array = NDArray[np.float64]
 LENGTH = VEHICLE.wheelbase

@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Pure pursuit against its closed forms."""
 
 import math
 
 import control_support as support
 from control_support import VEHICLE
-import numpy as np
-import pytest
-
 from crgame_ros.control.pure_pursuit import PurePursuitTracker, steering_angle_to
 from crgame_ros.control.tracker import Reference
 from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle
 from crgame_ros.vehicle.models import KinematicSingleTrack
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import pytest
 
 
 def made(**options: object) -> PurePursuitTracker:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Speed control: ramps, stops, limits, anti-windup, noise."""
 
 from dataclasses import replace
@@ -7,15 +19,14 @@ import math
 
 import control_support as support
 from control_support import DT, DT_C, VEHICLE
-import numpy as np
-import pytest
-
-from crgame_ros.control.settings import control_settings
 from crgame_ros.control.speed import SpeedController
 from crgame_ros.control.tracker import Reference
+from crgame_ros.vehicle.control_settings import control_settings
 from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle
 from crgame_ros.vehicle.models import KinematicSingleTrack, VehicleModel
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import pytest
 
 SETTINGS = control_settings().speed_control
 

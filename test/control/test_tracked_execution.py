@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Execution by tracking as a whole: errors, bias, used-up plans, replanning, real plans."""
 
 import math
@@ -7,17 +19,16 @@ from pathlib import Path
 
 import control_support as support
 from control_support import DT, DT_C, VEHICLE
-import numpy as np
-import pytest
-
 from crgame_ros.control.tracked_execution import TrackedExecution
 from crgame_ros.control.tracker import Control, Reference, Tracker
-from crgame_ros.scenario.game_file import load_game
+from crgame_ros.game.game_file import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle
 from crgame_ros.vehicle.models import KinematicSingleTrack
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import pytest
 
 NAMES = ['lqr', 'pure-pursuit']
 PLAN = Reference(support.plan(10.0, 1.0), DT_C)

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The registry of trackers, and what the documentation says about it."""
 
 import inspect
@@ -8,11 +20,10 @@ import re
 
 import control_support as support
 from control_support import VEHICLE
-import numpy as np
-import pytest
-
 from crgame_ros.control.trackers import TRACKERS
 from crgame_ros.vehicle.models import VEHICLE_MODELS
+import numpy as np
+import pytest
 
 # Of both trackers, listed once.
 SPEED = {'speed_gain', 'integral_gain', 'position_gain', 'acceleration_lag'}

@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Collisions against an independent truth: polygons intersected by shapely."""
 
 import itertools
 import math
 
+from crgame_ros.drivability.collision import CollisionDetector
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.shape import Shape
 import numpy as np
 import pytest
 import shapely
 from shapely import affinity
-
-from crgame_ros.drivability.collision import CollisionDetector
-from crgame_ros.errors import InputError
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.objects import ObjectStates
 
 CAR = Shape.rectangle(4.508, 1.61)
 SHAPES = {
@@ -131,7 +142,7 @@ def test_obstacle_turns_between_two_ticks() -> None:
 
 
 def test_absent_objects_and_vehicles_touch_nobody() -> None:
-    """NaN is absence, of an object, of its velocity, of a vehicle, and before the first tick."""
+    """A NaN is absence, of an object, of its velocity, of a vehicle, and before the first tick."""
     detector = CollisionDetector([CAR, CAR], [CAR, CAR])
     nan = math.nan
     detector.move(0.0)

@@ -1,14 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Contacts in closed form: which side, which kind, and whether braking would have avoided them."""
 
 import math
 
-import numpy as np
-import pytest
-
 from crgame_ros.drivability.contact import could_avoid, Course, kind_of, touched_side
 from crgame_ros.geometry.shape import Shape
+import numpy as np
+import pytest
 
 CAR = Shape.rectangle(4.0, 2.0)
 DT = 0.01
@@ -94,5 +105,5 @@ def test_overlap_from_the_start() -> None:
     (5.0, 0.0, 'left', 'stopped track'), (5.0, 3.0, 'front', 'active front'),
     (5.0, 9.0, 'rear', 'rear'), (-2.0, 9.0, 'right', 'lateral')])
 def test_kinds(speed: float, other: float, side: str, kind: str) -> None:
-    """NuPlan's five kinds, the stopped ones first."""
+    """The five kinds of nuPlan, the stopped ones first."""
     assert kind_of(speed, other, side) == kind  # type: ignore[arg-type]

@@ -1,15 +1,23 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The drivability monitor: who hit what, at which step, and who has to stop."""
 
 from dataclasses import replace
 import math
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
-import numpy as np
-from numpy.typing import NDArray
-import pytest
-
 from crgame_ros.drivability.monitor import (
     changes,
     DrivabilityMonitor,
@@ -17,11 +25,14 @@ from crgame_ros.drivability.monitor import (
     VehicleDrivability,
 )
 from crgame_ros.errors import InputError
+from crgame_ros.game.game import DrivabilitySpec
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.game import DrivabilitySpec
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
+import numpy as np
+from numpy.typing import NDArray
+import pytest
 
 BMW = load_vehicle_parameters()
 HUMAN = ObjectDescription('hv0', 'car', Role.HUMAN, BMW.shape, BMW.rear_to_center)
@@ -78,7 +89,7 @@ def test_the_road_is_looked_at_through_the_transform_and_contacts_are_not() -> N
         monitor = DrivabilityMonitor(
             [HUMAN, AV, replace(AV, id='av1')], [TRUCK], network(), ALL, transforms=transforms)
         monitor.prepare(states)
-        monitor.set_objects(0, at((27.0, 3.0, 0.0, 0.0)))
+        monitor.set_objects(at((27.0, 3.0, 0.0, 0.0)))
         verdicts = monitor.check(0, 0.0, states)
         assert [item.off_road for item in verdicts] == off_road
         assert [item.hit for item in verdicts] == [('av1',), ('o30',), ('hv0',)]
@@ -91,8 +102,7 @@ def test_everyone_is_checked_against_everyone(prepared: bool) -> None:
     states = vehicles(rear(0.0, -3.5), rear(3.0, -2.5))
     if prepared:
         monitor.prepare(states)
-    monitor.set_objects(40, at((11.0, -2.0, 0.0, 0.0), (40.0, 0.0, 0.0, 0.0)))
-    assert monitor.objects_n == 40
+    monitor.set_objects(at((11.0, -2.0, 0.0, 0.0), (40.0, 0.0, 0.0, 0.0)))
     assert monitor.check(42, 0.02, states) == (
         VehicleDrivability('hv0', True, True, ('av0',), 42),
         VehicleDrivability('av0', True, False, ('hv0', 'o30'), 42))
@@ -101,7 +111,7 @@ def test_everyone_is_checked_against_everyone(prepared: bool) -> None:
 def test_hits_are_sorted_and_named() -> None:
     """All ids that are touched, in the order of their names, whatever the order of the objects."""
     monitor = DrivabilityMonitor([AV, HUMAN], [WALKER, TRUCK], None, ALL)
-    monitor.set_objects(0, at((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)))
+    monitor.set_objects(at((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)))
     verdicts = monitor.check(0, 0.0, vehicles(rear(0.0, 0.0), rear(1.0, 1.0)))
     assert [verdict.hit for verdict in verdicts] == [('hv0', 'o30', 'o4'), ('av0', 'o30', 'o4')]
 
@@ -114,7 +124,7 @@ def test_reference_point_is_the_rear_axle() -> None:
     2.254 - 1.4227 m behind the axle do not.
     """
     monitor = DrivabilityMonitor([HUMAN], [WALKER], None, ALL)
-    monitor.set_objects(0, at((3.9, 0.0, 0.0, 0.0)))
+    monitor.set_objects(at((3.9, 0.0, 0.0, 0.0)))
     for yaw, hit in ((0.0, True), (math.pi, False), (math.pi / 2, False)):
         state = vehicles([0.0, 0.0, yaw, 0.0, 0.0, 0.0, 0.0, 0.0])
         assert monitor.check(0, 0.0, state)[0].collision is hit
@@ -123,7 +133,7 @@ def test_reference_point_is_the_rear_axle() -> None:
 def test_obstacle_moves_on_since_the_tick() -> None:
     """A truck at 12.254 m and 10 m/s meets the car, 8.254 m between centres, after 0.4 s."""
     monitor = DrivabilityMonitor([HUMAN], [TRUCK], None, ALL)
-    monitor.set_objects(0, at((12.254, 0.0, -10.0, 0.0)))
+    monitor.set_objects(at((12.254, 0.0, -10.0, 0.0)))
     standing = vehicles(rear(0.0, 0.0))
     assert not monitor.check(39, 0.399, standing)[0].collision
     assert monitor.check(41, 0.401, standing)[0].hit == ('o30',)
@@ -135,7 +145,7 @@ def test_checks_are_switched_separately(collision: bool, road: bool) -> None:
     """CRG III-D: either check is enabled or disabled by its own flag."""
     monitor = DrivabilityMonitor([HUMAN], [WALKER], network(),
                                  DrivabilitySpec(collision=collision, road=road, stop=True))
-    monitor.set_objects(0, at((0.0, 4.0, 0.0, 0.0)))
+    monitor.set_objects(at((0.0, 4.0, 0.0, 0.0)))
     verdict = monitor.check(7, 0.0, vehicles(rear(0.0, 4.0)))[0]
     assert verdict == VehicleDrivability('hv0', collision, road, ('o4',) if collision else (), 7,
                                          stop_requested=collision or road)
@@ -157,7 +167,7 @@ def test_absence() -> None:
     """Vehicles and objects with NaN are absent: valid themselves and hit by nobody."""
     monitor = DrivabilityMonitor([HUMAN, AV], [WALKER], network(), ALL)
     monitor.prepare(vehicles(rear(0.0, 0.0), [math.nan] * 8))
-    monitor.set_objects(0, at((math.nan, math.nan, math.nan, math.nan)))
+    monitor.set_objects(at((math.nan, math.nan, math.nan, math.nan)))
     verdicts = monitor.check(1, 0.01, vehicles(rear(0.0, 0.0), [math.nan] * 8))
     assert all(verdict.is_valid for verdict in verdicts)
 
@@ -174,7 +184,7 @@ def test_wrong_shapes_are_refused() -> None:
     with pytest.raises(InputError, match='2 driven vehicles'):
         monitor.check(0, 0.0, vehicles(rear(0.0, 0.0)))
     with pytest.raises(InputError, match='1 objects'):
-        monitor.set_objects(0, at((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)))
+        monitor.set_objects(at((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)))
 
 
 def test_only_changes_are_reported() -> None:
@@ -185,7 +195,7 @@ def test_only_changes_are_reported() -> None:
     for n, (truck_x, walker_x) in enumerate(
             ((50.0, 50.0), (50.0, 50.0), (5.0, 50.0), (5.0, 50.0), (5.0, 1.0), (50.0, 1.0),
              (50.0, 50.0))):
-        monitor.set_objects(n, at((truck_x, 0.0, 0.0, 0.0), (walker_x, 0.0, 0.0, 0.0)))
+        monitor.set_objects(at((truck_x, 0.0, 0.0, 0.0), (walker_x, 0.0, 0.0, 0.0)))
         current = monitor.check(n, 0.0, vehicles(rear(0.0, 0.0), rear(0.0, 30.0)))
         log += [(verdict.n, verdict.vehicle_id, verdict.hit)
                 for verdict in changes(reported, current)]

@@ -1,27 +1,38 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Curbs and fences in the drivability monitor: who hits them, judged by shapely and by hand."""
 
 import math
 from pathlib import Path
 
+from crgame_ros.drivability.monitor import DrivabilityMonitor
+from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
+from crgame_ros.game.game import DrivabilitySpec
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.occupancy_writer import write_map
+from crgame_ros.occupancy.rasterize import Raster
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 import shapely
-
-from crgame_ros.drivability.monitor import DrivabilityMonitor
-from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.game import DrivabilitySpec
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.scenario.occupancy import OccupancyGrid
-from crgame_ros.scenario.occupancy_raster_spec import RasterSpec
-from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
-from crgame_ros.scenario.occupancy_writer import write_map
-from crgame_ros.scenario.rasterize import Raster
-from crgame_ros.vehicle.parameters import load_vehicle_parameters
 
 BMW = load_vehicle_parameters()
 HUMAN = ObjectDescription('hv0', 'car', Role.HUMAN, BMW.shape, BMW.rear_to_center)
@@ -58,8 +69,8 @@ def rear(x: float, y: float, yaw: float = 0.0) -> list[float]:
 
 @pytest.mark.parametrize('shape', [
     BMW.shape, Shape.circle(0.6), Shape.polygon(((2.0, 0.0), (-1.0, 1.0), (-0.5, 0.0),
-                                                 (-1.0, -1.0)))],
-    ids=['rectangle', 'circle', 'polygon'])
+                                                 (-1.0, -1.0)))
+], ids=['rectangle', 'circle', 'polygon'])
 @pytest.mark.parametrize('cell', [0.1, 0.5])
 def test_against_shapely(shape: Shape, cell: float) -> None:
     """4,000 random poses among random cells, far from the origin: overlap means a hit."""
@@ -100,7 +111,7 @@ def test_into_a_fence_and_beside_it() -> None:
     grid = fence((-10.0, 3.0), (10.0, 3.2))
     monitor = DrivabilityMonitor([HUMAN, AV], [WALKER], None, DrivabilitySpec(stop=True),
                                  occupancy=Fixed(grid))
-    monitor.set_objects(0, ObjectStates(np.array([[-6.0, 0.0, 0.0]]), np.zeros((1, 3))))
+    monitor.set_objects(ObjectStates(np.array([[-6.0, 0.0, 0.0]]), np.zeros((1, 3))))
     for y, yaw, hit in ((2.19, 0.0, False), (2.20, 0.0, True), (0.74, math.pi / 2, False),
                         (0.75, math.pi / 2, True), (3.1, 0.0, True), (4.00, 0.0, True),
                         (4.01, 0.0, False), (-9.0, 0.4, False)):

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Devices read through evdev: decoding with real events, real absence, and uinput where it is."""
 
 from collections.abc import Iterator
@@ -10,14 +22,13 @@ import select
 from tempfile import TemporaryDirectory
 import time
 
-from evdev import AbsInfo, ecodes, InputEvent, UInput
-import pytest
-
 from crgame_ros.driver.device_map import load_device_map, load_device_maps
 from crgame_ros.driver.evdev_device import EvdevDevice, EventDecoder, open_evdev
 from crgame_ros.driver.source import EvdevDriver
 from crgame_ros.driver.wheel import GearButtons
 from crgame_ros.errors import InputError
+from evdev import AbsInfo, ecodes, InputEvent, UInput
+import pytest
 
 DT_S = 0.01
 G29 = 'Logitech G29 Driving Force Racing Wheel'
@@ -190,7 +201,7 @@ def test_a_wrong_map_is_refused_at_once(tmp_path: Path) -> None:
     """A file that is no device map is no missing device."""
     path = tmp_path / 'mine.yaml'
     path.write_text('title: 3', encoding='utf-8')
-    with pytest.raises(InputError, match='"title" is 3'):
+    with pytest.raises(InputError, match='"kind" is missing'):
         open_evdev(str(path))
 
 

@@ -1,12 +1,21 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Driver sources: their names, scripted drivers in lockstep, and an external joy node."""
 
 from pathlib import Path
 
-import pytest
-
-from crgame_ros.driver.command import RELEASED
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.source import (
@@ -18,6 +27,8 @@ from crgame_ros.driver.source import (
     SourceSpec,
 )
 from crgame_ros.errors import InputError
+from crgame_ros.vehicle.driver_command import RELEASED
+import pytest
 
 DT_S = 0.01
 KEYS = """

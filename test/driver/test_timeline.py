@@ -1,23 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Timelines: what they hold when, and which files are refused."""
 
 import json
 from pathlib import Path
 
-import pytest
-
 from crgame_ros.driver.keyboard import KeyState
-from crgame_ros.driver.timeline import (
-    JoyTimeline,
-    KeyTimeline,
-    MAX_BYTES,
-    parse_timeline,
-    read_timeline,
-    SCRIPTED_LAYOUT,
-)
+from crgame_ros.driver.timeline import JoyTimeline, KeyTimeline, SCRIPTED_LAYOUT
+from crgame_ros.driver.timeline_file import parse_timeline, read_timeline, timeline_text
 from crgame_ros.driver.wheel import normalize
 from crgame_ros.errors import InputError
+from crgame_ros.yaml_text import MAX_BYTES
+import pytest
 
 KEYS = """
 keys:
@@ -64,7 +70,7 @@ def test_keys_are_held_from_start_until_just_before_the_end(t_s: float, held: se
 
 @pytest.mark.parametrize('rate', [10, 30, 100, 125, 1000])
 def test_edges_are_met_at_every_rate(rate: int) -> None:
-    """For n * dt on an edge, however it rounds, the new keys hold: 0.1, 0.7, 1.1, 5.7 s…"""
+    """For n * dt on an edge, however it rounds, the new keys hold: 0.1, 0.7, 1.1, 5.7 s."""
     lines = [f'  - {{from: {i / 10}, to: {(i + 1) / 10}, hold: [left]}}'
              for i in range(1, 100, 2)]
     timeline = parse_timeline('\n'.join(['keys:', *lines]), 'edges')
@@ -107,7 +113,7 @@ def test_ends() -> None:
 def test_text_round_trip(text: str) -> None:
     """The text that the resolved game carries, in JSON too, gives an equal timeline."""
     timeline = parse_timeline(text, 'here')
-    carried = json.loads(json.dumps(timeline.to_text()))
+    carried = json.loads(json.dumps(timeline_text(timeline)))
     assert parse_timeline(carried, 'there') == timeline
 
 
@@ -119,43 +125,50 @@ def test_json_is_read() -> None:
 
 
 @pytest.mark.parametrize(('text', 'message'), [
-    ('keys: [{from: 0, to: 1, hold: [thrust]}]', "drive.yaml: keys: entry 1: hold: .*'thrust'"),
-    ('keys: [{from: 0, to: 1, hold: [[left]]}]', 'knows no key'),
-    ('keys: [{from: 0, to: 1}]', 'entry 1: .* exactly from, hold, to'),
-    ('keys: [{from: 0, to: 1, hold: left, tap: x}]', 'entry 1'),
-    ('keys: [{from: -0.1, to: 1, hold: left}]', 'entry 1: from: is -0.1'),
+    ('keys: [{from: 0, to: 1, hold: [thrust]}]',
+     r"drive.yaml: keys.0.: \"hold\" is .'thrust'.; give one or a list of throttle"),
+    ('keys: [{from: 0, to: 1, hold: [[left]]}]', '"hold" is ..'),
+    ('keys: [{from: 0, to: 1}]', 'keys.0.: "hold" is missing'),
+    ('keys: [{from: 0, to: 1, hold: left, tap: x}]',
+     'keys.0.: "tap" is unknown; known are from, to, hold'),
+    ('keys: [{from: -0.1, to: 1, hold: left}]',
+     'keys.0.: "from" is -0.1; give a number from 0 to 1e.06'),
     ('keys: [{from: 0, to: 1, hold: left}, {from: 2, to: 2, hold: left}]',
-     'entry 2: ends at 2 s, not after its start at 2 s'),
+     'keys.1.: ends at 2 s, not after its start at 2 s'),
     ('keys: [{from: 3, to: 2, hold: left}]', 'not after its start'),
-    ('keys: [{from: .nan, to: 2, hold: left}]', 'from: is nan'),
-    ('keys: [{from: 0, to: .inf, hold: left}]', 'to: is inf'),
-    ('keys: [{from: 0, to: true, hold: left}]', 'to: is True'),
-    ('keys: [{from: 0, to: 1e1, hold: left}]', "to: is '1e1'.* 1.0e-3, not 1e-3"),
-    ('keys: {from: 0}', 'keys: is .*no list'),
-    ('keys: [5]', 'entry 1: is 5'),
-    ('doors: []', "has .'doors'. at its top"),
-    ('{keys: [], joy: {points: [[0, 0, 0, 0]]}}', 'at its top'),
+    ('keys: [{from: .nan, to: 2, hold: left}]', '"from" is nan'),
+    ('keys: [{from: 0, to: .inf, hold: left}]', '"to" is inf'),
+    ('keys: [{from: 0, to: true, hold: left}]', '"to" is True'),
+    ('keys: [{from: 0, to: 1e1, hold: left}]', "\"to\" is '1e1'.* 1.0e-3, not 1e-3"),
+    ('keys: {from: 0}', '"keys" is {.*give a list of {from:, to:, hold:}'),
+    ('keys: [5]', 'keys.0.: is no mapping'),
+    ('doors: []', '"doors" is unknown; known are keys, joy'),
+    ('{keys: [], joy: {points: [[0, 0, 0, 0]]}}',
+     r'has 2 timelines \(keys, joy\); give exactly one of keys, joy'),
     ('', 'is no mapping'),
     ('[1, 2]', 'is no mapping'),
     ('keys: [', 'is no YAML'),
     ('\x00', 'is no YAML'),
     ('keys: !!python/object/apply:os.getcwd []', 'is no YAML'),
-    ('x: 2025-99-99', 'is no YAML'),
-    ('a: &a [x]\nb: [*a, *a]', 'alias'),
-    ('[' * 100000, 'nested too deeply'),
+    ('x: 2025-99-99', '"x" is unknown; known are keys, joy'),
+    ('keys: "\\ud800"', 'is no YAML'),
+    ('a: &a [x, *a]', 'the alias .a stands inside'),
+    ('[' * 100000, 'nested deeper than 20 levels'),
     ('#' * (MAX_BYTES + 1), 'is longer than'),
-    ('joy: 3', 'joy: is 3'),
-    ('joy: {points: []}', 'points: is empty'),
-    ('joy: {points: [[0, 0, 0]]}', r'point 1: is .*give .t, throttle, brake, steering'),
-    ('joy: {axes: [clutch], points: [[0, 0]]}', "'clutch' is unknown"),
-    ('joy: {axes: [brake, brake], points: [[0, 0, 0]]}', "'brake' is unknown or doubled"),
-    ('joy: {points: [[0, 1.5, 0, 0]]}', 'point 1: throttle: is 1.5'),
-    ('joy: {points: [[0, 0, -0.5, 0]]}', 'point 1: brake: is -0.5'),
-    ('joy: {points: [[0, 0, 0, -1.5]]}', 'point 1: steering: is -1.5'),
-    ('joy: {points: [[0, 0, 0, .nan]]}', 'steering: is nan'),
-    ('joy: {points: [[-1, 0, 0, 0]]}', 'point 1: t: is -1'),
-    ('joy: {points: [[1, 0, 0, 0], [1, 1, 0, 0]]}', 'point 2: is at 1.0 s, not after 1.0 s'),
-    ('joy: {points: [[0, 0, 0, 0]], reverse: [{from: 1}]}', 'reverse: entry 1'),
+    ('joy: 3', 'joy: is no mapping'),
+    ('joy: {points: []}', 'points: has 0 entries; give 1 or more'),
+    ('joy: {points: [[0, 0, 0]]}', r'points.0.: is .*give .t, throttle, brake, steering'),
+    ('joy: {axes: [clutch], points: [[0, 0]]}',
+     "\"axes\" holds 'clutch'; give a list of throttle, brake, steering"),
+    ('joy: {axes: [brake, brake], points: [[0, 0, 0]]}',
+     '"brake" is doubled; name each axis once'),
+    ('joy: {points: [[0, 1.5, 0, 0]]}', 'points.0.: "throttle" is 1.5; give a number from 0 to 1'),
+    ('joy: {points: [[0, 0, -0.5, 0]]}', 'points.0.: "brake" is -0.5'),
+    ('joy: {points: [[0, 0, 0, -1.5]]}', 'points.0.: "steering" is -1.5'),
+    ('joy: {points: [[0, 0, 0, .nan]]}', 'points.0.: holds nan'),
+    ('joy: {points: [[-1, 0, 0, 0]]}', 'points.0.: "t" is -1'),
+    ('joy: {points: [[1, 0, 0, 0], [1, 1, 0, 0]]}', 'points.1.: is at 1 s, not after 1 s'),
+    ('joy: {points: [[0, 0, 0, 0]], reverse: [{from: 1}]}', 'reverse.0.: "to" is missing'),
 ])
 def test_wrong_timelines_name_file_and_line(text: str, message: str) -> None:
     """One message each, with the file and the entry."""
@@ -174,8 +187,8 @@ def test_a_yaml_bomb_is_refused_before_it_expands() -> None:
 
 
 @pytest.mark.parametrize(('content', 'message'), [
-    (None, 'No such file'), (b'\xff\xfe\x00\x01', 'is no text'),
-    (b' ' * (3 * MAX_BYTES), 'is longer than')])
+    (None, 'No such file'), (b'\xff\xfe\x00\x01', 'no text in UTF-8'),
+    (b' ' * (3 * MAX_BYTES), 'is larger than')])
 def test_wrong_files_are_refused(tmp_path: Path, content: bytes | None, message: str) -> None:
     """Missing, binary and huge files; no more than the limit is read."""
     path = tmp_path / 'drive.yaml'
@@ -187,7 +200,7 @@ def test_wrong_files_are_refused(tmp_path: Path, content: bytes | None, message:
 
 def test_a_directory_is_no_timeline(tmp_path: Path) -> None:
     """The message names it."""
-    with pytest.raises(InputError, match='Is a directory'):
+    with pytest.raises(InputError, match='is a directory'):
         read_timeline(tmp_path)
 
 

@@ -1,10 +1,20 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Normalisation of raw axes against CRG 17."""
 
 import math
-
-import pytest
 
 from crgame_ros.driver.wheel import (
     AxisBinding,
@@ -17,6 +27,7 @@ from crgame_ros.driver.wheel import (
     reported,
 )
 from crgame_ros.errors import InputError
+import pytest
 
 STEERING = AxisRange(0, 0.0, 65535.0, 32767.5, inverted=True)
 THROTTLE = AxisRange(2, 0.0, 255.0, 255.0, inverted=True)
@@ -59,7 +70,7 @@ def test_values_beyond_the_range_are_clipped() -> None:
 
 
 def test_values_that_are_no_numbers_count_as_rest() -> None:
-    """NaN and infinity must not press a pedal."""
+    """Neither NaN nor infinity must not press a pedal."""
     assert normalize(raw(math.nan, math.inf, -math.inf), WHEEL) == (0.0, 0.0, 0.0, False)
 
 

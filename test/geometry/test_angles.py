@@ -1,13 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Angles are normalised to (-pi, pi] and mixed by the shortest way."""
 
 import math
 
+from crgame_ros.geometry.angles import interpolate_angle, wrap_pi, wrap_pi_array
 import numpy as np
 import pytest
-
-from crgame_ros.geometry.angles import interpolate_angle, wrap_pi, wrap_pi_array
 
 
 @pytest.mark.parametrize(('angle', 'wrapped'), [
@@ -47,7 +58,7 @@ def test_just_beyond_pi_does_not_reach_minus_pi() -> None:
 
 
 def test_absence_stays_absence() -> None:
-    """NaN stands for an absent object and must not become a direction."""
+    """A NaN stands for an absent object and must not become a direction."""
     wrapped = wrap_pi_array(np.array([math.nan, 4.0]))
     assert math.isnan(wrapped[0])
     assert wrapped[1] == pytest.approx(4.0 - 2.0 * math.pi)

@@ -1,20 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """From the command line to a checked run and its folder."""
 
+from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from pathlib import Path
 import socket
 
-import pytest
-
 from crgame_ros.errors import InputError
+from crgame_ros.game.game import HumanSpec
+from crgame_ros.game.game_file import load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, plan_run
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game import HumanSpec
-from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.setup import build_setup
+import pytest
 
 SCENARIOS = scenarios_directory()
 CUT_IN, TWO_AVS = SCENARIOS / 'cut_in.yaml', SCENARIOS / 'two_avs.yaml'
@@ -96,14 +108,25 @@ def test_folder_is_named_by_time_and_scenario(tmp_path: Path) -> None:
 
 
 def test_given_folder_is_used(tmp_path: Path) -> None:
-    """Also where it exists, as long as it holds no recording."""
+    """Also where it exists, as long as it holds no recording; else one beside it."""
     (tmp_path / 'mine').mkdir()
     plan = plan_run(RunRequest(CUT_IN, out=Path('mine')), noon)
     assert plan.folder == tmp_path / 'mine'
     assert plan.bag == tmp_path / 'mine' / 'bag'
-    plan.bag.mkdir()
-    with pytest.raises(InputError, match='holds a recording already; choose another folder'):
-        plan_run(RunRequest(CUT_IN, out=Path('mine')), noon)
+    for number in (2, 3):
+        plan.bag.mkdir()
+        plan = plan_run(RunRequest(CUT_IN, out=Path('mine')), noon)
+        assert plan.folder == tmp_path / f'mine_{number}'
+
+
+@pytest.mark.parametrize('out', [None, Path('mine')])
+def test_ten_starts_at_once_have_ten_folders(tmp_path: Path, out: Path | None) -> None:
+    """Also where the folder that they all name is there already."""
+    (tmp_path / 'mine').mkdir()
+    with ThreadPoolExecutor(10) as pool:
+        plans = list(pool.map(lambda _: plan_run(RunRequest(CUT_IN, out=out), noon), range(10)))
+    assert len({plan.folder for plan in plans}) == 10
+    assert all(plan.game_file.is_file() for plan in plans)
 
 
 def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A ROS node of the test's own that listens to a graph, steers it and speaks in it."""
 
 from collections import defaultdict
@@ -8,6 +20,10 @@ import time
 from types import TracebackType
 from typing import Any, Self
 
+from crgame_ros.game.documents import GameDocument, parse_game_document
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.timing.cycle_rows import CycleTable
 from diagnostic_msgs.msg import DiagnosticStatus
 from live_support import PATIENCE_S
 import numpy as np
@@ -20,11 +36,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
-
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_time
-from crgame_ros.simulation.documents import GameDocument, parse_game_document
-from crgame_ros.timing.cycle_rows import CycleTable
 
 QUEUE_DEPTH = 5000
 
@@ -140,10 +151,10 @@ class Peer:
                 if status.name == name]
 
     def forget(self) -> None:
-        """Forget everything heard but the documents."""
+        """Forget everything heard but what is said once and then holds."""
         self.listen()
         for name, messages in self.messages.items():
-            if not name.startswith('/scenario/'):
+            if not name.startswith('/scenario/') and name != '/seats':
                 messages.clear()
 
     def close(self) -> None:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A graph of real processes under the launcher, and what the tests of the live part share."""
 
 from collections.abc import Callable, Sequence
@@ -20,6 +32,8 @@ from worker_roles import own_domain_id
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / 'scenarios'
 CUT_IN = SCENARIOS / 'cut_in.yaml'
+# As the kernel names their processes, in 15 characters.
+NODES = {path.stem[:15] for path in (ROOT / 'crgame_ros' / 'nodes').glob('*_node.py')}
 # How long to wait for what will come [s]: many times what an idle machine takes.
 PATIENCE_S = 90.0
 _STARTED = re.compile(r'(\w+): process (\d+)')
@@ -36,11 +50,15 @@ def wait_until(condition: Callable[[], object], what: str, limit_s: float = PATI
 def is_node(pid: int) -> bool:
     """Tell whether a process is one of our nodes and runs."""
     try:
-        command = Path(f'/proc/{pid}/cmdline').read_bytes()
-        state = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
+        name = Path(f'/proc/{pid}/comm').read_text().strip()
+        return name in NODES and _state(pid) != 'Z'
     except OSError:
         return False
-    return b'crgame_ros.nodes.' in command and state != 'Z'
+
+
+def _state(pid: int) -> str:
+    """Give the state of a process, one letter as in proc(5)."""
+    return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
 
 
 class Launcher:
@@ -51,11 +69,12 @@ class Launcher:
     :param out: folder of the run; None leaves the choice to the launcher.
     :param cwd: where it is started.
     :param headless: without the cockpit.
+    :param domain: that of another run; one of its own if not given.
     """
 
     def __init__(self, arguments: Sequence[str | Path], out: Path | None = None,
-                 cwd: Path = ROOT, *, headless: bool = True) -> None:
-        self.domain = own_domain_id()
+                 cwd: Path = ROOT, *, headless: bool = True, domain: int | None = None) -> None:
+        self.domain = own_domain_id() if domain is None else domain
         self.out = out or cwd
         words = [*map(str, arguments), *(['--out', str(out)] if out else []),
                  *(['--headless'] if headless else [])]
@@ -125,8 +144,10 @@ class Launcher:
         os.kill(self.node(name), signal.SIGKILL)
 
     def freeze(self, name: str) -> None:
-        """Stop a node where it is."""
-        os.kill(self.node(name), signal.SIGSTOP)
+        """Stop a node where it is, and wait until it stands: on a busy machine that takes time."""
+        pid = self.node(name)
+        os.kill(pid, signal.SIGSTOP)
+        wait_until(lambda: _state(pid) == 'T', f'{name} to stand')
 
     def thaw(self, name: str) -> None:
         """Let a frozen node go on."""

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The cockpit of a running graph, seen from its WebSocket."""
 
 from collections.abc import Iterator
@@ -8,19 +20,17 @@ import os
 from pathlib import Path
 import signal
 import socket
-import time
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 import urllib.request
 
+from crgame_ros.ros.ros_messages import from_time
 from live_peer import Peer
 from live_support import Launcher, SCENARIOS, wait_until
 import numpy as np
 from page_client import PageClient, PLAN, STATE
 import pytest
 from steady_game import THROTTLE, write_steady_game
-
-from crgame_ros.ros.messages import from_time
 
 TOPICS = ('/clock', '/scenario/game', '/seats', '/timing/cycle', '/vehicles/state', '/trigger',
           '/diagnostics', ('/<v>/driver_command', 'hv0'), ('/<av>/plan', 'av0'))
@@ -292,8 +302,10 @@ def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
     graph.peer.wait_until(lambda: _commands(graph)[-1, 0] == 0.0, 'the throttle released')
     wait_until(lambda: sum('the cockpit is at' in line for line in graph.launcher.lines) > 1,
                'the address of the new one')
-    time.sleep(0.2)
     with PageClient(graph.launcher.page) as client:
+        # It hears of the graph's seats a moment after it serves.
+        wait_until(lambda: 'hv0' in client.documents.get('seats', {}).get('seats', {}),
+                   'the seats')
         assert client.seat('hv0')['source'] == 'cockpit' and client.seat('hv0')['holder'] is None
         assert client.request('claim', seat='hv0')['ok']
         assert client.request('release', seat='hv0')['ok']

@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Pause, step, reset, pace, another scenario and stop: the orders that a running graph takes."""
 
 from collections.abc import Iterator
 import time
 
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.recording.run_folder import bags_of, run_folder, run_folders
+from crgame_ros.ros.ros_messages import from_time, to_time
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS
 import numpy as np
 import pytest
-
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_folder import bags_of, run_folder, run_folders
-from crgame_ros.recording.run_log import read_cycles
-from crgame_ros.ros.messages import from_time, to_time
 
 pytestmark = pytest.mark.alone
 
@@ -193,7 +204,7 @@ def test_another_scenario_is_taken_at_the_next_reset(graph: tuple[Launcher, Peer
     _reset(peer)
     peer.forget()
     peer.wait_until(lambda: peer.n > 120, 'n = 120 in another scenario')
-    assert peer.games[-1].content['benchmark_id'] == OTHER_SCENARIO.removesuffix('.xml')
+    assert peer.games[-1].benchmark_id == OTHER_SCENARIO.removesuffix('.xml')
     assert peer.messages['/scenario/xml'][-1].data == (SCENARIOS / OTHER_SCENARIO).read_text()
     # The roundabout's AV begins with 8 m/s, the motorway's with 20 m/s.
     assert peer.states('av0')[0, 4] == pytest.approx(8.0, abs=0.5)

@@ -1,29 +1,41 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Perception and reactive traffic in their own processes: as offline, and when they fail."""
 
 from collections.abc import Iterator
 from pathlib import Path
 import re
 
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.joints import vehicles_from_joints
+from crgame_ros.perception.perception import Perception
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.simulation.av_models import make_perception
+from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.simulation.world_reader import WorldReader
+from crgame_ros.vehicle.state import VehicleState
 from live_peer import Peer
 from live_support import Launcher, SCENARIOS
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 import yaml
-
-from crgame_ros.perception.perception import Perception
-from crgame_ros.planner.joints import vehicles_from_joints
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.ros.messages import from_joint_trajectory, from_time
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.scenario.objects import ObjectStates
-from crgame_ros.scenario.signals import TrafficLights
-from crgame_ros.simulation.av_models import make_perception
-from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.simulation.world_reader import WorldReader
-from crgame_ros.vehicle.state import VehicleState
 
 pytestmark = pytest.mark.alone
 
@@ -113,7 +125,8 @@ def test_perception_perceives_the_same_in_its_process(recorded: Recorded) -> Non
                            n % STEPS_PER_TICK * 0.01)
         odometry = recorded.at('/av0/localization', n)
         if odometry is not None:
-            assert odometry.pose.pose.position.x == perception.estimate.x  # type: ignore[attr-defined]
+            place = odometry.pose.pose.position  # type: ignore[attr-defined]
+            assert place.x == perception.estimate.x
         true, told = (recorded.at(f'/av0/{name}_request', n) for name in ('true', 'plan'))
         if true is not None and told is not None:
             expected = perception.perceive(from_joint_trajectory(true, 'true'))

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Events in a running graph: triggers over DDS, planners that change, a recording that repeats."""
 
 from collections.abc import Iterator
@@ -7,22 +19,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from crgame_ros.game.documents import parse_events_document
+from crgame_ros.game.events import AtStep, FiredEvent
+from crgame_ros.game.game_file import load_game
+from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.recorded_inputs import recorded_inputs, with_replayed_events
+from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
 from live_peer import Peer
 from live_support import Launcher, SCENARIOS
 import numpy as np
 import pytest
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
-
-from crgame_ros.recording.run_events import read_run_events
-from crgame_ros.recording.run_log import read_run_log
-from crgame_ros.ros.messages import from_time
-from crgame_ros.scenario.events import AtStep, FiredEvent
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import parse_events_document
-from crgame_ros.simulation.offline import run_offline
-from crgame_ros.simulation.replay import recorded_inputs, with_replayed_events
-from crgame_ros.simulation.setup import build_setup
 
 CROSSING = SCENARIOS / 'crossing.yaml'
 TOPICS = ('/clock', '/scenario/game', '/scenario/events', '/traffic/objects', '/diagnostics',
@@ -40,7 +51,7 @@ class Stage(NamedTuple):
 
     @property
     def fired(self) -> tuple[FiredEvent, ...]:
-        """What has taken effect in the present epoch, as published last."""
+        """Give what has taken effect in the present epoch, as published last."""
         epoch, fired = parse_events_document(self.peer.messages['/scenario/events'][-1].data)
         assert epoch == self.peer.games[-1].epoch
         return fired

@@ -1,19 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Drivers, monitors, recorder and simulation are killed and frozen, and a disk fills up."""
 
+import os
 from pathlib import Path
 import resource
 
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.timing.cycle_rows import CycleTable
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, wait_until
 import numpy as np
 import pytest
 from steady_game import Run, STEP_NS, THROTTLE, TOPICS, write_steady_game
-
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.ros.messages import from_time
-from crgame_ros.timing.cycle_rows import CycleTable
 
 # Of the watchdog: CRG's release rate of pedals [1/s], the gentle brake, the silence allowed [s].
 RELEASE_RATE, GENTLE_BRAKE, SILENCE_S = 2.2, 0.15, 0.2
@@ -92,6 +104,28 @@ def test_monitor_and_supervisor_are_started_again(run: Run) -> None:
     assert np.array_equal(numbers, np.arange(numbers[0], numbers[0] + len(numbers)))
 
 
+def _computed_s(pid: int) -> float:
+    """Give the time that a process has computed for [s]."""
+    fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
+def test_who_takes_the_place_of_the_dead_has_everything_loaded(run: Run) -> None:
+    """Twice in a row, and of any node: it works after less computing than imports alone take."""
+    launcher, peer = run
+    for name, topic in (('planner_node_av0', '/<av>/plan'), ('planner_node_av0', '/<av>/plan'),
+                        ('drivability_node', '/<v>/drivability')):
+        killed = launcher.node(name)
+        launcher.kill(name)
+        wait_until(lambda name=name, killed=killed: launcher.node(name) != killed,
+                   f'another start of {name}')
+        peer.forget()
+        peer.wait_until(lambda topic=topic: peer.messages[topic], f'{topic} of the successor')
+        successor = launcher.node(name)
+        assert _computed_s(successor) < 1.0
+        assert Path(f'/proc/{successor}/comm').read_text().strip() == name.partition('_av')[0][:15]
+
+
 def _recorded_steps(bag: Path, offset_ns: int) -> list[int]:
     """Give the steps of /vehicles/state in a recording, in its order."""
     with BagReader(bag) as reader:
@@ -101,7 +135,7 @@ def _recorded_steps(bag: Path, offset_ns: int) -> list[int]:
 
 def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
     """
-    Killed, it loses no more than its last second, and continues in another folder.
+    Killed, it loses no more than its last moments, and continues in another folder.
 
     There its disk fills up: that is an error on /diagnostics, and the driving goes on. At the end
     both recordings are finished files, and the run has its scenario.
@@ -114,9 +148,9 @@ def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
         launcher.kill('recorder_node')
         offset_ns = peer.games[-1].scheduler.clock_offset_ns
         steps = _recorded_steps(tmp_path / 'run' / 'bag', offset_ns)
-        # It hands over every 0.9 s what it has; 0.4 s more for a machine that is busy.
+        # It hands over every 0.4 s what it has; 0.4 s more for a machine that is busy.
         assert steps == list(range(len(steps)))
-        assert steps[-1] > killed_n - 130
+        assert steps[-1] > killed_n - 80
         launcher.wait_for('recording into .*bag_part2')
         part = tmp_path / 'run' / 'bag_part2'
         file = part / 'bag_part2_0.mcap'
@@ -126,6 +160,7 @@ def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
         healthy = peer.statuses('recorder_node: recording')[-1]
         assert healthy[0].level == healthy[0].OK and int(healthy[1]['bytes']) > 0
         resource.prlimit(launcher.node('recorder_node'), resource.RLIMIT_FSIZE, (limit, limit))
+
         def failures() -> list[str]:
             return [status.message for status, _ in peer.statuses('recorder_node: recording')
                     if status.level == status.ERROR]
@@ -144,6 +179,7 @@ def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
     assert (tmp_path / 'run' / 'C-ZAM_CutIn-1_1_T-1.xml').is_file()
 
 
+@pytest.mark.alone
 def test_killed_simulation_ends_the_run(tmp_path: Path) -> None:
     """The launcher says so and fails; everything that was published by then is recorded."""
     with Launcher([CUT_IN], tmp_path / 'run') as launcher, Peer(launcher.domain, *TOPICS) as peer:

@@ -1,9 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Planners freeze, die and lie: the AV keeps to its last good plan, and brakes where it ends."""
 
 from collections.abc import Callable
 
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.joints import plan_from_joints, plan_to_joints
+from crgame_ros.messages.plan import Plan
+from crgame_ros.ros.ros_messages import from_time, to_joint_trajectory
+from crgame_ros.vehicle.state import VehicleState
 from live_peer import Peer
 from live_support import wait_until
 import numpy as np
@@ -12,11 +29,6 @@ import pytest
 from rclpy.publisher import Publisher
 from steady_game import Run, STEP_NS, STEP_S
 from trajectory_msgs.msg import JointTrajectory
-
-from crgame_ros.planner.interface import Plan
-from crgame_ros.planner.joints import plan_from_joints, plan_to_joints
-from crgame_ros.ros.messages import from_joint_trajectory, from_time, to_joint_trajectory
-from crgame_ros.vehicle.state import VehicleState
 
 TICK_NS, STEPS_PER_TICK = 100_000_000, 10
 # Deceleration of an AV whose plan is used up [m/s^2].
@@ -80,7 +92,8 @@ def test_av_follows_its_last_plan_and_brakes_while_the_planner_is_frozen(run: Ru
     launcher.thaw('planner_node_av0')
     peer.wait_until(lambda: int(run.counters()['accepted']) > accepted, 'new plans')
     peer.wait_until(lambda: not _stands(peer, 'av0'), 'av0 on its way again')
-    assert peer.statuses('sim_node: av0 plans')[-1][0].message == 'following its plan'
+    peer.wait_until(lambda: peer.statuses('sim_node: av0 plans')[-1][0].message
+                    == 'following its plan', 'word of that')
 
 
 def test_killed_planner_is_started_again_and_used(run: Run) -> None:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A recorded human again: offline to the last bit, and live against another planner."""
 
 from collections.abc import Iterator
@@ -9,22 +21,21 @@ from pathlib import Path
 import subprocess
 import sys
 
+from crgame_ros.game.game_file import load_game
+from crgame_ros.messages.joints import vehicle_to_joints
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.recording.run_folder import run_folder
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.vehicle.state import VehicleState
 from live_peer import Peer
 from live_support import CUT_IN, Launcher
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-
-from crgame_ros.planner.joints import vehicle_to_joints
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_folder import run_folder
-from crgame_ros.recording.run_log import read_cycles
-from crgame_ros.ros.messages import from_time
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.replay import recorded_inputs
-from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.vehicle.state import VehicleState
 
 pytestmark = pytest.mark.alone
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whole runs from the command line: outputs, exit codes, every way to end, bad input."""
 
 from collections.abc import Iterator
@@ -11,17 +23,16 @@ import signal
 import commonroad
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.scenario.obstacle import DynamicObstacle
+from crgame_ros.game.game_file import load_game
+from crgame_ros.recording.metadata import read_metadata
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.timing.cycle_rows import CycleTable
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS, wait_until
 from lxml import etree
 import numpy as np
 import pytest
-
-from crgame_ros.recording.metadata import read_metadata
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import read_cycles
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.timing.cycle_rows import CycleTable
 
 DURATION_S = 3.5
 STEPS = 350
@@ -98,6 +109,30 @@ def test_the_timing_report_has_table_one(finished: Launcher) -> None:
     assert 0 < plans['accepted'] <= STEPS // STEPS_PER_TICK + 1
     assert plans['refused'] == 0
     assert plans['latency_ms']['p50'] > 0.0
+
+
+def test_every_status_has_the_time_of_the_run_and_an_owner(finished: Launcher) -> None:
+    """All nodes stamp their diagnostics with simulation time, and sign them with their name."""
+    stamps: dict[str, list[int]] = {}
+    owners: dict[str, set[str]] = {}
+    with BagReader(finished.out / 'bag') as reader:
+        clock = [item.message.clock for item in reader.decoded(['/clock'])]
+        for item in reader.decoded(['/diagnostics', '/hv0/drivability', '/av0/drivability']):
+            stamp = item.message.header.stamp
+            for status in item.message.status:
+                owners.setdefault(status.hardware_id, set()).add(status.name)
+                stamps.setdefault(status.name, []).append(
+                    stamp.sec * 1_000_000_000 + stamp.nanosec)
+    assert {'/sim_node', '/planner_node_av0', '/recorder_node', '/drivability_node',
+            '/timesync_node'} <= owners.keys() <= {f'/{name}' for name in NODES}
+    assert all(owner.split('/')[1].startswith(name.partition(':')[0].partition('_node')[0])
+               for owner, names in owners.items() for name in names if ':' in name)
+    first_ns, last_ns = (value.sec * 1_000_000_000 + value.nanosec
+                         for value in (clock[0], clock[-1]))
+    assert last_ns - first_ns == STEPS * STEP_NS
+    for name, found in stamps.items():
+        assert first_ns <= min(found) and max(found) <= last_ns, name
+        assert found == sorted(found), name
 
 
 def test_no_step_is_missing_in_the_recording(finished: Launcher) -> None:

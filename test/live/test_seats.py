@@ -1,10 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Seats in a running graph: taken from the script, from the planner, and given back."""
 
 from collections.abc import Callable, Iterator
 import json
 
+from crgame_ros.ros.ros_messages import from_time, to_joy
+from crgame_ros.vehicle.driver_command import DriverCommand
 from live_peer import Peer
 from live_support import Launcher
 import numpy as np
@@ -14,9 +28,6 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from steady_game import THROTTLE, write_steady_game
 
-from crgame_ros.driver.command import DriverCommand
-from crgame_ros.ros.messages import from_time, to_joy
-
 TOPICS = ('/clock', '/scenario/game', '/seats', '/timing/cycle', '/vehicles/state',
           '/diagnostics', ('/<v>/driver_command', 'hv0'), ('/<av>/plan_request', 'av0'))
 # float32 represents it exactly.
@@ -24,8 +35,8 @@ BRAKE = DriverCommand(brake=0.25)
 
 
 @pytest.fixture(scope='module')
-def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
-    """Keep one graph; every test leaves the seats as it found them."""
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
+    """Keep one graph."""
     folder = tmp_path_factory.mktemp('seats')
     with Launcher([write_steady_game(folder)], folder / 'run') as launcher, \
             Peer(launcher.domain, *TOPICS) as peer:
@@ -33,8 +44,18 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
         yield peer
 
 
+@pytest.fixture
+def peer(running: Peer) -> Iterator[Peer]:
+    """Leave the seats as every test finds them, also if it fails."""
+    yield running
+    for seat, own in (('hv0', 'game'), ('av0', 'planner')):
+        if _seats(running)[seat]['source'] != own:
+            Taker(running, seat).order('game', own)
+
+
 def _seats(peer: Peer) -> dict[str, dict[str, str]]:
     """Give what /seats says now."""
+    peer.listen()
     return json.loads(peer.messages['/seats'][-1].data) if peer.messages['/seats'] else {}
 
 
@@ -58,8 +79,9 @@ class Taker:
              source: str = 'tester') -> None:
         """Repeat a command until something holds."""
         def send() -> object:
-            stamp_ns = self.peer.clock_ns[-1]
-            self._commands.publish(to_joy(command, stamp_ns, source))
+            # None right after `forget`.
+            for stamp_ns in self.peer.clock_ns[-1:]:
+                self._commands.publish(to_joy(command, stamp_ns, source))
             return until()
         self.peer.wait_until(send, what)
 
@@ -84,8 +106,12 @@ def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
     taker.order('tester', 'tester')
     taker.hold(BRAKE, lambda: _last(taker, 1, 0.25), 'the brake of the one who has the seat')
     peer.forget()
-    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 50, 'fifty cycles')
-    assert np.all(taker.consumed()[5:, :2] == (0.0, 0.25))
+    # On a busy machine the test may pause for longer than a driver may be silent.
+    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 50
+               and np.all(taker.consumed()[-50:, :2] == (0.0, 0.25)),
+               'fifty cycles of nothing but that brake')
+    # Neither the script's pedal nor anybody else's, ever.
+    assert np.all(taker.consumed()[5:, 0] == 0.0)
     spoken = [message.header.frame_id for message in peer.messages['/<v>/driver_command']]
     assert 'game' not in spoken[10:]
     taker.order('game', 'game')
@@ -171,7 +197,7 @@ def test_planner_stop_and_go(peer: Peer) -> None:
     peer.wait_until(lambda: peer.n > n + 100, 'seven ticks')
     assert not peer.messages['/<av>/plan_request']
     peer.wait_until(lambda: peer.statuses('sim_node: av0 plans')[-1:]
-                    and peer.statuses('sim_node: av0 plans')[-1][1]['running'] == 'False',
+                    and peer.statuses('sim_node: av0 plans')[-1][1]['running'] == 'false',
                     'a report that the planner is stopped')
     order(True)
     peer.wait_until(lambda: len(peer.messages['/<av>/plan_request']) > 3, 'requests again')

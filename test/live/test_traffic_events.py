@@ -1,27 +1,42 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Events that change agents, in their own process: the bits of offline, and after a restart."""
 
 from pathlib import Path
 
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
 from live_peer import Peer
 from live_support import Launcher, SCENARIOS
 import numpy as np
 from numpy.typing import NDArray
+import pytest
 from std_msgs.msg import String
 import yaml
 
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_events import read_run_events
-from crgame_ros.ros.messages import from_time
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.offline import run_offline
-from crgame_ros.simulation.replay import with_recorded_events
-from crgame_ros.simulation.setup import build_setup
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
+pytestmark = pytest.mark.alone
 
 # Seconds after the start at which somebody presses the button, and traffic_node is killed.
 PRESSED_S, KILLED_S = 2.5, 6.0
+RESUMED = 'going on at k'
 CRAWL = 3.0
 
 
@@ -70,10 +85,16 @@ def test_agents_obey_events_to_the_same_bits_and_after_a_restart(tmp_path: Path)
         peer.wait_until(lambda: peer.n > 100 * PRESSED_S, 'some seconds')
         peer.publisher('/trigger').publish(String(data='crawl'))
         peer.wait_until(lambda: peer.n > 100 * KILLED_S, 'some seconds more')
+        # It may have said so before: on a busy machine it is late at the start of a run.
+        times = launcher.text.count(RESUMED)
         launcher.kill('traffic_node')
-        launcher.wait_for('going on at k')
-        back = peer.n
-        peer.wait_until(lambda: peer.n > back + 300, '3 s with the new one')
+        peer.wait_until(lambda: launcher.text.count(RESUMED) > times, 'agents that go on')
+        back, times = peer.n, launcher.text.count(RESUMED)
+        while peer.n <= back + 300:
+            peer.listen_for(0.1)
+            if launcher.text.count(RESUMED) > times:
+                # On a busy machine it was late, and stood again.
+                back, times = peer.n, launcher.text.count(RESUMED)
         assert peer.call('/sim/stop').success
         assert launcher.wait() == 0, launcher.text
     bag = tmp_path / 'run' / 'run_2' / 'bag'
@@ -100,4 +121,4 @@ def test_agents_obey_events_to_the_same_bits_and_after_a_restart(tmp_path: Path)
     # Without the event they would be at 4.5 m/s, 3 s after the stand of who hears nothing.
     last = np.hypot(*agents[max(agents)][1][:, :2].T)
     assert max(agents) >= (back + 290) // 10
-    assert CRAWL - 1.0 < np.nanmax(last) < CRAWL + 0.1
+    assert CRAWL - 1.0 < np.nanmax(last) < CRAWL + 0.7

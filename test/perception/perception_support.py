@@ -1,29 +1,40 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Vehicles on known courses, small worlds and requests that the tests of perception share."""
 
 from collections.abc import Sequence
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.perception_spec import LocalisationSpec, PerceptionSpec, SensorSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.perception.localisation import Localisation
-from crgame_ros.perception.perception import Perception
-from crgame_ros.perception.spec import LocalisationSpec, PerceptionSpec, SensorSpec
-from crgame_ros.planner.joints import (
+from crgame_ros.messages.joints import (
     JointSeries,
     object_joint_names,
     vehicle_joint_names,
     vehicle_to_joints,
 )
-from crgame_ros.scenario.objects import ObjectDescription, Role
+from crgame_ros.perception.localisation import Localisation
+from crgame_ros.perception.perception import Perception
 from crgame_ros.vehicle.kinematic_single_track import integrate
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 DT = 0.01
@@ -100,11 +111,11 @@ class World:
         return self.course[n] if self.course else VehicleState(0.0, 0.0, 0.0, 0.0)
 
     def states(self, n: int) -> Array:
-        """Give the states (V, 8) of the driven vehicles."""
+        """Give the (V, 8) states of the driven vehicles."""
         return np.array([*([self.human] if self.human else []), self.ego(n)])
 
     def poses(self, n: int) -> Array:
-        """Give the true centre poses (M, 3) of the objects."""
+        """Give the true (M, 3) centre poses of the objects."""
         return self.start + DT * n * self.velocities
 
     def observe(self, n: int) -> None:
@@ -145,6 +156,10 @@ class World:
     def perceived(self, n: int, name: str) -> tuple[Array, Array]:
         """Give the poses and velocities, each (P, 3), at which a request shows a thing."""
         request = self.perception.perceive(self.request(n))
+        if f'{name}/x' not in request.names:
+            # It is left out where nobody knows of it.
+            nowhere = np.full((len(request.times_ns), 3), np.nan)
+            return nowhere, nowhere
         first = request.names.index(f'{name}/x')
         return request.positions[:, first:first + 3], request.velocities[:, first:first + 3]
 

@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Noise, bias and the Kalman filter (FS II-B1): is its covariance that of its errors?"""
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Noise, bias and the Kalman filter (FS II-B1), whose covariance is that of its errors."""
 
 import math
 
+from crgame_ros.game.perception_spec import LocalisationSpec
+from crgame_ros.perception.localisation import Localisation
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 from perception_support import DT, localise, straight, winding
 import pytest
 from scipy import linalg, stats
-
-from crgame_ros.perception.localisation import Localisation
-from crgame_ros.perception.spec import LocalisationSpec
-from crgame_ros.vehicle.state import VehicleState
 
 RUNS = 60
 

@@ -1,11 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What an AV is told of the world: occlusion, memory, latency, noise and coordinates (FS II-B)."""
 
 from dataclasses import replace
 import math
 from typing import Any
 
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.perception_spec import LocalisationSpec, SensorSpec
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.messages.joints import vehicles_from_joints
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.perception.perception import Perception
+from crgame_ros.perception.sensors import PERMANENT
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from perception_support import (
     CAR,
@@ -20,16 +41,6 @@ from perception_support import (
 )
 import pytest
 from scipy import stats
-
-from crgame_ros.errors import InputError
-from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.perception.perception import Perception
-from crgame_ros.perception.sensors import PERMANENT
-from crgame_ros.perception.spec import LocalisationSpec, SensorSpec
-from crgame_ros.planner.joints import vehicles_from_joints
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.occupancy import OccupancyGrid
-from crgame_ros.vehicle.state import VehicleState
 
 FRONT = SensorSpec('front', **EXACT)
 ALL_ROUND = SensorSpec('roof', x=1.0, field_of_view=2 * math.pi, rays=720, **EXACT)

@@ -1,17 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The examples of docs/perception.md do what the page says."""
 
 import math
 from pathlib import Path
 import re
 
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.schema.reading import read
+from crgame_ros.schema.writing import write
 from perception_support import CAR, VAN, World
 import pytest
 import yaml
-
-from crgame_ros.perception.spec import parse_perception, perception_entry, PerceptionSpec
-from crgame_ros.scenario.objects import ObjectDescription, Role
 
 
 def examples(root: Path, language: str) -> list[str]:
@@ -24,13 +37,13 @@ def examples(root: Path, language: str) -> list[str]:
 def test_written_defaults_are_the_defaults(project_root: Path, tmp_path: Path) -> None:
     """Every key of the specification is there, with its default value."""
     values = yaml.safe_load(examples(project_root, 'yaml')[1])['perception']
-    said = perception_entry(parse_perception(values, 'docs/perception.md', tmp_path))
-    sensor = perception_entry(PerceptionSpec())['sensors'][0]
+    said = write(read(PerceptionSpec, values, 'docs/perception.md', tmp_path))
+    sensor = write(PerceptionSpec())['sensors'][0]
     assert said['sensors'][0].pop('field_of_view') == pytest.approx(
         sensor.pop('field_of_view'), abs=1e-3)
     assert said['sensors'][0] == sensor
     assert values['sensors'][0].keys() == {*sensor, 'field_of_view'}
-    expected = perception_entry(PerceptionSpec())
+    expected = write(PerceptionSpec())
     for key in ('localisation', 'memory', 'seed'):
         assert said[key] == expected[key]
     assert values['localisation'].keys() == expected['localisation'].keys()
@@ -39,7 +52,8 @@ def test_written_defaults_are_the_defaults(project_root: Path, tmp_path: Path) -
 def test_the_sensor_of_the_page_works(project_root: Path, tmp_path: Path) -> None:
     """Within its reach of 100 m and its field of view it sees a car, else nothing."""
     (tmp_path / 'radar.py').write_text(examples(project_root, 'python')[0])
-    spec = parse_perception(yaml.safe_load(examples(project_root, 'yaml')[2]), 'page', tmp_path)
+    spec = read(PerceptionSpec, yaml.safe_load(examples(project_root, 'yaml')[2]),
+                'page', tmp_path)
     behind = ObjectDescription('o9', 'car', Role.RECORDED, CAR.shape)
     world = World([(CAR, (90.0, 5.0, 0.0), (0.0, 0.0, 0.0)),
                    (VAN, (120.0, 0.0, 0.0), (0.0, 0.0, 0.0)),

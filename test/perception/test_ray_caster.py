@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Line tracing (FS II-B2) against shapely, which knows nothing of sectors."""
 
 import math
 from typing import Any
 
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.perception_spec import SensorSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.perception.bodies import SensedBodies
+from crgame_ros.perception.ray_caster import RayCaster
+from crgame_ros.perception.sensors import NOTHING, PERMANENT, Scan
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 import shapely
 from shapely import affinity
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.perception.bodies import Bodies
-from crgame_ros.perception.ray_caster import RayCaster
-from crgame_ros.perception.sensors import NOTHING, PERMANENT, Scan
-from crgame_ros.perception.spec import SensorSpec
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.occupancy import OccupancyGrid
 
 Array = NDArray[np.float64]
 FULL = 2.0 * math.pi
@@ -28,9 +39,9 @@ KINDS = {'rectangles': [Shape.rectangle(4.5, 1.8)], 'circles': [Shape.circle(0.3
          'all': [Shape.rectangle(12.0, 2.5), Shape.circle(1.0), ARROW]}
 
 
-def bodies_of(shapes: list[Shape], poses: Any) -> Bodies:
-    bodies = Bodies([ObjectDescription(f'o{i}', 'car', Role.RECORDED, shape)
-                     for i, shape in enumerate(shapes)])
+def bodies_of(shapes: list[Shape], poses: Any) -> SensedBodies:
+    bodies = SensedBodies([ObjectDescription(f'o{i}', 'car', Role.RECORDED, shape)
+                           for i, shape in enumerate(shapes)])
     bodies.place(np.array(poses, dtype=float).reshape(-1, 3))
     return bodies
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Roads, requests and closed loops that the tests of the planners share."""
 
 from collections.abc import Callable
@@ -11,17 +23,17 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import CustomState, InitialState
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.interface import Planner, PlannerContext
+from crgame_ros.planner.path_planner import initial_state
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
-from crgame_ros.planner.path_planner import initial_state
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.vehicle.parameters import load_vehicle_parameters
-from crgame_ros.vehicle.state import VehicleState
 
 Array = NDArray[np.float64]
 DT = 0.1

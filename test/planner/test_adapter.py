@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The adapter: whatever a planner does wrong becomes a counted braking plan."""
 
 from collections.abc import Callable
@@ -8,18 +20,18 @@ from itertools import count
 from typing import ClassVar
 
 from commonroad.scenario.scenario import Scenario
-import numpy as np
-import planner_support as support
-import pytest
-
 from crgame_ros.errors import CrgameError, PlanningError
+from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.adapter import PlannerAdapter
 from crgame_ros.planner.braking import braking_plan
 from crgame_ros.planner.idm import IdmPlanner
-from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import planner_support as support
+import pytest
 
 EGO = VehicleState(0.0, 0.0, 0.0, 10.0, 0.05, 0.3, 0.19, 0.0)
 Answer = Callable[[PlanRequest], Plan]

@@ -1,21 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The planners of one AV: who is in office, on which roads, after which events."""
 
 from dataclasses import replace
 from typing import ClassVar
 
-import pytest
-
 from crgame_ros.errors import InputError, PlanningError
+from crgame_ros.game.events import EventSpec, PlannerSwap, SpeedLimit
+from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.crew import PlannerCrew
-from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
+from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.path_planner import initial_state
-from crgame_ros.scenario.events import EventSpec, PlannerSwap, SpeedLimit
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
+import pytest
 
 TOWN = 50.0 / 3.6
 SLOW = EventSpec('slow', SpeedLimit(5.0))

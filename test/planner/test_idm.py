@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The IDM planner against the model's closed forms and in closed loops."""
 
 import math
-
-import numpy as np
-import planner_support as support
-import pytest
 
 from crgame_ros.errors import InputError
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import planner_support as support
+import pytest
 
 V0, HEADWAY, S0, A, B = 20.0, 1.5, 2.0, 1.5, 2.0
 

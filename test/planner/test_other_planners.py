@@ -1,21 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The planners of the CommonRoad packages and the constant-velocity planner in closed loops."""
 
 import logging
 import math
 
+from crgame_ros.errors import PlanningError
+from crgame_ros.messages.plan import Plan
+from crgame_ros.planner.adapter import PlannerAdapter
+from crgame_ros.planner.interface import Planner
+from crgame_ros.planner.plan_check import check_plan
+from crgame_ros.planner.planner_registry import create_planner
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import planner_support as support
 import pytest
-
-from crgame_ros.errors import PlanningError
-from crgame_ros.planner.adapter import PlannerAdapter
-from crgame_ros.planner.interface import Plan, Planner
-from crgame_ros.planner.plan_check import check_plan
-from crgame_ros.planner.registry import create_planner
-from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import VehicleState
 
 
 def ready(name: str, speed: float = 10.0, count: int = 1, length: float = 2000.0,

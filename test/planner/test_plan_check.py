@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Each ground for refusing a plan, and that plans within the limits pass."""
 
 import dataclasses
 import math
 
-import numpy as np
-import planner_support as support
-import pytest
-
-from crgame_ros.planner.interface import Plan
+from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.plan_check import check_plan, PlanTolerances
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import StateColumn, VehicleState
+import numpy as np
+import planner_support as support
+import pytest
 
 STAMP = 500
 
@@ -50,6 +61,8 @@ def test_a_circle_within_the_limits_passes(vehicle: VehicleParameters) -> None:
     (0, StateColumn.SPEED, 1.5, 'off the speed'),
     (9, StateColumn.YAW, math.nan, 'yaw of state 9 is nan'),
     (9, StateColumn.ACCELERATION, math.inf, 'acceleration of state 9 is inf'),
+    (9, StateColumn.YAW, 1.7e308, 'yaw of state 9 is 1.7e+308'),
+    (9, StateColumn.YAW_RATE, -1e12, 'yaw_rate of state 9 is -1e+12'),
     (9, StateColumn.SPEED, 101.6, 'speed of'),
     (9, StateColumn.SPEED, -40.0, 'speed in reverse'),
     (9, StateColumn.SPEED, 2.0, 'acceleration of'),
@@ -63,6 +76,19 @@ def test_each_fault_is_refused(row: int, column: StateColumn, change: float, rea
     plan.states[row, column] += change
     found = verdict(plan, vehicle)
     assert found is not None and reason in found
+
+
+def test_no_jump_hides_behind_a_heading_beyond_all_measure(vehicle: VehicleParameters) -> None:
+    """Differences of such headings are no numbers, with which no comparison says too much."""
+    plan = turning(10.0, 0.02, vehicle)
+    plan.states[5:, 0] += 500.0
+    plan.states[4, 2], plan.states[5, 2] = 1.7e308, -1.7e308
+    assert verdict(plan, vehicle) is not None
+
+
+def test_a_plan_has_a_largest_length(vehicle: VehicleParameters) -> None:
+    states = np.repeat(turning(10.0, 0.02, vehicle).states[:1], 3001, axis=0)
+    assert 'too many' in str(verdict(Plan(STAMP, states), vehicle))
 
 
 def test_wrong_stamp_and_single_state_are_refused(vehicle: VehicleParameters) -> None:

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Finding planners and checking their options; the example of the documentation runs."""
 
 from importlib.metadata import EntryPoint
@@ -7,44 +19,43 @@ import inspect
 from pathlib import Path
 import re
 
-import planner_support as support
-import pytest
-
 from crgame_ros.errors import InputError
-from crgame_ros.planner import registry
+from crgame_ros.planner import planner_registry
 from crgame_ros.planner.adapter import PlannerAdapter
 from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+import planner_support as support
+import pytest
 
 DOCUMENT = Path(__file__).resolve().parents[2] / 'docs' / 'planners.md'
 
 
 def test_names_begin_with_the_built_in_ones() -> None:
-    assert registry.planner_names()[:5] == ('idm', 'idm-package', 'reactive',
-                                            'reactive-package', 'constant-velocity')
+    assert planner_registry.planner_names()[:5] == (
+        'idm', 'idm-package', 'reactive', 'reactive-package', 'constant-velocity')
 
 
 @pytest.mark.parametrize('name', ['idm', 'crgame_ros.planner.idm:IdmPlanner'])
 def test_planners_by_name_and_by_module(name: str) -> None:
-    made = registry.create_planner(name, {'time_headway': 2})
+    made = planner_registry.create_planner(name, {'time_headway': 2})
     assert isinstance(made, IdmPlanner)
     assert made._model.time_headway == 2.0
 
 
-@pytest.mark.parametrize('name', registry.BUILT_IN)
+@pytest.mark.parametrize('name', planner_registry.BUILT_IN)
 def test_every_built_in_planner_can_be_made(name: str) -> None:
-    assert registry.create_planner(name).name == name
+    assert planner_registry.create_planner(name).name == name
 
 
 def test_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint('steady', 'crgame_ros.planner.constant_velocity:ConstantVelocityPlanner',
-                       registry.PLANNERS.entry_point_group)
+                       planner_registry.PLANNERS.entry_point_group)
     monkeypatch.setattr('crgame_ros.registry.entry_points', lambda group: [point])
-    assert 'steady' in registry.planner_names()
-    assert isinstance(registry.create_planner('steady'), ConstantVelocityPlanner)
+    assert 'steady' in planner_registry.planner_names()
+    assert isinstance(planner_registry.create_planner('steady'), ConstantVelocityPlanner)
 
 
 @pytest.mark.parametrize(('name', 'message'), [
@@ -58,7 +69,7 @@ def test_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
 ])
 def test_unusable_names_are_refused(name: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        registry.create_planner(name)
+        planner_registry.create_planner(name)
 
 
 @pytest.mark.parametrize(('options', 'message'), [
@@ -70,20 +81,20 @@ def test_unusable_names_are_refused(name: str, message: str) -> None:
 ])
 def test_wrong_options_are_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=re.escape(message)) as caught:
-        registry.create_planner('idm', options)
+        planner_registry.create_planner('idm', options)
     assert 'planner idm' in str(caught.value)
 
 
 def test_a_choice_is_checked() -> None:
     with pytest.raises(InputError, match="give 'lane' or 'straight'"):
-        registry.create_planner('constant-velocity', {'path': 'left'})
+        planner_registry.create_planner('constant-velocity', {'path': 'left'})
 
 
 def test_a_broken_file_is_one_line(tmp_path: Path) -> None:
     file = tmp_path / 'broken.py'
     file.write_text('import nothing_of_that_name\n', encoding='utf-8')
     with pytest.raises(InputError, match='ModuleNotFoundError') as caught:
-        registry.create_planner(f'{file}:Broken')
+        planner_registry.create_planner(f'{file}:Broken')
     assert '\n' not in str(caught.value)
 
 
@@ -92,7 +103,7 @@ def test_the_documented_example_plans(tmp_path: Path, vehicle: VehicleParameters
     assert code is not None
     file = tmp_path / 'stop_and_go.py'
     file.write_text(code[1], encoding='utf-8')
-    adapter = PlannerAdapter(registry.create_planner(f'{file}:StopAndGo', {'speed': 6.0}))
+    adapter = PlannerAdapter(planner_registry.create_planner(f'{file}:StopAndGo', {'speed': 6.0}))
     adapter.setup(support.context(support.plain(), support.problem(5.0)))
     ego = VehicleState(0.0, 0.0, 0.3, 5.0, 0.05)
     for obstacles, expected in (((), 6.0), (((15.0, 4.6, 0.0, 0.0),), 0.0)):
@@ -105,8 +116,8 @@ def test_the_documented_example_plans(tmp_path: Path, vehicle: VehicleParameters
 
 def test_the_document_lists_every_planner_and_option() -> None:
     text = DOCUMENT.read_text(encoding='utf-8')
-    for name in registry.BUILT_IN:
+    for name in planner_registry.BUILT_IN:
         row = next(line for line in text.splitlines() if line.startswith(f'| `{name}`'))
-        kind = registry.planner_class(name)
+        kind = planner_registry.planner_class(name)
         for option in inspect.signature(kind).parameters:
             assert f'`{option}`' in row

@@ -1,21 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Routes and reference paths, on roads of known shape and on real maps."""
 
 import math
 from pathlib import Path
 
 from commonroad.geometry.shape import Rectangle
+from crgame_ros.errors import PlanningError
+from crgame_ros.planner.reference_path import plan_driving_path
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.route import find_route, goal_lanelets
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import planner_support as support
 import pytest
-
-from crgame_ros.errors import PlanningError
-from crgame_ros.planner.reference_path import plan_driving_path
-from crgame_ros.planner.route import find_route, goal_lanelets
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import VehicleState
 
 
 def two_lanes(length: float = 300.0) -> support.Scenario:

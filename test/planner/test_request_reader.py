@@ -1,25 +1,36 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A planner's view of a request: who is where, as centres."""
 
 from dataclasses import replace
 import math
 
-import numpy as np
-import pytest
-
 from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.planner.joints import (
+from crgame_ros.messages.joints import (
     JointSeries,
     object_joint_names,
     vehicle_joint_names,
     vehicle_to_joints,
 )
 from crgame_ros.planner.request_reader import RequestReader
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.timing.scenario_scheduler import ScenarioScheduler
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import pytest
 
 REACH = 1.4227
 BODY = Shape.rectangle(4.5, 1.6)

@@ -1,31 +1,48 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Messages and whole runs to record, serialised by a library that is not under test."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+import sys
 from typing import Any
 
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.game.documents import events_document, objects_document
+from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.metadata import TopicQos
+from crgame_ros.recording.writer import BagWriter
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.timing.cycle_rows import CycleRows
+from crgame_ros.timing.time_controller import Cycle
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
 
-from crgame_ros.driver.command import DriverCommand
-from crgame_ros.driver.replay import ReplayDriver
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
-from crgame_ros.recording.metadata import TopicQos
-from crgame_ros.recording.writer import BagWriter
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
-from crgame_ros.simulation.documents import events_document, game_document, objects_document
-from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.setup import build_setup
-from crgame_ros.timing.cycle_rows import CycleRows
-from crgame_ros.timing.time_controller import Cycle
-from crgame_ros.vehicle.state import VehicleState
+sys.path.insert(0, str(Path(__file__).parent))
+
+from export_runs import ExportRuns  # noqa: E402, I100 - importable from here on
 
 TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 CYCLE_LABEL = 'epoch,n,k,e_n'
@@ -127,11 +144,13 @@ class RunRecorder:
 
     def messages(self, result: OfflineResult, *, epoch: int = 0, offset_ns: int = 0,
                  log_ns: int = 1_700_000_000_000_000_000,
-                 intervals_s: Any = None) -> list[tuple[str, str, int, bytes]]:
+                 intervals_s: Any = None, tick_states: bool = False,
+                 ) -> list[tuple[str, str, int, bytes]]:
         """
         Write a run as (topic, type, log time, data), logged 1 ms after its stamps and `log_ns`.
 
         :param intervals_s: Delta t_eff of each step, the nominal step where None.
+        :param tick_states: write the topic that only `ros2 bag record -a` records.
         """
         setup = result.setup
         scheduler = replace(setup.scheduler, clock_offset_ns=offset_ns)
@@ -149,6 +168,9 @@ class RunRecorder:
         humans = [human.id for human in setup.humans]
         rows = CycleRows(humans, 1)
         self.rows = np.zeros((len(result.vehicle_states), len(rows.columns)))
+        # With every interval as it was measured, their sum is ahead of n dt by the lag.
+        lags_s = np.zeros(len(self.rows)) if intervals_s is None else np.concatenate(
+            ([0.0], np.cumsum(intervals_s - scheduler.dt_s)))
         for n, states in enumerate(result.vehicle_states):
             stamp_ns = scheduler.stamp_ns(n)
             at_ns = log_ns + stamp_ns - offset_ns + 1_000_000
@@ -159,11 +181,14 @@ class RunRecorder:
                     stamp_ns, others, poses, result.object_velocities[row],
                     np.full_like(poses, np.nan))))
             joints = np.array([vehicle_to_joints(VehicleState(*state)) for state in states])
-            found.append(('/vehicles/state', TRAJECTORY, at_ns, self.joints(
-                stamp_ns, names, joints[:, 0], joints[:, 1], joints[:, 2])))
+            for topic in ('/vehicles/state', '/vehicles/tick_state'):
+                if topic == '/vehicles/state' or tick_states and scheduler.is_tick(n):
+                    found.append((topic, TRAJECTORY, at_ns, self.joints(
+                        stamp_ns, names, joints[:, 0], joints[:, 1], joints[:, 2])))
             if n:
                 dt_s = scheduler.dt_s if intervals_s is None else intervals_s[n - 1]
-                cycle = Cycle(n, n * scheduler.dt_s, n * scheduler.dt_s, 0.0, 0.0, dt_s, 0, 0.0)
+                cycle = Cycle(n, n * scheduler.dt_s, n * scheduler.dt_s + lags_s[n],
+                              dt_s - scheduler.dt_s, lags_s[n], dt_s, 0, 0.0)
                 rows.add(epoch, scheduler.k(n), cycle, 0.001, 0.009,
                          [DriverCommand(*row) for row in result.commands[n]])
                 self.rows[n] = rows.taken()
@@ -216,3 +241,9 @@ def drive() -> Callable[..., OfflineResult]:
         return run_offline(build_setup(game), duration_s=duration_s, intervals_s=intervals_s,
                            drivers={'hv0': ReplayDriver(commands)}, check_drivability=False)
     return run
+
+
+@pytest.fixture(scope='session')
+def runs() -> type[ExportRuns]:
+    """Return the maker of runs to export."""
+    return ExportRuns

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Recordings become scenario files: from every storage, cut off, chosen, placed and refused."""
 
 from collections.abc import Callable
@@ -9,20 +21,19 @@ from pathlib import Path
 from typing import Any
 
 from commonroad.common.reader.file_reader_xml import XMLFileReader
+from crgame_ros.cli import main
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import AvSpec
+from crgame_ros.recording.conversion import ConversionReport, convert
+from crgame_ros.scenario.export_network import schema_errors
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.simulation.offline import OfflineResult
 from lxml import etree
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
-
-from crgame_ros.cli import main
-from crgame_ros.errors import InputError
-from crgame_ros.recording.conversion import ConversionReport, convert
-from crgame_ros.scenario.export_network import schema_errors
-from crgame_ros.scenario.game import AvSpec
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.simulation.offline import OfflineResult
 
 Drive = Callable[..., OfflineResult]
 TRAFFIC, CUT_IN = 'ZAM_Traffic-1_1_T-1.xml', 'ZAM_CutIn-1_1_T-1.xml'
@@ -143,7 +154,7 @@ def test_exported_run_can_be_driven_again(tmp_path: Path, recorder: Any, drive: 
 
 @pytest.mark.parametrize(('kept', 'message'), [
     (0, 'no /scenario/game in it'), (3, 'no /vehicles/state in it'),
-    (5, 'the run has no scenario step')])
+    (5, 'run 1 ended before it began, after 0 simulation steps')])
 def test_recordings_without_a_run(tmp_path: Path, recorder: Any, drive: Drive, kept: int,
                                   message: str) -> None:
     """Nothing, documents alone, or step 0 alone make no scenario, and no file appears."""

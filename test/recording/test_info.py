@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What people are told of a recording."""
 
 import json
@@ -7,12 +19,11 @@ from pathlib import Path
 import time
 from typing import Any
 
-import pytest
-
 from crgame_ros.errors import InputError
 from crgame_ros.recording.info import describe, format_info, Gap
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.writer import BagWriter
+import pytest
 
 CYCLES = 'std_msgs/msg/Float64MultiArray'
 STRING = 'std_msgs/msg/String'
@@ -25,7 +36,7 @@ def record(folder: Path, samples: Any, messages: list[tuple[str, str, bytes]]) -
     """Record messages 10 ms apart, the first at 2 s."""
     with BagWriter(folder, now_ns=time.monotonic_ns) as writer:
         channels = {topic: writer.add_topic(topic, type_name, TopicQos(1, 'reliable', 'volatile'))
-                    for topic, type_name in dict((m[0], m[1]) for m in messages).items()}
+                    for topic, type_name in {m[0]: m[1] for m in messages}.items()}
         for i, (topic, _, data) in enumerate(messages):
             writer.write(channels[topic], data, 2_000_000_000 + i * 10_000_000)
     return folder

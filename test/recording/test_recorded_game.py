@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A recording is run again by itself; with a game it must belong to it."""
 
 from collections.abc import Callable
@@ -8,22 +20,21 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pytest
-
 from crgame_ros.cli import main
-from crgame_ros.driver.replay import ReplayDriver
+from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import InputError
+from crgame_ros.game.documents import GAME_TOPIC
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, ModelSpec, PoseSpawn
+from crgame_ros.game.game_file import dump_game, load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, plan_run
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_game import read_recorded_game
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, ModelSpec, PoseSpawn
-from crgame_ros.scenario.game_file import dump_game, load_game
-from crgame_ros.simulation.documents import GAME_TOPIC
+from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.replay import recorded_inputs
 from crgame_ros.simulation.setup import build_setup
+import numpy as np
+import pytest
 
 CUT_IN_XML = scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml'
 STEPS = 150

@@ -1,21 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Killed recorders and cut files: what was stored comes back, and nothing is ever lost."""
 
 from pathlib import Path
 import random
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 from typing import Any
-
-from mcap.reader import make_reader
-from mcap.writer import Writer
-import pytest
-from rosbags.rosbag2 import Reader, StoragePlugin
-from rosbags.rosbag2 import Writer as RosbagsWriter
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import share_directory
@@ -23,13 +31,18 @@ from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recover import recover
 from crgame_ros.recording.writer import BagWriter
+from mcap.reader import make_reader
+from mcap.writer import Writer
+import pytest
+from rosbags.rosbag2 import Reader, StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
 
 STRING = 'std_msgs/msg/String'
 LATCHED = TopicQos(1, 'reliable', 'transient_local')
 
 
 def record(folder: Path, samples: Any, count: int = 600) -> list[tuple[str, str, int, bytes]]:
-    """Record texts that do not compress, 20 ms apart in chunks of 0.9 s."""
+    """Record texts that do not compress, 20 ms apart in chunks of 0.4 s."""
     generator = random.Random(3)
     expected = [('/a', STRING, 5_000_000_000 + i * 20_000_000,
                  samples.string(f'{i} {generator.randbytes(100).hex()}')) for i in range(count)]
@@ -319,15 +332,55 @@ def test_nothing_to_recover(tmp_path: Path, kind: str) -> None:
 
 
 def test_sqlite_recordings(tmp_path: Path, samples: Any) -> None:
-    """A finished one is left alone, an unfinished one is for rosbag2 itself to mend."""
+    """A finished one is left alone; metadata that is missing or broken is written, once."""
     with RosbagsWriter(tmp_path / 'bag', version=9,
                        storage_plugin=StoragePlugin.SQLITE3) as writer:
-        writer.write(writer.add_connection('/a', STRING, typestore=samples.store), 7,
-                     samples.string('x'))
+        for topic, times in (('/a', (7, 9)), ('/b', (8,))):
+            connection = writer.add_connection(topic, STRING, typestore=samples.store)
+            for log_ns in times:
+                writer.write(connection, log_ns, samples.string(f'{topic} {log_ns}'))
     before = contents(tmp_path / 'bag')
     assert not recover(tmp_path / 'bag').changed
     assert contents(tmp_path / 'bag') == before
-    shutil.copytree(tmp_path / 'bag', tmp_path / 'cut')
-    (tmp_path / 'cut' / 'metadata.yaml').unlink()
-    with pytest.raises(InputError, match='ros2 bag reindex'):
-        recover(tmp_path / 'cut')
+    with BagReader(tmp_path / 'bag') as reader:
+        topics, messages = reader.topics, list(reader.messages())
+    for name, metadata in (('missing', None), ('broken', '['), ('other', 'x: 1'), (
+            'wrong', re.sub(r'(duration:\s+nanoseconds: )\d+', r'\1[1]',
+                            (tmp_path / 'bag' / 'metadata.yaml').read_text()))):
+        folder = Path(shutil.copytree(tmp_path / 'bag', tmp_path / name))
+        (folder / 'metadata.yaml').unlink()
+        if metadata is not None:
+            (folder / 'metadata.yaml').write_text(metadata)
+        report = recover(folder)
+        assert report.metadata_written and report.messages == 3 and report.duration_s == 2e-9
+        with BagReader(folder) as reader:
+            assert reader.complete and reader.topics == topics
+            assert list(reader.messages()) == messages
+        assert not recover(folder).changed
+
+
+def test_a_killed_sqlite_recorder(tmp_path: Path, samples: Any) -> None:
+    """What it had not committed is taken back, the rest is there; a damaged file is refused."""
+    with RosbagsWriter(tmp_path / 'bag', version=9,
+                       storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connection = writer.add_connection('/a', STRING, typestore=samples.store)
+        for log_ns in range(1000):
+            writer.write(connection, log_ns, samples.string('x' * 100))
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    database = tmp_path / 'bag' / 'bag.db3'
+    killed = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""
+        import os, sqlite3
+        connection = sqlite3.connect({str(database)!r})
+        connection.execute('PRAGMA cache_size = 1')
+        connection.execute('UPDATE messages SET data = ?', (b'y' * 100,))
+        os._exit(0)
+    """)], check=False)
+    assert killed.returncode == 0 and database.with_name('bag.db3-journal').stat().st_size
+    assert recover(tmp_path / 'bag').messages == 1000
+    with BagReader(tmp_path / 'bag') as reader:
+        assert {message.data[8:108] for message in reader.messages()} == {b'x' * 100}
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    data = database.read_bytes()
+    database.write_bytes(data[:len(data) // 2])
+    with pytest.raises(InputError, match=r'bag\.db3: the database is damaged'):
+        recover(tmp_path / 'bag')

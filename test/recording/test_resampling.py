@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Exported and converted motion through stalls: differences of positions are the speeds."""
 
 from collections.abc import Callable, Sequence
@@ -9,21 +21,20 @@ from pathlib import Path
 from typing import Any
 
 from commonroad.common.reader.file_reader_xml import XMLFileReader
-import numpy as np
-from numpy.typing import NDArray
-import pytest
-
-from crgame_ros.driver.replay import ReplayDriver
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, LaneletSpawn, TimingSpec
+from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.conversion import convert
+from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.resampling import resample
 from crgame_ros.recording.run_log import run_log_of, RunLog
-from crgame_ros.scenario.export import write_scenario
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, LaneletSpawn, TimingSpec
-from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.time_controller import TimeController
+import numpy as np
+from numpy.typing import NDArray
+import pytest
 
 MS = 1_000_000
 DT = 0.01

@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Contacts in the timing report of a recording, against those of the same run offline."""
 
 from pathlib import Path
 from typing import Any
 
-import pytest
-
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, PoseSpawn, TimingSpec
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.timing_report import timing_report
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, PoseSpawn, TimingSpec
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+import pytest
 
 Message = tuple[str, str, int, bytes]
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Timing reports of recordings whose cycles, plans and verdicts are known."""
 
 from collections.abc import Callable
@@ -7,14 +19,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pytest
-
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.game import AvSpec
 from crgame_ros.recording.timing_report import timing_report, write_timing_report
-from crgame_ros.scenario.game import AvSpec
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import TIMING_COLUMNS
+import numpy as np
+import pytest
 
 Drive = Callable[..., OfflineResult]
 Message = tuple[str, str, int, bytes]

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Recordings as other programs see them, on disks that fill up, over a long time."""
 
 from collections.abc import Iterator
@@ -11,19 +23,18 @@ import sys
 import time
 from typing import Any
 
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
-import pytest
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import get_types_from_msg
-import yaml
-
 from crgame_ros.errors import InputError
 from crgame_ros.paths import share_directory
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.schemas import schema_text, type_hash
 from crgame_ros.recording.writer import BagWriter, FLUSH_INTERVAL_NS, TopicQos
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+import pytest
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import get_types_from_msg
+import yaml
 
 TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 STRING = 'std_msgs/msg/String'

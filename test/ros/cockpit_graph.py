@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The cockpit's live backend between pages and a graph whose messages the test chooses."""
 
 import asyncio
@@ -7,21 +19,21 @@ from collections.abc import Callable, Coroutine
 import json
 from typing import Any
 
+from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.page_messages import parse_message
+from crgame_ros.game.documents import objects_document
+from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
+from crgame_ros.nodes.cockpit.cockpit_backend import LiveBackend
+from crgame_ros.ros.ros_messages import StateMessage
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import Setup
 from live_peer import Peer
 import numpy as np
 import rclpy
 from rclpy.context import Context
 from std_msgs.msg import String
 from worker_roles import own_domain_id
-
-from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.hub import Hub
-from crgame_ros.cockpit.messages import parse_message
-from crgame_ros.planner.joints import vehicle_joint_names, vehicle_to_joints
-from crgame_ros.ros.cockpit_backend import LiveBackend
-from crgame_ros.ros.messages import StateMessage
-from crgame_ros.simulation.documents import game_document, objects_document
-from crgame_ros.simulation.setup import Setup
 
 OFFSET_NS = 1_000_000_000
 PATIENCE_S = 20.0
@@ -91,7 +103,7 @@ class Graph:
 
     @property
     def scene(self) -> dict[str, Any]:
-        """The scene."""
+        """Give the scene."""
         return self.document('scene')
 
     def seat(self, name: str = 'hv0') -> dict[str, Any]:

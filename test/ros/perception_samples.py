@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A game whose AV perceives, and messages of what it perceives."""
 
 from array import array
@@ -8,16 +20,15 @@ from pathlib import Path
 from typing import Any
 
 from cockpit_graph import OFFSET_NS
+from crgame_ros.cli import main
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
+from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.simulation.setup import build_setup, Setup
 from live_support import CUT_IN
 from nav_msgs.msg import OccupancyGrid, Odometry
 import numpy as np
 from sensor_msgs.msg import LaserScan
-
-from crgame_ros.cli import main
-from crgame_ros.perception.spec import PerceptionSpec, SensorSpec
-from crgame_ros.ros.messages import to_time
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.setup import build_setup, Setup
 
 
 def perceiving_setup(folder: Path) -> Setup:

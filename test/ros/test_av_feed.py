@@ -1,19 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What AVs perceive on its way to the pages that want it, and the map of permanent obstacles."""
 
 from array import array
 from dataclasses import replace
 
 from cockpit_graph import Graph, lived, OFFSET_NS
+from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
+from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.simulation.setup import Setup
 import numpy as np
 from perception_samples import estimate, grid, perceiving_setup, scan
 import pytest
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-from crgame_ros.ros.messages import to_time
-from crgame_ros.simulation.setup import Setup
 
 
 @pytest.fixture(scope='module')
@@ -38,10 +50,12 @@ def test_what_an_av_perceives_is_passed_on_to_who_wants_it(setup: Setup) -> None
         for message in (scan('front', 20), scan('rear', 20)):
             await graph.say('/<av>/scan', message, 'av0')
         await graph.say('/<av>/localization', estimate(20, 3.1), 'av0')
-        request = JointTrajectory(joint_names=['av0/x', 'av0/y', 'hv0/x', 'hv0/y'])
+        request = JointTrajectory(
+            joint_names=[*vehicle_joint_names('av0'), *object_joint_names('hv0')])
         request.header.stamp = to_time(OFFSET_NS + 200_000_000)
-        request.points = [JointTrajectoryPoint(positions=array('d', row)) for row in (
-            [1.0, 2.0, float('nan'), float('nan')], [3.0, 4.0, 5.0, 6.0])]
+        request.points = [JointTrajectoryPoint(
+            positions=array('d', row), velocities=array('d', [0.0] * 7)) for row in (
+            [1.0, 2.0, 0.0, 0.0, *[float('nan')] * 3], [3.0, 4.0, 0.0, 0.0, 5.0, 6.0, 0.0])]
         await graph.say('/<av>/plan_request', request, 'av0')
         slots = ('estimate:1', 'seen:1', 'scan:1:0', 'scan:1:1')
         await graph.until(lambda: all(slot in graph.hub._frames for slot in slots), 'all frames')

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What the cockpit makes of messages good and bad, and of seats that change."""
 
 from array import array
@@ -8,6 +20,12 @@ import json
 from typing import Any
 
 from cockpit_graph import Graph, lived, OFFSET_NS
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import events_document
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.game_file import load_game
+from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.simulation.setup import build_setup, Setup
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from live_support import SCENARIOS
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -17,13 +35,6 @@ import pytest
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-from crgame_ros.errors import InputError
-from crgame_ros.ros.messages import to_time
-from crgame_ros.scenario.events import FiredEvent
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import events_document
-from crgame_ros.simulation.setup import build_setup, Setup
 
 FULL = {'keys': [1, 0, 0, 0], 'reverse': 0}
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The environment of ROS processes: defaults, free domains, and traffic on loopback only."""
 
 from collections.abc import Iterator
@@ -9,8 +21,6 @@ import socket
 import subprocess
 import sys
 import time
-
-import pytest
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.ros import environment
@@ -22,6 +32,7 @@ from crgame_ros.ros.environment import (
     PROFILE_VARIABLES,
     ros_wheels_prefix,
 )
+import pytest
 
 # DDSI-RTPS 9.6.1.1: unicast discovery port of participant 0 in domain d is 7400 + 250 d + 10.
 FIRST_UNICAST = 7410
@@ -206,3 +217,37 @@ def test_nothing_listens_beyond_loopback(ros_domain: int, clean: pytest.MonkeyPa
             peer.terminate()
         for peer in peers:
             peer.communicate(timeout=20)
+
+
+def test_another_pythons_ros_is_told_in_one_line(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes and the launcher name this Python and the remedy; there is no traceback."""
+    sourced = tmp_path / 'jazzy'
+    (sourced / 'rclpy').mkdir(parents=True)
+    (sourced / 'rclpy' / '__init__.py').write_text('import rclpy._rclpy_pybind11\n')
+    compiled = sourced / 'rclpy' / '_rclpy_pybind11.cpython-39-x86_64-linux-gnu.so'
+    compiled.touch()
+    nowhere = tmp_path / 'nowhere'
+    nowhere.mkdir()
+    (nowhere / 'sitecustomize.py').write_text(
+        'from importlib.machinery import PathFinder\n'
+        'found = PathFinder.find_spec\n'
+        'PathFinder.find_spec = classmethod(lambda cls, name, path=None, target=None:\n'
+        '    None if name == "rclpy" else found(name, path, target))\n')
+    root = Path(environment.__file__).parents[2]
+    for folder, text in ((sourced, f'the rclpy in {sourced / "rclpy"} is not for Python '),
+                         (nowhere, 'there is no ROS 2 (rclpy) for Python ')):
+        for module in ('crgame_ros.nodes.sim_node', 'crgame_ros.launcher.main'):
+            done = subprocess.run(
+                [sys.executable, '-m', module], capture_output=True, text=True, cwd=tmp_path,
+                env=dict(os.environ, PYTHONPATH=f'{folder}{os.pathsep}{root}'), timeout=60)
+            assert done.returncode == 1, done
+            assert done.stderr.startswith(f'error: {text}'), done.stderr
+            assert done.stderr.count('\n') == 1 and sys.executable in done.stderr
+            assert './run.sh' in done.stderr
+    # What fits is taken, whatever else lies beside it.
+    for suffix in environment.EXTENSION_SUFFIXES:
+        (compiled.parent / f'_rclpy_pybind11{suffix}').touch()
+    monkeypatch.syspath_prepend(str(sourced))
+    monkeypatch.delitem(sys.modules, 'rclpy', raising=False)
+    environment.require_ros()

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What the real map node publishes over DDS while a vehicle drives across a map."""
 
 import json
@@ -8,21 +20,21 @@ from pathlib import Path
 import subprocess
 import sys
 
+from crgame_ros.game.game_file import load_game
+from crgame_ros.messages.joints import vehicle_joint_names
+from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.occupancy_writer import write_map
+from crgame_ros.occupancy.rasterize import Raster
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import build_setup
 from live_peer import Peer
 from live_support import CUT_IN, PATIENCE_S
 import numpy as np
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from worker_roles import own_domain_id
-
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.occupancy_raster_spec import RasterSpec
-from crgame_ros.scenario.occupancy_tiles import TiledOccupancy
-from crgame_ros.scenario.occupancy_writer import write_map
-from crgame_ros.scenario.rasterize import Raster
-from crgame_ros.simulation.documents import game_document
-from crgame_ros.simulation.setup import build_setup
 
 # The node's default.
 REACH_M = 60.0
@@ -38,8 +50,10 @@ def _game(epoch: int, occupancy: Path | None) -> String:
 
 def _states(*positions: tuple[float, float]) -> JointTrajectory:
     """Say where two vehicles are."""
-    return JointTrajectory(points=[JointTrajectoryPoint(positions=[
-        value for x, y in positions for value in (x, y, 0.0, 0.0)])])
+    names = [name for i in range(len(positions)) for name in vehicle_joint_names(f'hv{i}')]
+    return JointTrajectory(joint_names=names, points=[JointTrajectoryPoint(
+        positions=[value for x, y in positions for value in (x, y, 0.0, 0.0)],
+        velocities=[0.0] * len(names), accelerations=[0.0] * len(names))])
 
 
 def test_the_tiles_near_the_vehicles_come_when_they_change(tmp_path: Path) -> None:

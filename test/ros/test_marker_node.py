@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """marker_node in a running graph: what who looks sees, and what it spares who does not."""
 
 from collections.abc import Iterator
@@ -7,6 +19,17 @@ import math
 from pathlib import Path
 import threading
 
+from crgame_ros.game.documents import objects_document
+from crgame_ros.game.game_file import load_game
+from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
+from crgame_ros.nodes import marker_node
+from crgame_ros.nodes.marker_node import MarkerNode
+from crgame_ros.nodes.markers.map_markers import NAMESPACES
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.node_main import StopFlag
+from crgame_ros.ros.ros_messages import from_time, StateMessage
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import build_setup, Setup
 from live_peer import Peer
 from live_support import Launcher
 import numpy as np
@@ -18,16 +41,8 @@ from std_msgs.msg import Bool, String
 from steady_game import write_steady_game
 from visualization_msgs.msg import Marker, MarkerArray
 
-from crgame_ros.nodes import marker_node
-from crgame_ros.nodes.marker_node import MarkerNode
-from crgame_ros.planner.joints import vehicle_joint_names, vehicle_to_joints
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.map_markers import NAMESPACES
-from crgame_ros.ros.messages import from_time, StateMessage
-from crgame_ros.ros.node_main import StopFlag
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import game_document, objects_document
-from crgame_ros.simulation.setup import build_setup, Setup
+# On a machine with nothing to spare what is said once may come before who hears it.
+pytestmark = pytest.mark.alone
 
 # CommonRoad vehicle 2 (BMW 320i): the rear axle is so far behind the centre [m].
 REAR_TO_CENTER = 1.4227
@@ -83,8 +98,8 @@ def test_who_looks_sees_the_map_then_what_moves(graph: tuple[Launcher, Peer]) ->
         peer.listen()
         assert seen[0].markers[0].action == Marker.DELETEALL
         assert {item.ns for item in seen[0].markers[1:]} == MAP
-        # A second time for who has just come, and then never again.
-        assert len(_maps(seen)) <= 2
+        # Twice more for who has just come, and then never again.
+        assert len(_maps(seen)) <= 3
         assert all(item.action == Marker.ADD for message in seen[1:] for item in message.markers)
         frames = _frames(seen)
         for number, vehicle in enumerate(('hv0', 'av0')):
@@ -266,6 +281,7 @@ def test_nothing_is_computed_while_nobody_looks(
     made: list[str] = []
 
     class Counted(marker_node.SceneMarkers):
+
         def __init__(self, documents: marker_node.ScenarioSet) -> None:
             made.append('scene')
             super().__init__(documents)

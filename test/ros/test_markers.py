@@ -1,30 +1,44 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The markers of real games: where they are, how large, in which colour, and when they go."""
 
 from collections.abc import Sequence
 import math
 from pathlib import Path
 
+from crgame_ros.game.documents import objects_document
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.outline import outline
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
+from crgame_ros.nodes.markers import marker_style as style
+from crgame_ros.nodes.markers.body_markers import Body
+from crgame_ros.nodes.markers.map_markers import line_segments, map_markers, NAMESPACES
+from crgame_ros.nodes.markers.markers import AvPaths, SceneMarkers
+from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
+from crgame_ros.scenario.loading import load_scenario, parse_scenario
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import build_setup, Setup
 from live_support import SCENARIOS
 import numpy as np
 from numpy.typing import NDArray
 import pytest
+import shapely
 from visualization_msgs.msg import Marker
-
-from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.planner.joints import JointSeries
-from crgame_ros.ros import marker_style as style
-from crgame_ros.ros.body_markers import Body
-from crgame_ros.ros.map_markers import line_segments, map_markers, NAMESPACES
-from crgame_ros.ros.markers import AvPaths, SceneMarkers
-from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.scenario.loading import load_scenario, parse_scenario
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.simulation.documents import game_document, objects_document
-from crgame_ros.simulation.setup import build_setup, Setup
 
 OFFSET_NS = 5_000_000_000
 TICK_NS = 100_000_000
@@ -308,20 +322,16 @@ def _series(names: Sequence[str], positions: NDArray[np.float64]) -> JointSeries
     return JointSeries(OFFSET_NS, tuple(names), times_ns, positions, nowhere, nowhere)
 
 
-def _names(vehicle: str, *joints: str) -> tuple[str, ...]:
-    return tuple(f'{vehicle}/{joint}' for joint in joints)
-
-
 def test_plan_is_drawn_until_it_is_used_up(scene: SceneMarkers, setup: Setup) -> None:
     """A plan over 3 s is a line through its positions, gone when its last state is past."""
     x = np.linspace(0.0, 30.0, 31)
-    plan = _series(_names('av0', 'x', 'y', 'yaw', 'steering'),
+    plan = _series(vehicle_joint_names('av0'),
                    np.stack((x, 0.1 * x, 0.0 * x, 0.0 * x), axis=1))
     scene.set_plan('av0', plan)
     line = _by_key(scene.message().markers)['plan', 0]
     assert line.type == Marker.LINE_STRIP
     assert np.allclose(_points(line), np.stack((x, 0.1 * x), axis=1), atol=1e-12)
-    scene.set_plan('av0', _series(_names('av1', 'x', 'y', 'yaw', 'steering'), np.zeros((31, 4))))
+    scene.set_plan('av0', _series(vehicle_joint_names('av1'), np.zeros((31, 4))))
     assert np.allclose(_points(line)[-1], (30.0, 3.0))
     states = np.array([vehicle.state for vehicle in setup.vehicles])
     for after_ns, action in ((30 * TICK_NS, Marker.ADD), (31 * TICK_NS, Marker.DELETE)):
@@ -345,11 +355,12 @@ def test_prediction_is_drawn_in_map() -> None:
     positions = np.concatenate((
         nowhere, transform.to_scenario(driven), np.zeros((31, 1)), transform.to_scenario(still),
         transform.to_scenario(walker)), axis=1)
-    names = (*_names('av0', 'x', 'y', 'yaw', 'steering'),
-             *_names('hv0', 'x', 'y', 'yaw', 'steering'), *_names('o1', 'x', 'y', 'yaw'),
-             *_names('o2', 'x', 'y', 'yaw'))
-    paths = AvPaths(style.map_header(), 0, 'av0', transform)
+    names = (*vehicle_joint_names('av0'),
+             *vehicle_joint_names('hv0'), *object_joint_names('o1'),
+             *object_joint_names('o2'))
+    paths = AvPaths(style.map_header(), 0, 'av0', transform, {})
     paths.set_prediction(_series(names, positions))
+    assert not paths.perceived.present
     segments = _points(paths.prediction.markers[0]).reshape(-1, 2, 2)
     # Six segments of 0.5 s for each of the two that move; the AV itself is nobody's prediction.
     assert len(segments) == 12
@@ -358,9 +369,46 @@ def test_prediction_is_drawn_in_map() -> None:
     assert np.allclose(cars[:, :, 1], 0.0, atol=1e-9)
     others = segments[(segments[:, :, 0] <= 0.01).all(axis=1)]
     assert np.allclose(np.sort(others[:, 1, 1]), [0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
-    paths.set_plan(_series(_names('av0', 'x', 'y', 'yaw', 'steering'), np.concatenate(
+    paths.set_plan(_series(vehicle_joint_names('av0'), np.concatenate(
         (transform.to_scenario(driven), np.zeros((31, 1))), axis=1)))
     assert np.allclose(_points(paths.plan.markers[0]), driven[:, :2], atol=1e-9)
+
+
+def test_what_an_av_knows_of_is_outlined_where_it_takes_it_to_be() -> None:
+    """
+    Outlines by shapely at the poses of the first point, mapped back; the unseen has none.
+
+    Driven vehicles are placed by their rear axle, and the AV itself is nothing that it perceives.
+    """
+    transform = RigidTransform(0.5 * math.pi, 100.0, 0.0)
+    poses = {'av0': (0.0, 0.0, 0.0), 'hv0': (30.0, -4.0, 0.4), 'o1': (7.0, 7.0, -2.0),
+             'o2': (math.nan,) * 3}
+    shapes = {'av0': Shape.rectangle(LENGTH, WIDTH), 'hv0': Shape.rectangle(LENGTH, WIDTH),
+              'o1': Shape.polygon(((-2.0, -1.0), (2.0, -1.0), (0.0, 3.0))),
+              'o2': Shape.rectangle(4.0, 2.0)}
+    ahead = {'av0': REAR_TO_CENTER, 'hv0': REAR_TO_CENTER, 'o1': 0.0, 'o2': 0.0}
+    # The AV itself comes first, with its steering.
+    positions = np.tile(np.insert(np.concatenate(
+        [transform.to_scenario(np.array(pose)) for pose in poses.values()]), 3, 0.0), (31, 1))
+    names = [*vehicle_joint_names('av0'), *(
+        name for key in poses if key != 'av0' for name in object_joint_names(key))]
+    outlines = {key: outline(shape) + (ahead[key], 0.0) for key, shape in shapes.items()}
+    paths = AvPaths(style.map_header(), 0, 'av0', transform, outlines)
+    paths.set_prediction(_series(tuple(names), positions))
+    assert paths.perceived.present
+    drawn = shapely.union_all(shapely.linestrings(
+        _points(paths.perceived.markers[0]).reshape(-1, 2, 2)))
+    expected = shapely.union_all([shapely.affinity.translate(shapely.affinity.rotate(
+        shapely.affinity.translate(
+            shapely.Polygon(shapes[key].vertices) if shapes[key].vertices else shapely.box(
+                -0.5 * LENGTH, -0.5 * WIDTH, 0.5 * LENGTH, 0.5 * WIDTH), ahead[key], 0.0),
+        poses[key][2], origin=(0.0, 0.0), use_radians=True), *poses[key][:2]).boundary
+        for key in ('hv0', 'o1')])
+    assert shapely.hausdorff_distance(drawn, expected) < 1e-9
+    assert drawn.length == pytest.approx(expected.length)
+    # As old as the prediction may be, no older.
+    paths.expire(OFFSET_NS + 1_600_000_000)
+    assert not paths.perceived.present
 
 
 def test_published_scenarios_can_be_drawn(shared_scenarios: Path) -> None:

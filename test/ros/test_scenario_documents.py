@@ -1,18 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Documents are given once they belong together, in whatever order they come."""
 
 from dataclasses import replace
 from itertools import permutations
 
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import objects_document
+from crgame_ros.game.game_file import load_game
+from crgame_ros.ros.scenario_documents import DocumentCollector, KINDS
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import build_setup
 from live_support import SCENARIOS
 import pytest
-
-from crgame_ros.errors import InputError
-from crgame_ros.ros.scenario_documents import DocumentCollector, KINDS
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import game_document, objects_document
-from crgame_ros.simulation.setup import build_setup
 
 
 def _texts(game: str, epoch: int = 0) -> dict[str, str]:
@@ -84,12 +96,12 @@ def test_a_reset_does_not_read_the_same_scenario_again(cut_in: dict[str, str]) -
 
 
 def test_what_cannot_be_read_is_said(cut_in: dict[str, str]) -> None:
-    """The error names the topic; the right text afterwards mends it."""
+    """The error names the topic, and what was there before stays: it is given with what is new."""
     collector = DocumentCollector()
     for kind, text in cut_in.items():
         collector.take(kind, text)
-    collector.take('objects', '[{}]')
     with pytest.raises(InputError, match='/scenario/objects'):
-        collector.complete()
-    collector.take('objects', cut_in['objects'])
+        collector.take('objects', '[{}]')
+    with pytest.raises(InputError, match='/scenario/game'):
+        collector.take('game', '{}')
     assert collector.complete() is not None

@@ -1,11 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Seats of a run over DDS: losses, pauses, changes of hands and floods, step by step."""
 
 from collections.abc import Iterator
 import json
 from typing import NamedTuple
 
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.game.game_file import load_game
+from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.ros_messages import to_joy
+from crgame_ros.ros.seats import COMMAND_DEPTH, GAME, MAX_ORDERS, Seat, Seats
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from live_peer import Peer
 from live_support import CUT_IN, wait_until
 import numpy as np
@@ -16,15 +36,6 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 from worker_roles import own_domain_id
-
-from crgame_ros.driver.command import DriverCommand, RELEASED
-from crgame_ros.driver.replay import ReplayDriver
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import to_joy
-from crgame_ros.ros.seats import COMMAND_DEPTH, GAME, MAX_ORDERS, Seat, Seats
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.replay import RecordedInputs
-from crgame_ros.simulation.setup import build_setup
 
 MS = 1_000_000
 OFFSET_NS = 1_000_000_000
@@ -43,7 +54,7 @@ class Table(NamedTuple):
 
     @property
     def human(self) -> Seat:
-        """The seat of hv0."""
+        """Give the seat of hv0."""
         return self.seats.humans[0]
 
     def say(self, command: DriverCommand, source: str = GAME) -> None:
@@ -183,13 +194,14 @@ def test_what_makes_no_command_is_counted(table: Table) -> None:
         (OFFSET_NS - 1, GAME), (OFFSET_NS, GAME), (OFFSET_NS, 'stranger')))
     empty.axes = []
     for message in (old, empty, stranger, to_joy(
-            DriverCommand(float('nan'), float('inf'), float('-inf')), OFFSET_NS, GAME)):
+            DriverCommand(float('nan'), float('inf'), float('-inf')), OFFSET_NS, GAME),
+            to_joy(DriverCommand(7.0, 1.0, -3.0), OFFSET_NS, GAME)):
         table.commands.publish(message)
     found = []
     wait_until(lambda: found.append(table.human.command(0, 0.01, 20.0))
                or found[-1] != RELEASED, 'the last of them')
-    assert found[-1] == DriverCommand(0.0, 1.0, -1.0)
-    assert (table.human.outdated, table.human.malformed) == (1, 1)
+    assert found[-1] == DriverCommand(1.0, 1.0, -1.0)
+    assert (table.human.outdated, table.human.malformed) == (1, 2)
 
 
 def test_a_recording_drives_by_the_step(table: Table) -> None:

@@ -1,13 +1,36 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Half-made ports in shared memory: removed when nobody finishes them, left alone otherwise."""
 
+import fcntl
+import mmap
 import os
 from pathlib import Path
+import subprocess
+import sys
 import threading
 import time
 
-from crgame_ros.ros.shared_memory import PATIENCE_S, remove_half_made_ports
+from crgame_ros.ros.shared_memory import (
+    PATIENCE_S,
+    remove_half_made_ports,
+    remove_stale,
+    SHARED_MEMORY,
+    YOUNG_S,
+)
+from worker_roles import own_domain_id
 
 MADE, UNMADE = (2).to_bytes(4, 'little') + bytes(60), bytes(64)
 
@@ -43,3 +66,52 @@ def test_a_port_in_the_making_is_waited_for(tmp_path: Path) -> None:
     assert time.monotonic() - start_s > 0.2
     maker.join()
     assert port.exists()
+
+
+def _left(folder: Path, *names: str) -> None:
+    for name in names:
+        (folder / name).write_bytes(MADE)
+        _age(folder / name, 2.0 * YOUNG_S)
+
+
+def test_what_dead_processes_left_goes_and_what_is_used_stays(tmp_path: Path) -> None:
+    """Unlocked and unmapped alone; the young, the locked, the mapped and the strange stay."""
+    gone, locked, mapped, young = (f'fastrtps_{digit * 16}' for digit in '0123')
+    _left(tmp_path, gone, f'{gone}_el', locked, f'{locked}_el', mapped, f'{mapped}_el',
+          'fastrtps_port7001', 'fastrtps_port7001_el', 'sem.fastrtps_port7001_mutex',
+          'fastrtps_port7002', 'somebody_elses', 'fastrtps_xyz')
+    (tmp_path / young).write_bytes(MADE)
+    (tmp_path / f'{young}_el').write_bytes(b'')
+    with (tmp_path / f'{locked}_el').open() as holder, (tmp_path / mapped).open('rb') as file, \
+            mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ):
+        fcntl.flock(holder, fcntl.LOCK_EX)
+        count, size = remove_stale(tmp_path)
+        left = {path.name for path in tmp_path.iterdir()}
+    assert count == 1 and size > 0
+    assert left == {locked, f'{locked}_el', mapped, f'{mapped}_el', young, f'{young}_el',
+                    'fastrtps_port7001', 'fastrtps_port7001_el', 'sem.fastrtps_port7001_mutex',
+                    'fastrtps_port7002', 'somebody_elses', 'fastrtps_xyz'}
+
+
+def test_a_living_participant_keeps_its_memory_and_a_killed_one_does_not() -> None:
+    """Real Fast DDS: its own files are there while it lives, whoever cleans, and go after it."""
+    code = ('import rclpy, time; rclpy.init(); node = rclpy.create_node("held"); '
+            'print("up", flush=True); time.sleep(100)')
+    process = subprocess.Popen(
+        [sys.executable, '-c', code], stdout=subprocess.PIPE, text=True,
+        env=os.environ | {'ROS_DOMAIN_ID': str(own_domain_id())})
+    try:
+        assert process.stdout is not None and process.stdout.readline() == 'up\n'
+        own = {line.rpartition('/')[2].split()[0] for line in Path(
+            f'/proc/{process.pid}/maps').read_text().splitlines() if '/dev/shm/fastrtps_' in line}
+        assert own
+        for name in own:
+            _age(SHARED_MEMORY / name, 2.0 * YOUNG_S)
+        remove_stale()
+        assert all((SHARED_MEMORY / name).exists() for name in own)
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+    remove_stale()
+    assert not any((SHARED_MEMORY / name).exists() for name in own if 'port' not in name)

@@ -1,21 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What the time-sync supervisor orders, said by the real node over DDS."""
 
 import os
 import subprocess
 import sys
 
+from crgame_ros.game.game_file import load_game
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.timing.cycle_rows import CycleRows
+from crgame_ros.timing.time_controller import Cycle
 from live_peer import Peer
 from live_support import CUT_IN, PATIENCE_S
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from worker_roles import own_domain_id
-
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import game_document
-from crgame_ros.simulation.setup import build_setup
-from crgame_ros.timing.cycle_rows import CycleRows
-from crgame_ros.timing.time_controller import Cycle
 
 LAG_S = 1.0
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The configurations for RViz and Foxglove name what the contract has."""
 
 from collections.abc import Iterator
@@ -8,21 +20,27 @@ from pathlib import Path
 import re
 from typing import Any
 
+from crgame_ros.messages.contract import load_contract, Topic
+from crgame_ros.timing.cycle_rows import CycleRows
 import pytest
 import yaml
 
-from crgame_ros.ros.contract import load_contract
-from crgame_ros.timing.cycle_rows import CycleRows
-
 DISPLAYED = {'MarkerArray': 'visualization_msgs/msg/MarkerArray', 'Path': 'nav_msgs/msg/Path',
-             'Odometry': 'nav_msgs/msg/Odometry'}
+             'Odometry': 'nav_msgs/msg/Odometry', 'LaserScan': 'sensor_msgs/msg/LaserScan',
+             'Map': 'nav_msgs/msg/OccupancyGrid'}
 
 
 @pytest.fixture(scope='module')
-def topics() -> dict[str, str]:
-    """Give the types of the topics of a game of two humans and two AVs."""
-    return {name: topic.type_name for topic in load_contract().topics.values()
+def contract() -> dict[str, Topic]:
+    """Give the topics of a game of two humans and two AVs."""
+    return {name: topic for topic in load_contract().topics.values()
             for name in topic.names(('hv0', 'hv1'), ('av0', 'av1'))}
+
+
+@pytest.fixture(scope='module')
+def topics(contract: dict[str, Topic]) -> dict[str, str]:
+    """Give the types of these topics."""
+    return {name: topic.type_name for name, topic in contract.items()}
 
 
 @pytest.fixture(scope='module')
@@ -38,21 +56,29 @@ def foxglove(project_root: Path) -> dict[str, Any]:
     return json.loads((project_root / 'config' / 'crgame_foxglove.json').read_text())
 
 
-def test_rviz_shows_the_scene_from_above(rviz: dict[str, Any], topics: dict[str, str]) -> None:
+def test_rviz_shows_the_scene_from_above(rviz: dict[str, Any],
+                                         contract: dict[str, Topic]) -> None:
     """The fixed frame is the markers'; each display has its topic, type and QoS as published."""
     assert rviz['Global Options']['Fixed Frame'] == 'map'
     assert rviz['Views']['Current']['Class'] == 'rviz_default_plugins/TopDownOrtho'
     seen = set()
     for display in rviz['Displays']:
         kind = display['Class'].removeprefix('rviz_default_plugins/')
+        if kind == 'TF':
+            # It names no topics: it takes /tf and /tf_static.
+            continue
         topic = display['Topic']['Value']
-        assert topics[topic] == DISPLAYED[kind]
-        # A best-effort publisher would give nothing to who asks for reliable, or the reverse.
-        assert display['Topic']['Reliability Policy'] == 'Reliable'
-        assert display['Topic']['Durability Policy'] == 'Volatile'
+        assert contract[topic].type_name == DISPLAYED[kind]
+        # A best-effort publisher would give nothing to who asks for reliable, or the reverse; and
+        # what is latched comes to a late viewer only if it asks for it.
+        qos = contract[topic].qos
+        assert display['Topic']['Reliability Policy'] == qos.reliability.title() == 'Reliable'
+        assert display['Topic']['Durability Policy'] == qos.durability.replace('_', ' ').title()
         seen.add((kind, topic, display['Enabled']))
     assert {('MarkerArray', '/markers', True), ('Path', '/av0/plan_path', True),
-            ('Odometry', '/hv0/odom', False)} <= seen
+            ('Odometry', '/hv0/odom', False), ('LaserScan', '/av0/scan', True),
+            ('LaserScan', '/av1/scan', True), ('Map', '/occupancy', True)} <= seen
+    assert {display['Class'] for display in rviz['Displays']} >= {'rviz_default_plugins/TF'}
 
 
 def _leaves(node: str | dict[str, Any]) -> Iterator[str]:

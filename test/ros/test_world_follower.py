@@ -1,25 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Steps of the world are put together in order, whatever half of one is lost or late."""
 
 from collections.abc import Callable, Iterator
 import time
 
+from crgame_ros.game.documents import objects_document
+from crgame_ros.game.game_file import load_game
+from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.ros_messages import StateMessage
+from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
+from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import build_setup
 from live_support import PATIENCE_S, SCENARIOS
 import numpy as np
 import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
-
-from crgame_ros.planner.joints import object_joint_names, vehicle_joint_names
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import StateMessage
-from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
-from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.documents import game_document, objects_document
-from crgame_ros.simulation.setup import build_setup
 
 STATES = '/vehicles/tick_state'
 

@@ -1,21 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Obstacles whose course events change: held, released, braking, put; and their prediction."""
 
 import math
 
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.courses import ObstacleCourses
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.prediction import LanePrediction, recorded_future
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.courses import ObstacleCourses
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.prediction import LanePrediction, recorded_future
-from crgame_ros.scenario.road_network import RoadNetwork
 
 DT = 0.1
 LEADER, WALKER, PUT = 0, 1, 2

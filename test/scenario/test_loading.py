@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Loading: real scenarios, what is mended with a notice, uncertain initial states."""
 
 import hashlib
@@ -8,9 +20,8 @@ from pathlib import Path
 import subprocess
 import sys
 
-import pytest
-
 from crgame_ros.scenario.loading import load_scenario, parse_scenario
+import pytest
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 LANELET = """<lanelet id="{id}">
@@ -106,6 +117,7 @@ def test_scenario_without_problem_is_said_in_one_line() -> None:
 @pytest.mark.parametrize(('links', 'rest', 'notice'), [
     ('<successor ref="77"/>', '', 'the missing lanelet 77'),
     ('<adjacentLeft ref="77" drivingDir="same"/>', '', 'the missing lanelet 77'),
+    ('<adjacentLeft drivingDir="same"/>', '', 'without a ref'),
     ('<trafficSignRef ref="78"/>', '', 'the missing trafficSign 78'),
     ('<adjacentRight ref="1" drivingDir="same"/>', '', 'closes a circle'),
     ('', '<trafficSign id="5"><trafficSignElement><trafficSignID>274</trafficSignID>'
@@ -123,6 +135,12 @@ def test_mendable_faults_load_with_a_notice(links: str, rest: str, notice: str) 
     assert len(loaded.scenario.lanelet_network.lanelets) == 2
     assert loaded.scenario.lanelet_network.find_lanelet_by_id(1).successor == [2]
     assert sum(notice in n for n in loaded.notices) == 1
+
+
+def test_a_notice_stays_a_line_that_is_read() -> None:
+    """A name of 4,700 characters with breaks in it: one line of less than 500."""
+    notice, = parse_scenario(write(), 'far/away/\n' * 470).notices
+    assert notice.startswith('far/away/ far/away/') and len(notice) < 500
 
 
 def test_sign_on_a_circle_of_neighbours_ends() -> None:

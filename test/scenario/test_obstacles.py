@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Obstacles against commonroad-io's own states and occupancies, and closed forms."""
 
 import math
@@ -7,14 +19,13 @@ from pathlib import Path
 
 from commonroad.geometry.shape import Circle, Polygon, Rectangle, ShapeGroup
 from commonroad.scenario.obstacle import StaticObstacle
-import numpy as np
-import pytest
-
 from crgame_ros.errors import InputError
+from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
-from crgame_ros.scenario.objects import Role
 from crgame_ros.scenario.obstacles import convert_shape, ScenarioObstacles
+import numpy as np
+import pytest
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 

@@ -1,15 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Predictions against the closed form of the circle, straight lines, and recorded futures."""
 
 import math
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-import pytest
-
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.prediction import (
@@ -17,8 +26,10 @@ from crgame_ros.scenario.prediction import (
     predict_constant_steering,
     recorded_future,
 )
-from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
+import pytest
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 

@@ -1,25 +1,37 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where vehicles start: on every real scenario free, on the road and in the lane's heading."""
 
 import math
 from pathlib import Path
 
 from commonroad_dc import pycrcc
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import HumanSpec, LaneletSpawn, PoseSpawn
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.outline import placed_polygon
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import pytest
 import shapely
-
-from crgame_ros.errors import InputError
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.game import HumanSpec, LaneletSpawn, PoseSpawn
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario
-from crgame_ros.scenario.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.spawn import lanelet_pose, outline, place_human, problem_pose
-from crgame_ros.vehicle.parameters import load_vehicle_parameters
-from crgame_ros.vehicle.state import VehicleState
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 
@@ -73,7 +85,7 @@ def test_human_is_placed_free_on_the_road_in_its_lane(name: str, with_av: bool) 
                     if shape.kind == 'circle' else pycrcc.RectOBB(
                         shape.length / 2, shape.width / 2, pose[2], pose[0], pose[1])
                 assert not mine.collide(other)
-        footprint = outline(CAR.shape, *human.center(CAR.rear_to_center), human.yaw)
+        footprint = placed_polygon(CAR.shape, *human.center(CAR.rear_to_center), human.yaw)
         assert surface.covers(footprint)
         lane = road.lanelet_at(human.x, human.y, human.yaw)
         assert lane is not None and road.is_for_cars(lane)

@@ -1,22 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Playing the games with objects, traffic and perception, changed or not, and measuring them."""
 
 from collections.abc import Callable
 import functools
 from typing import Any
 
+from crgame_ros.game.game_file import parse_game
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.planner.idm import IdmPlanner
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
 import numpy as np
 from numpy.typing import NDArray
 import shapely
 import yaml
-
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.idm import IdmPlanner
-from crgame_ros.planner.interface import Plan, PlanRequest
-from crgame_ros.scenario.game_file import parse_game
-from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.setup import build_setup
 
 Array = NDArray[np.float64]
 Change = Callable[[dict[str, Any]], object]

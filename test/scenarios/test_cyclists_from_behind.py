@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Cyclists faster than the AV who ride into its lane from behind, at shallow angles."""
 
 import math
 from pathlib import Path
-
-import pytest
-from test_cyclists import DT, TICKS, write
 
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.simulation.contacts import Contact, contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+import pytest
+from test_cyclists import DT, TICKS, write
 
 # Of the vehicle: from rear axle to centre, and half its width [m].
 REAR_TO_CENTER, HALF_WIDTH = 1.4227, 0.805

@@ -1,11 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The games with objects, traffic and perception: nobody comes to harm, and the human matters."""
 
 from dataclasses import replace
 from pathlib import Path
 
 from commonroad.common.file_reader import CommonRoadFileReader
+from crgame_ros.drivability.monitor import VehicleDrivability
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.export import write_scenario
+from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
 from engine_games_support import (
     distances,
     play,
@@ -16,14 +35,6 @@ from engine_games_support import (
 )
 import numpy as np
 import pytest
-
-from crgame_ros.drivability.monitor import VehicleDrivability
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.run_log import run_log_of
-from crgame_ros.scenario.export import write_scenario
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.setup import build_setup
 
 # They share the games that are played as they are.
 pytestmark = pytest.mark.xdist_group('scenarios/games')

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 The package's own games: the scripted human makes the AV react, and nobody comes to harm.
 
@@ -11,18 +23,17 @@ from dataclasses import dataclass, replace
 import functools
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-import pytest
-import shapely
-
 from crgame_ros.drivability.monitor import VehicleDrivability
+from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game_file import load_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+import shapely
 
 
 def _is_plain(path: Path) -> bool:

@@ -1,9 +1,22 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The games with perception: what an AV sees late it brakes for late."""
 
 from typing import Any
 
+from crgame_ros.simulation.offline import OfflineResult
 from engine_games_support import (
     bodies,
     column,
@@ -20,8 +33,6 @@ import numpy as np
 import pytest
 import shapely
 
-from crgame_ros.simulation.offline import OfflineResult
-
 # They share the games that are played as they are.
 pytestmark = pytest.mark.xdist_group('scenarios/games')
 
@@ -36,8 +47,7 @@ def _listening(values: dict[str, Any]) -> None:
 
 def _ticks_with_walker() -> list[int]:
     """Give the ticks whose request contained the pedestrian, and forget the requests."""
-    ticks = [request.k for request in ListeningIdm.requests if np.isfinite(
-        request.obstacle_poses[0, request.obstacle_ids.index('walker'), 0])]
+    ticks = [request.k for request in ListeningIdm.requests if 'walker' in request.obstacle_ids]
     ListeningIdm.requests.clear()
     return ticks
 

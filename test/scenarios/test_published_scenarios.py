@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Every published scenario runs ten seconds with our planner and with the reactive one."""
 
 import functools
 from pathlib import Path
 
-import numpy as np
-import pytest
-
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
+import numpy as np
+import pytest
 
 NAMES = (
     'DEU_Flensburg-10_1_T-1', 'DEU_Guetersloh-36_1_T-1', 'DEU_Test-1_1_T-1', 'FRA_Anglet-1_1_T-1',

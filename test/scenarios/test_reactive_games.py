@@ -1,15 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The reactive planner in our own games: it answers, and it hits nobody; see also test_cut_in."""
 
 from pathlib import Path
-
-import pytest
 
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
+import pytest
 
 # Share of ticks that the reactive planner has to answer with a plan of its own.
 WANTED = 0.8

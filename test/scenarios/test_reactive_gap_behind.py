@@ -1,15 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The reactive planner before a parked car, beside somebody who looks at nothing."""
 
 from pathlib import Path
 
-import numpy as np
-import pytest
-
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, PoseSpawn
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, PoseSpawn
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+import numpy as np
+import pytest
 
 # The lanes' centre lines are at y = 2 and 6 m, the AV starts at x = 15.6 m with 20 m/s, and the
 # parked car's rear is 28.5 m ahead: what 20 m/s need at 7 m/s^2.

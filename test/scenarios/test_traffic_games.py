@@ -1,10 +1,24 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The games with traffic: agents make room, swerve, and react to the human."""
 
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.simulation.offline import OfflineResult
 from engine_games_support import (
     agents,
     Array,
@@ -21,9 +35,6 @@ from engine_games_support import (
 import numpy as np
 import pytest
 import shapely
-
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.simulation.offline import OfflineResult
 
 # They share the games that are played as they are.
 pytestmark = pytest.mark.xdist_group('scenarios/games')

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Games, plans and hand-driven runs that the tests of the engine share."""
 
 from collections.abc import Callable, Sequence
@@ -9,17 +21,16 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crgame_ros.driver.command import DriverCommand
-from crgame_ros.planner.interface import Plan
-from crgame_ros.planner.joints import JointSeries, plan_to_joints, vehicles_from_joints
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec, PoseSpawn, TimingSpec
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, PoseSpawn, TimingSpec
+from crgame_ros.messages.joints import JointSeries, plan_to_joints, vehicles_from_joints
+from crgame_ros.messages.plan import Plan
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 DT, DT_C, N = 0.01, 0.1, 10

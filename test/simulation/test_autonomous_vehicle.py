@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """An AV between its planner's answers: busy flag, refusals, braking, late plans."""
 
 from collections.abc import Callable
@@ -7,15 +19,14 @@ from dataclasses import replace
 import math
 import re
 
+from crgame_ros.messages.joints import JointSeries, plan_to_joints
+from crgame_ros.messages.plan import Plan
+from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np
 import pytest
 import simulation_support as support
 from simulation_support import HandDriven
-
-from crgame_ros.planner.interface import Plan
-from crgame_ros.planner.joints import JointSeries, plan_to_joints
-from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.vehicle.state import StateColumn, VehicleState
 
 STEP_NS = 100_000_000
 Array = support.Array

@@ -1,25 +1,39 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who drives: alternatives on one spot, and exported runs that are driven again."""
 
 from dataclasses import replace
 import math
 from pathlib import Path
 
-from lxml import etree
-import numpy as np
-import pytest
-
+from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.errors import InputError
+from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.game.game_file import load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_log import run_log_of
-from crgame_ros.scenario.export import write_scenario
-from crgame_ros.scenario.game import AvSpec, Game, HumanSpec
-from crgame_ros.scenario.game_file import load_game
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.simulation.cast import cast_avs
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
+from lxml import etree
+import numpy as np
+import pytest
 
 MERGE = 'more/C-DEU_MONAMerge-2_1_T-299.xml'
 HUMAN = (HumanSpec('hv0', 'idle'),)
@@ -38,6 +52,20 @@ def test_problems_on_one_spot_are_alternatives(shared_scenarios: Path) -> None:
     assert len(told) == 1 and '100025, 100055, 100059, 100041 start on one spot' in told[0]
     result = run_offline(setup, duration_s=0.5)
     assert not [item for item in result.violations if item.collision]
+
+
+def test_hundreds_of_alternatives_are_counted() -> None:
+    """Of 500 problems on one spot a few are named, and the remedy is still read."""
+    game = load_game(scenarios_directory() / 'cut_in.yaml')
+    loaded = load_scenario(game.scenario)
+    problem = loaded.planning_problems[0]
+    many = [PlanningProblem(number, problem.initial_state, problem.goal)
+            for number in range(1000, 1500)]
+    parts, (notice,) = cast_avs(Game(game.scenario, humans=HUMAN),
+                                replace(loaded, planning_problems=tuple(many)))
+    assert len(parts) == 1 and len(notice) < 480
+    assert 'problems 1000, 1001, 1002' in notice and 'and 491 more' in notice
+    assert '--problem' in notice
 
 
 def test_another_alternative_is_asked_for(shared_scenarios: Path) -> None:

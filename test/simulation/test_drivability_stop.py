@@ -1,22 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A human's violation ends an offline run at its very step, where the game says so."""
 
 from dataclasses import replace
 import json
 from pathlib import Path
 
-import numpy as np
-import pytest
-import yaml
-
 from crgame_ros.cli import main
+from crgame_ros.game.game import PoseSpawn
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
-from crgame_ros.scenario.game import PoseSpawn
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+import numpy as np
+import pytest
+import yaml
 
 # Well ahead of the AV, where nobody runs into the human: x, y, yaw and speed.
 STARTS = {'USA_US101-4_1_T-1': (43.57, -38.65, -0.7094, 5.331),

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The engine step by step: algorithm 1's order, requests, transforms, several vehicles."""
 
 from collections.abc import Sequence
@@ -8,22 +20,21 @@ from dataclasses import replace
 import hashlib
 from pathlib import Path
 
-import numpy as np
-import pytest
-import simulation_support as support
-from simulation_support import Array, HandDriven
-
-from crgame_ros.driver.command import DriverCommand
+from crgame_ros.game.game import AvSpec, HumanSpec, PoseSpawn
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.planner.joints import plan_from_joints
-from crgame_ros.scenario.game import AvSpec, HumanSpec, PoseSpawn
+from crgame_ros.messages.joints import plan_from_joints
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.plan_requests import PlanRequests
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import pytest
+import simulation_support as support
+from simulation_support import Array, HandDriven
 
 PAIR = (HumanSpec('hv0', 'idle', spawn=PoseSpawn(-80.0, 0.0, 0.0, 20.0)),
         HumanSpec('hv1', 'idle', spawn=PoseSpawn(-80.0, 8.0, 0.1, 10.0)))
@@ -231,7 +242,7 @@ def places(names: Sequence[str], positions: Array, velocities: Array) -> Array:
 
 
 def distances(points: Array) -> Array:
-    """Give the distances (Q, Q) between points (Q, 2)."""
+    """Give the (Q, Q) distances between points (Q, 2)."""
     return np.hypot(*np.moveaxis(points[:, None] - points[None], 2, 0))
 
 

@@ -1,26 +1,36 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whole offline runs with events: the AV reacts, planners change, and all of it repeats."""
 
 from dataclasses import replace
 import json
-from pathlib import Path
 from typing import Any
-
-import numpy as np
-import pytest
 
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
+from crgame_ros.game.events import AtStep, AtTime, EventList, FiredEvent
+from crgame_ros.game.game import Game
+from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.event_file import parse_events
-from crgame_ros.scenario.events import AtStep, AtTime, FiredEvent
-from crgame_ros.scenario.game import Game
-from crgame_ros.scenario.game_file import load_game
+from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.schema.reading import read
 from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.replay import with_recorded_events
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+import pytest
 
 CROSSING = scenarios_directory() / 'crossing.yaml'
 # The human has passed the crossing then, and the AV is about 15 m in front of it.
@@ -78,8 +88,8 @@ def test_runs_with_triggers_repeat_to_the_last_bit(game: Game) -> None:
 
 def test_recorded_events_repeat_a_run_as_conditions(game: Game) -> None:
     """The same bits without anybody at the buttons; nothing else fires by itself."""
-    clock = parse_events([{'name': 'clock', 'when': {'time': 3.0},
-                           'plan_display': {'av': 'av0', 'show': False}}], '', Path())
+    clock = read(EventList, [{'name': 'clock', 'when': {'time': 3.0},
+                              'plan_display': {'av': 'av0', 'show': False}}], '')
     game = replace(game, events=(*game.events, *clock))
     original = play(game, (700, 'leader-brakes'), (RELEASE_N, 'pedestrian'), duration_s=12.0)
     repeated = with_recorded_events(game, original.fired)
@@ -107,7 +117,7 @@ def test_speed_limit_of_one_lanelet(game: Game) -> None:
     """Only behind the crossing (lanelet 21, x > 170 m); in front of it 50 km/h hold."""
     entry = {'name': 'zone', 'speed_limit': {'speed': 5.0, 'lanelets': [21]},
              'when': {'time': 0.0}}
-    game = replace(game, humans=(), events=parse_events([entry], '', Path()))
+    game = replace(game, humans=(), events=read(EventList, [entry], ''))
     states = play(game).states_of('av0')
     ahead = states[:, StateColumn.X] < 120.0
     assert states[ahead, StateColumn.SPEED].max() > 12.5
@@ -123,8 +133,7 @@ def test_planner_is_replaced_in_the_run(game: Game, planner: str) -> None:
 
     The pedestrian tells them apart: only constant velocity does not care.
     """
-    swap = parse_events([{'name': 'swap', 'planner': {'av': 'av0', 'planner': planner}}], '',
-                        Path())
+    swap = read(EventList, [{'name': 'swap', 'planner': {'av': 'av0', 'planner': planner}}], '')
     game = replace(game, humans=(), events=(*game.events, *swap))
     result = play(game, (300, 'swap'), (600, 'pedestrian'), duration_s=9.5)
     record = result.planners['av0']

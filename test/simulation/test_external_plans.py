@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Plans of an external planner, which pass no adapter, are held to the road by the simulation."""
 
 from pathlib import Path
 import statistics
 import time
 
+from crgame_ros.game.game import DrivabilitySpec, Game
+from crgame_ros.messages.joints import JointSeries, plan_to_joints
+from crgame_ros.messages.plan import Plan
+from crgame_ros.planner.road_limit import RoadLimit
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import pytest
 from simulation_support import arc, av_of, ego_of, HandDriven, setup_of
-
-from crgame_ros.planner.interface import Plan
-from crgame_ros.planner.joints import JointSeries, plan_to_joints
-from crgame_ros.planner.road_limit import RoadLimit
-from crgame_ros.scenario.game import DrivabilitySpec, Game
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.simulation.setup import build_setup
-from crgame_ros.vehicle.state import VehicleState
 
 STEP_NS = 100_000_000
 

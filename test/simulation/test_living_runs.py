@@ -1,21 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whole offline runs with objects of the game's own and agents, beside events and recordings."""
 
 from typing import Any
 
+from crgame_ros.errors import InputError
+from crgame_ros.game.game_file import dump_game, parse_game
+from crgame_ros.game.objects import Role
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 import yaml
-
-from crgame_ros.errors import InputError
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game_file import dump_game, parse_game
-from crgame_ros.scenario.objects import Role
-from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.replay import with_recorded_events
-from crgame_ros.simulation.setup import build_setup, Setup
 
 
 def living(name: str, **changes: Any) -> Setup:
@@ -25,7 +36,7 @@ def living(name: str, **changes: Any) -> Setup:
 
 
 def speeds(result: OfflineResult) -> NDArray[np.float64]:
-    """Give the agents' speeds (ticks, A); NaN where absent."""
+    """Give the agents' (ticks, A) speeds; NaN where absent."""
     columns = result.setup.agent_columns
     return np.hypot(*np.moveaxis(result.object_velocities[:, columns, :2], -1, 0))
 

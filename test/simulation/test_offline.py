@@ -1,27 +1,39 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The offline runner: ideal planners at every latency, exact repetition, replay."""
 
 from dataclasses import replace
 import math
 from typing import ClassVar
 
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import AvSpec, DrivabilitySpec, HumanSpec
+from crgame_ros.game.game_file import load_game
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.planner.interface import Planner, PlannerContext
+from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.vehicle.driver_command import DriverCommand
 import numpy as np
 import pytest
 import simulation_support as support
 from simulation_support import Array
-
-from crgame_ros.driver.command import DriverCommand
-from crgame_ros.driver.replay import ReplayDriver
-from crgame_ros.driver.source import DriverSource
-from crgame_ros.errors import InputError
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.interface import Plan, Planner, PlannerContext, PlanRequest
-from crgame_ros.scenario.game import AvSpec, DrivabilitySpec, HumanSpec
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.setup import build_setup, Setup
 
 
 class IdealPlanner(Planner):

@@ -1,23 +1,34 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whole offline runs of an AV that perceives the world imperfectly (FS II-B)."""
 
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-import pytest
-import yaml
-
+from crgame_ros.game.game_file import parse_game
+from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.joints import JointSeries
-from crgame_ros.scenario.game_file import parse_game
 from crgame_ros.simulation.av_models import ego_of, make_perception, published_states
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.offline import OfflineResult, PlannerSeat, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.state import StateColumn, VehicleState
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+import yaml
 
 NOISY = {'localisation': {'position_noise': 0.3, 'yaw_noise': 0.02, 'speed_noise': 0.3}}
 BLIND = {'localisation': None,

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """From a game to placed vehicles."""
 
 import copy
@@ -8,17 +20,16 @@ import hashlib
 import math
 from pathlib import Path
 
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import AvSpec, HumanSpec, LaneletSpawn, PoseSpawn
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.objects import Role
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario, scenario_digest
+from crgame_ros.simulation.setup import build_setup
 import numpy as np
 import pytest
 import simulation_support as support
-
-from crgame_ros.errors import InputError
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.scenario.game import AvSpec, HumanSpec, LaneletSpawn, PoseSpawn
-from crgame_ros.scenario.game_file import load_game
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario, scenario_digest
-from crgame_ros.scenario.objects import Role
-from crgame_ros.simulation.setup import build_setup
 
 REACH = 1.4227170936
 

@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """A person takes an AV over and gives it back, in the engine and in the offline runner."""
 
 import math
 
-import numpy as np
-import simulation_support as support
-from simulation_support import HandDriven
-
-from crgame_ros.driver.command import DriverCommand
-from crgame_ros.driver.replay import ReplayDriver
+from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.offline import run_offline
+from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
+import numpy as np
+import simulation_support as support
+from simulation_support import HandDriven
 
 BRAKE = DriverCommand(brake=0.5).rounded()
 GAS_LEFT = DriverCommand(throttle=0.6, steering=0.05).rounded()

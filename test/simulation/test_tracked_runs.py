@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Whole offline runs whose AV executes its plans with a controller on a vehicle (FS II-C)."""
 
 from collections.abc import Iterator
@@ -9,23 +21,22 @@ from typing import Any
 
 from commonroad.planning.goal import GoalRegion
 from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import AvSpec, DrivabilitySpec, Game, ModelSpec
+from crgame_ros.game.game_file import dump_game, parse_game
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.roads.route import start_lanelet
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.route_lane import RouteLane
+from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 import yaml
-
-from crgame_ros.driver.command import DriverCommand
-from crgame_ros.driver.source import DriverSource
-from crgame_ros.errors import InputError
-from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.route import start_lanelet
-from crgame_ros.scenario.game import AvSpec, DrivabilitySpec, Game, ModelSpec
-from crgame_ros.scenario.game_file import dump_game, parse_game
-from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.route_lane import RouteLane
-from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.vehicle.state import StateColumn
 
 LIMIT = 11.5
 BIAS = 0.4

@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Offline runs in which nobody drives."""
 
 from pathlib import Path
 
-import numpy as np
-
+from crgame_ros.game.game import Game, TrafficSpec
+from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_log import run_log_of
-from crgame_ros.scenario.export import write_scenario
-from crgame_ros.scenario.game import Game, TrafficSpec
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+import numpy as np
 
 DURATION_S = 6.0
 

@@ -1,14 +1,25 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The rows of /timing/cycle: filled, taken, read again."""
 
-import numpy as np
-import pytest
-
-from crgame_ros.driver.command import DriverCommand
 from crgame_ros.errors import InputError
 from crgame_ros.timing.cycle_rows import CycleRows, CycleTable, TIMING_COLUMNS
 from crgame_ros.timing.time_controller import Cycle
+from crgame_ros.vehicle.driver_command import DriverCommand
+import numpy as np
+import pytest
 
 FIRST = Cycle(7, 0.07, 0.0701, 0.0001, 0.0002, 0.0101, 1, 0.3)
 SECOND = Cycle(8, 0.08, 0.0805, 0.0002, 0.0005, 0.0099, 2, 0.4)
@@ -51,7 +62,7 @@ def test_commands_keep_their_bits() -> None:
 
 
 def test_an_av_that_follows_its_plan_has_no_command() -> None:
-    """NaN in its four columns; the command of whoever takes it over otherwise."""
+    """It is NaN in its four columns; the command of whoever takes it over otherwise."""
     rows = CycleRows(('hv0', 'av0'), 2)
     rows.add(0, 1, FIRST, 0.0, 0.0, (LEFT, None))
     rows.add(0, 1, SECOND, 0.0, 0.0, (LEFT, BACK))

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Progress along a plan (CRG 15-16): the paper's way, which fails, and the default.
 
@@ -10,12 +22,11 @@ at the tick; it answers a stated number of steps later.
 import math
 from typing import Any
 
+from crgame_ros.timing.progress_tracker import ProgressTracker
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-
-from crgame_ros.timing.progress_tracker import ProgressTracker
-from crgame_ros.vehicle.state import VehicleState
 
 N = 10
 DT_C = 0.1

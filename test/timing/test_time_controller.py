@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The time controller on synthetic clocks (CRG 11-13)."""
 
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-import pytest
-
 from crgame_ros.errors import InputError
-from crgame_ros.scenario.game import TimingSpec
+from crgame_ros.game.game import TimingSpec
 from crgame_ros.timing.time_controller import Cycle, TimeController
 from crgame_ros.timing.timing_metrics import TimingMetrics
+import numpy as np
+import pytest
 
 DT = 0.01
 START_NS = 5_000_000_000

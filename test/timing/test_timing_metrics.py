@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The metrics of CRG table I on series whose values are known by hand."""
 
 import dataclasses
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-import pytest
-
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.scenario.game import TimingSpec
+from crgame_ros.game.game import TimingSpec
 from crgame_ros.timing.quantiles import LogHistogram
 from crgame_ros.timing.time_controller import TimeController
 from crgame_ros.timing.timing_metrics import TimingMetrics, TimingSummary
+import numpy as np
+from numpy.typing import NDArray
+import pytest
 
 DT = 0.01
 TABLE_I = ['final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',

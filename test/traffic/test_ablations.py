@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """What each behaviour of the agents is good for: the same situation with it and without."""
 
 from collections.abc import Sequence
@@ -7,19 +19,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 import shapely
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.spec import TrafficSpec
-from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
 
 FloatArray = NDArray[np.float64]
 
@@ -65,7 +76,7 @@ class Drive:
     speeds: FloatArray
 
     def accelerations(self) -> FloatArray:
-        """Give the accelerations (K - 1, C) [m/s^2]."""
+        """Give the (K - 1, C) accelerations [m/s^2]."""
         return np.diff(self.speeds, axis=0) / STEP_S
 
     def lanelets(self, k: int) -> list[int]:
@@ -85,7 +96,7 @@ class Drive:
              y[:, None] + corners[:, 0] * sin + corners[:, 1] * cos), axis=-1)))
 
     def distances(self, one: int, other: int) -> FloatArray:
-        """Give the distances (K) of two cars; 0 where they overlap [m]."""
+        """Give the (K) distances of two cars; 0 where they overlap [m]."""
         return np.asarray(shapely.distance(self.boxes(one), self.boxes(other)))
 
 

@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Lane changes for the route, past slow leaders and where a lane ends; courtesy; swerving."""
 
 from pathlib import Path
 
 from commonroad.scenario.scenario import Scenario
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.traffic.adoption import Adopted
 import numpy as np
 import pytest
 import traffic_support as support
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.spec import TrafficSpec
 
 NARROW = Shape.rectangle(1.0, 1.0)
 
@@ -190,3 +201,33 @@ def test_a_change_that_comes_to_nothing_ends_in_the_nearer_lane(y: float, lane: 
     assert traffic._graph.ids[agents.lane[0]] == lane
     assert agents.source[0] < 0
     assert abs(agents.d[0]) < 0.5
+
+
+def test_nobody_begins_a_change_where_a_junction_is_near_behind_a_short_lanelet() -> None:
+    """
+    Lanes 1 and 2 end at x = 200; lanelets of 6 m lie between them and a junction.
+
+    Whoever overtakes does so well before the junction or behind it: with 15 m left at least.
+    """
+    pair = {'adjacent_left_same_direction': True, 'adjacent_right_same_direction': True}
+    lanes = []
+    for first, begin, end in ((1, 0.0, 200.0), (3, 200.0, 206.0), (5, 206.0, 230.0),
+                              (7, 230.0, 600.0)):
+        links = {key: first + to for key, to in (('predecessor', -2), ('successor', 2))
+                 if 0 < first + to < 8}
+        for lane, y, side in ((first, 0.0, 'right'), (first + 1, -3.5, 'left')):
+            lanes.append(support.straight_lane(
+                lane, y, begin, end, **{f'adjacent_{side}': 2 * first + 1 - lane,
+                                        f'adjacent_{side}_same_direction':
+                                        pair[f'adjacent_{side}_same_direction']},
+                **{key: [value + lane - first] for key, value in links.items()}))
+    across = support.lane_strip(9, [(218.0, y) for y in np.linspace(-60.0, 60.0, 30)])
+    begins = []
+    for since in range(0, 60, 3):
+        # Somebody slow comes out of a drive, 25 m ahead.
+        run = support.Run(support.roads(*lanes, across), TrafficSpec(), 0,
+                          [support.human(175.0 + 0.9 * since, -3.5, 0.0, 5.0, since)],
+                          [agent(1, 150.0, -3.5, 9.0)]).ticks(250)
+        poses, _ = run.series(0)
+        begins.append(float(poses[np.argmax(poses[:, 1] > -3.4), 0]))
+    assert all(150.0 < x < 206.0 - 15.0 or x > 230.0 for x in begins), begins

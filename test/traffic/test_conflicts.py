@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Where lanes cross and who has the right of way, on maps with signs and without."""
 
 from pathlib import Path
 
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.conflicts import Conflicts, roundabouts
+from crgame_ros.traffic.lane_graph import LaneGraph
 import numpy as np
 import pytest
 import shapely
 import traffic_support as support
-
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.conflicts import Conflicts
-from crgame_ros.traffic.lane_graph import LaneGraph
 
 
 def built(path: Path) -> tuple[LaneGraph, Conflicts]:
@@ -48,7 +59,37 @@ def test_who_is_in_the_roundabout_goes_first(maps: Path) -> None:
     graph, conflicts = built(maps / 'ZAM_Roundabout-1_1_T-1.xml')
     assert len(conflicts) == 8
     for arm in (10, 20, 30, 40):
-        assert conflicts.priority[row_of(graph, conflicts, arm + 5, arm + 3)] == 1
+        assert conflicts.priority[row_of(graph, conflicts, arm + 5, arm + 3)] == 2
+        assert conflicts.priority[row_of(graph, conflicts, arm + 3, arm + 5)] == -2
+
+
+@pytest.mark.parametrize(('name', 'ring'), [
+    ('more/BRA_SantaRita-1', {29, 123, 10, 176, 73, 95, 43, 140}),
+    ('more/ITA_CarpiCentro-9_6_T-1', {48082, 48452, 48075, 48434}),
+    # A triangle of roads around an island, and a town with blocks to drive around.
+    ('more/HRV_Pula-27_3_T-1', set()), ('more/DEU_Starnberg-1_1_T-1', set())])
+def test_roundabouts_are_found_on_published_maps(shared_scenarios: Path, name: str,
+                                                 ring: set[int]) -> None:
+    graph = LaneGraph(RoadNetwork(load_scenario(
+        shared_scenarios / f'{name}.xml').scenario.lanelet_network))
+    assert {graph.ids[i] for i in np.flatnonzero(roundabouts(graph))} == ring
+
+
+def test_room_behind_a_merge_begins_where_the_ways_are_one() -> None:
+    slip = [(60.0, -20.0), (80.0, -6.0), (90.0, -2.0), (100.0, 0.0), (140.0, 0.0)]
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, 60.0, 140.0, successor=[3]),
+        support.lane_strip(2, shapely.get_coordinates(shapely.segmentize(
+            shapely.LineString(slip), 1.0)).tolist(), successor=[3]),
+        support.straight_lane(3, 0.0, 140.0, 200.0, predecessor=[1, 2]))
+    graph = LaneGraph(RoadNetwork(scenario.lanelet_network))
+    conflicts = Conflicts(graph)
+    row = row_of(graph, conflicts, 1, 2)
+    # The conflict lasts until both have left it, but from x = 100 - 0.8 / 0.2 on one is behind
+    # the other.
+    assert conflicts.merges[row] and conflicts.end[row] == pytest.approx(80.0, abs=1.0)
+    leave = conflicts.table.leave[:, graph.index[1]]
+    assert leave == pytest.approx([36.0, 36.0], abs=1.0)
 
 
 def test_without_signs_who_comes_from_the_right_goes_first() -> None:

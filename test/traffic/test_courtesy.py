@@ -1,15 +1,26 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Cooperative lane changes: the gap that courtesy opens, and the shock wave that it spares."""
-
-import numpy as np
-from numpy.typing import NDArray
-import pytest
 
 from crgame_ros.traffic import courtesy
 from crgame_ros.traffic.car_following import AdaptiveCruise
 from crgame_ros.traffic.courtesy import CourtesyRules, fading
 from crgame_ros.traffic.lane_change import GapAcceptance
+import numpy as np
+from numpy.typing import NDArray
+import pytest
 
 Array = NDArray[np.float64]
 LENGTH = 4.5
@@ -74,15 +85,15 @@ def test_nobody_brakes_harder_for_others_than_the_own_limit() -> None:
     # 2 * 16 / 16 = 2 m/s^2 are wanted, a drop of 8 m/s.
     generous = CourtesyRules(max_speed_drop=10.0)
     b, yields = generous.courtesy_deceleration(v, np.full(4, -6.0), v, np.full(4, 10.0), hurry,
-                                                temper)
+                                               temper)
     np.testing.assert_array_equal(yields, [False, True, False, False])
     np.testing.assert_allclose(b, [0.0, 2.0, 0.0, 0.0])
     _, yields = rules.courtesy_deceleration(v, np.full(4, -6.0), v, np.full(4, 10.0), hurry,
-                                             temper)
+                                            temper)
     assert not yields.any()
     # A gap that is wide enough asks for nothing, not even of the aggressive.
     b, yields = rules.courtesy_deceleration(v, np.full(4, 20.0), v, np.full(4, 10.0), hurry,
-                                             temper)
+                                            temper)
     assert not yields.any() and (b == 0.0).all()
     # Nobody stops for it.
     assert not rules.courtesy_deceleration(one(1.0), one(0.0), one(1.0), one(5.0), 1.0, 0.0)[1][0]

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Crossings: right of way, gaps, red lights, and nobody waits for ever."""
 
 from pathlib import Path
@@ -13,14 +25,13 @@ from commonroad.scenario.traffic_light import (
     TrafficLightState,
 )
 from commonroad.scenario.traffic_sign import TrafficSign, TrafficSignElement, TrafficSignIDGermany
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.adoption import Adopted
 import numpy as np
 import pytest
 import traffic_support as support
-
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.spec import TrafficSpec
 
 NAME = 'ZAM_Intersection-1_1_T-1.xml'
 MOUTH = 18.0
@@ -134,6 +145,23 @@ def test_a_red_light_holds_until_it_is_green() -> None:
     assert np.isnan(poses[-1, 0]) or poses[-1, 0] > 150.0
 
 
+def test_who_starts_when_a_light_turns_yellow_stops_if_that_takes_less_than_hard_braking() -> None:
+    taken = set()
+    for green in range(5, 60, 3):
+        scenario = lane_with_a_light(((TrafficLightState.GREEN, green),
+                                      (TrafficLightState.YELLOW, 3),
+                                      (TrafficLightState.RED, 1000)))
+        run = support.Run(scenario, TrafficSpec(), 0, (), [support.driving(
+            1, [(88.0, 0.0, 0.0), (190.0, 0.0, 0.0)], 0.0)]).ticks(green + 60)
+        poses, speeds = run.series(0)
+        left = 100.0 - (poses[green, 0] + 2.25)
+        stops = bool(poses[-1, 0] + 2.25 < 100.2)
+        if left > 0.1 and speeds[green] ** 2 / (2.0 * left) < 2.8:
+            assert stops, (green, speeds[green], left)
+        taken.add(stops)
+    assert taken == {False, True}
+
+
 def test_a_green_light_holds_nobody() -> None:
     run = support.Run(lane_with_a_light(((TrafficLightState.GREEN, 1000),)), TrafficSpec(), 0,
                       (), one()).ticks(120)
@@ -168,6 +196,23 @@ def test_nobody_blocks_a_junction_behind_which_there_is_no_room() -> None:
     poses, speeds = run.series(0)
     # It would fit behind the human with its rear on the other lane.
     assert speeds[-1] == 0.0 and poses[-1, 0] + 2.25 < 118.25
+
+
+def test_who_stands_before_a_full_way_turns_off_after_a_while() -> None:
+    left = [(100.0, 0.0), (104.0, 0.6), (107.0, 3.0), (108.5, 7.0), (108.5, 60.0)]
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 100.0, successor=[2, 3]),
+        support.straight_lane(2, 0.0, 100.0, 200.0, predecessor=[1]),
+        support.lane_strip(3, left, predecessor=[1]),
+        support.lane_strip(4, [(104.0, y) for y in np.linspace(-60.0, 60.0, 80)]))
+    run = support.Run(scenario, TrafficSpec(), 0, [support.human(113.8, 0.0, 0.0)], [
+        support.driving(1, [(60.0, 0.0, 0.0), (190.0, 0.0, 0.0)], 8.0)]).ticks(500)
+    poses, speeds = run.series(0)
+    stood = np.flatnonzero(speeds < 0.05)
+    # For 15 s, before the junction.
+    assert 145 < len(stood) < 165 and poses[stood[-1], 0] + 2.25 < 101.0
+    assert np.nanmax(poses[:, 1]) > 30.0
+    assert run.overlaps() == []
 
 
 @pytest.mark.slow

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Left-hand traffic: a mirrored map is driven as the mirror image, to the same rules mirrored."""
 
 from pathlib import Path
@@ -7,17 +19,16 @@ from pathlib import Path
 from commonroad.scenario.intersection import Intersection, IntersectionIncomingElement
 from commonroad.scenario.lanelet import Lanelet, StopLine
 from commonroad.scenario.scenario import Scenario
-import numpy as np
-import pytest
-import traffic_support as support
-
+from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.driving_side import driving_side, LEFT_HAND, PRIORITY_TO_THE_RIGHT
 from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.spec import TrafficSpec
+import numpy as np
+import pytest
+import traffic_support as support
 
 FLIP = np.array([1.0, -1.0])
 

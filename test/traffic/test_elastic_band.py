@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The elastic band (FS M1) against its closed form and against boxes moved along it."""
 
 import math
 
+from crgame_ros.errors import InputError
+from crgame_ros.traffic.elastic_band import _band, Bands, ElasticBand
+from crgame_ros.traffic.passage import Obstacles
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from scipy.optimize import lsq_linear
 from shapely import affinity
 from shapely.geometry import box, Polygon
-
-from crgame_ros.errors import InputError
-from crgame_ros.traffic.elastic_band import _band, Bands, ElasticBand
-from crgame_ros.traffic.passage import Obstacles
 
 Array = NDArray[np.float64]
 S = 301
@@ -142,8 +153,8 @@ def test_less_than_the_wanted_clearance_is_taken_before_the_lane_is_blocked() ->
 @pytest.mark.parametrize(('d', 'left', 'right', 'side'), [
     (0.3, 5.0, 5.0, -1.0), (-0.3, 5.0, 5.0, 1.0), (0.0, 5.0, 5.0, 1.0), (0.0, 4.0, 5.0, -1.0),
     (0.0, 5.0, 4.0, 1.0), (1.6, 9.0, 1.75, -1.0)])
-def test_the_nearer_side_is_taken_then_the_one_with_more_room(d: float, left: float,
-                                                             right: float, side: float) -> None:
+def test_the_nearer_side_is_taken_then_the_one_with_more_room(
+        d: float, left: float, right: float, side: float) -> None:
     """A tie of both goes to the left."""
     bands = one_lane(ElasticBand(), obstacles((0, 150.0, d, 2.0, 0.5)), left=left, right=right)
     assert np.sign(bands.d[0, 150]) == side

@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who is really in the way, and how hard one brakes for that; checked with shapely."""
 
-import numpy as np
-import pytest
-import traffic_support as support
-
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.traffic.agents import Agents
 from crgame_ros.traffic.encounters import BEFORE, BESIDE, FIRMEST, needed_braking
 from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.spec import TrafficSpec
+import numpy as np
+import pytest
+import traffic_support as support
 
 HORIZON, STEP = 3.0, 0.05
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """
 Dense traffic on published maps, judged from outside (benchmarks/judge).
 
@@ -8,12 +20,11 @@ The long form is benchmarks/traffic_judge.py: every map, three seeds, five minut
 
 from pathlib import Path
 
+from crgame_ros.game.traffic_spec import TrafficSpec
 from judge.roads import JudgedRoads
 from judge.verdict import judge, LATERAL_P99, Verdict
 import pytest
 from traffic_drive import drive
-
-from crgame_ros.traffic.spec import TrafficSpec
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 # Lights with arrows, and without an intersection; narrow bends; vehicles that are recorded close
@@ -61,3 +72,29 @@ def test_nobody_stands_for_good_where_a_ramp_ends() -> None:
     # from 15 s on: for more than 90 s in this time.
     found = verdict('ZAM-Ramp-1_1-T-1', TrafficSpec(agents=30, flow=900.0), 110.0, 1, False)
     assert never(found) == []
+
+
+# Short roads between junctions, full in a circle; lanes beside each other that merge with a third
+# one behind a bend; bends of 3 m; a triangle of junctions around an island; two junctions in one.
+@pytest.mark.slow
+@pytest.mark.parametrize(('name', 'seed', 'seconds', 'speed'), [
+    ('more/BEL_Putte-8_2_T-1', 0, 180.0, 2.2), ('DEU_Guetersloh-36_1_T-1', 2, 240.0, 2.2),
+    ('more/DZA_Annaba-7', 3, 65.0, 5.0), ('more/DEU_Moabit-4_1_T-1', 1, 60.0, 4.0),
+    ('more/HRV_Pula-27_3_T-1', 2, 100.0, 1.5), ('more/DEU_Starnberg-1_1_T-1', 0, 195.0, 1.2)])
+def test_dense_towns_go_on_without_a_jam_for_good(name: str, seed: int, seconds: float,
+                                                  speed: float) -> None:
+    found = verdict(name, TrafficSpec(recorded='reactive', agents=40, flow=400.0), seconds, seed)
+    assert never(found) == []
+    assert not [x for x in found.events if x.what == 'vanished']
+    assert found.mean_speed > speed
+
+
+@pytest.mark.slow
+def test_a_full_roundabout_stays_open(maps: Path) -> None:
+    # Entered by everybody before whom there is room it is full after a minute, all around.
+    driven = drive(maps / 'ZAM_Roundabout-1_1_T-1.xml', TrafficSpec(agents=40, flow=400.0),
+                   150.0, 2)
+    found = judge(driven.history, JudgedRoads(driven.scenario.scenario.lanelet_network))
+    assert never(found) == []
+    assert not [x for x in found.events if x.what == 'vanished']
+    assert found.mean_speed > 2.5

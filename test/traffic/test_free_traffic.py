@@ -1,20 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Free traffic on maps of every kind: nobody hits anybody, whatever the map is like."""
 
 from pathlib import Path
 
+from crgame_ros.game.objects import Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 import pytest
 import traffic_support as support
-
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.objects import Role
-from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.spec import TrafficSpec
-from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
 
 MAPS = ('ZAM_Merge-1_1_T-1.xml', 'ZAM_Intersection-1_1_T-1.xml', 'ZAM_Roundabout-1_1_T-1.xml')
 

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """The judge of traffic finds what is wrong in hand-made states, and nothing in clean ones."""
 
 from collections.abc import Sequence
@@ -17,7 +29,7 @@ from commonroad.scenario.traffic_light import (
     TrafficLightDirection,
     TrafficLightState,
 )
-from judge.history import FloatArray, History, rectangle
+from judge.history import FloatArray, History
 from judge.lights import red_lines
 from judge.motion import lateral, off_road
 from judge.overlaps import overlaps, touching
@@ -31,6 +43,7 @@ from traffic_support import lane_strip, roads, straight_lane
 
 DT = 0.1
 CAR = (4.5, 1.8)
+CORNERS = np.array(((1, 1), (-1, 1), (-1, -1), (1, -1)))
 
 
 def seen(*tracks: FloatArray, sizes: Sequence[tuple[float, float]] = (), others: int = 0,
@@ -42,7 +55,7 @@ def seen(*tracks: FloatArray, sizes: Sequence[tuple[float, float]] = (), others:
     lights = np.array([[x] for x in light]) if light else None
     return History(DT, tuple(f't{i}' for i in range(len(tracks))),
                    tuple(kinds or ['car'] * len(tracks)), len(tracks) - others,
-                   tuple(rectangle(*x) for x in sizes), poses, velocities,
+                   tuple(0.5 * CORNERS * x for x in sizes), poses, velocities,
                    (9,) if light else (), lights)
 
 
@@ -211,6 +224,25 @@ def test_stands_are_explained_by_lights_queues_and_humans_only() -> None:
     assert {x.ids for x in stands(facing, lanes)} == {('t0',), ('t1',)}
     creeps = first + np.outer(np.arange(1201) * 0.01, (1.0, 0.0, 0.0))
     assert stands(seen(creeps, light=none), lanes) == []
+
+
+def test_a_queue_behind_the_junction_explains_who_waits_before_it() -> None:
+    lanes = JudgedRoads(junction(True).lanelet_network)
+    none = ['green'] * 1201
+    # Lane 8 crosses lane 2 up to x = 19.75. The first of the queue behind it creeps on, and
+    # the second has its rear at 24 m, or at 40 m.
+    moving = along([(31.0, 0.0), (75.0, 0.0)], 0.2, 120.0)
+    waits = standing(-5.0, 0.0, 120.0)
+    for rear, expected in ((24.0, []), (40.0, ['t0'])):
+        second = standing(rear + 2.25, 0.0, 120.0)
+        found = stands(seen(waits, second, moving + (rear - 24.0, 0.0, 0.0), light=none), lanes)
+        assert [i for x in found for i in x.ids] == expected
+    # It went left in the end: who stands straight on was not in its way.
+    left = np.concatenate((np.tile(along(LEFT, 8.0, 0.0, 55.0), (1100, 1)),
+                           along(LEFT, 8.0, 10.0, 55.0)))
+    found = stands(seen(left, standing(26.25, 0.0, 120.0)[:len(left)], moving[:len(left)],
+                        light=none[:len(left)]), lanes)
+    assert {i for x in found for i in x.ids} == {'t0'}
 
 
 def test_lateral_acceleration_is_that_of_a_circle() -> None:

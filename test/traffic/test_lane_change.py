@@ -1,13 +1,20 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Lane changes (FS 4) against the linear system of their conditions, and gap acceptance."""
 
 import math
-
-import numpy as np
-from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
-import pytest
 
 from crgame_ros.traffic import lane_change
 from crgame_ros.traffic.car_following import AdaptiveCruise
@@ -19,6 +26,10 @@ from crgame_ros.traffic.lane_change import (
     PEAK,
     quintic,
 )
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+import pytest
 
 Array = NDArray[np.float64]
 # The functions of one vehicle, for several.
@@ -121,7 +132,7 @@ def test_changes_are_made_into_gaps_that_are_wide_enough() -> None:
 
 
 def test_nobody_there_needs_no_speed() -> None:
-    """NaN as the speed of absent vehicles changes nothing."""
+    """A NaN as the speed of absent vehicles changes nothing."""
     v, nobody, unknown = np.array([20.0]), np.array([np.inf]), np.array([np.nan])
     assert GapAcceptance().accepts(v, nobody, unknown, nobody, unknown, unknown, unknown).all()
 

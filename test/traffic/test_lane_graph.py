@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Lane tables against the road network's own geometry."""
 
 from pathlib import Path
 
+from crgame_ros.errors import InputError
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.lane_cells import cell_of, LaneCells
+from crgame_ros.traffic.lane_graph import LaneGraph
 import numpy as np
 import pytest
 import traffic_support as support
-
-from crgame_ros.errors import InputError
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.lane_cells import LaneCells
-from crgame_ros.traffic.lane_graph import LaneGraph
 
 
 def graph_of(path: Path) -> LaneGraph:
@@ -54,9 +65,12 @@ def test_curvature_is_that_of_the_circle(maps: Path) -> None:
 
 def test_lanes_near_a_point_hold_every_lane_that_contains_it(maps: Path) -> None:
     graph = graph_of(maps / 'ZAM_Intersection-1_1_T-1.xml')
-    cells, random = LaneCells(graph), np.random.default_rng(3)
+    cells, random = LaneCells(graph).table, np.random.default_rng(3)
     points = random.uniform(-25.0, 25.0, (400, 2))
-    row, lane, guess = cells.near(points)
+    near = [(i, n) for i, (x, y) in enumerate(points) if (cell := cell_of(cells, x, y)) >= 0
+            for n in range(cells.starts[cell], cells.starts[cell + 1])]
+    row, place = np.array(near).T
+    lane, guess = cells.lanes[place], cells.guesses[place]
     found = set(zip(row.tolist(), lane.tolist(), strict=True))
     lanelets = graph.network.lanelet_network.find_lanelet_by_position(list(points))
     expected = {(i, graph.index[j]) for i, ids in enumerate(lanelets) for j in ids}

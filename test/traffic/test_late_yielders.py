@@ -1,22 +1,33 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Drivers who see late that they have to yield: they brake hard, and still yield."""
 
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.game.game import Game
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.traffic.meetings import CrossingRules
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 import traffic_support as support
-
-from crgame_ros.scenario.game import Game
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.simulation.offline import run_offline
-from crgame_ros.simulation.setup import build_setup
-from crgame_ros.traffic.meetings import CrossingRules
-from crgame_ros.traffic.spec import TrafficSpec
 
 LATE = CrossingRules().late
 # What agents brake with for a line that they see in time [m/s^2].

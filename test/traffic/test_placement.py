@@ -1,17 +1,28 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Who is in which lane: what is left out early makes no difference."""
 
 from pathlib import Path
 
-import numpy as np
-import pytest
-
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.placement import Bodies, place
+import numpy as np
+import pytest
 
 MAPS = ('DEU_Flensburg-10_1_T-1', 'DEU_Guetersloh-36_1_T-1', 'USA_Lanker-1_3_T-1',
         'USA_US101-4_1_T-1', 'FRA_Anglet-1_1_T-1', 'more/DEU_Starnberg-1_1_T-1')

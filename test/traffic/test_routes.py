@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Destinations and the lanes that lead there."""
 
 from pathlib import Path
 
-import numpy as np
-import traffic_support as support
-
-from crgame_ros.planner.route import find_route
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.route import find_route
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.road_network import RoadNetwork
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.routes import Routes
+import numpy as np
+import traffic_support as support
 
 
 def network(path: Path) -> RoadNetwork:

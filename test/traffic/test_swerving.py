@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """How fast a swerve may be driven: the tables of `Swerving` against bicycles that drive it."""
 
-import numpy as np
-import pytest
-from test_tracking import move, steer
-import traffic_support as support
-
-from crgame_ros.scenario.road_network import RoadNetwork
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries
+from crgame_ros.traffic.pursuit import pursuit_distance
 from crgame_ros.traffic.routes import Routes
 from crgame_ros.traffic.swerving import CUT, cutting_speed, Swerving
-from crgame_ros.traffic.tracking import pursuit_distance
+import numpy as np
+import pytest
+from test_pursuit import move, steer
+import traffic_support as support
 
 LIMIT = 2.0
 

@@ -1,21 +1,32 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Which lanes are too tight for whom; what is on the road is checked by the judge's own area."""
 
 from pathlib import Path
 
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.traffic.lane_graph import LaneGraph
+from crgame_ros.traffic.spawning import CAR, LARGE_CAR, TRUCK
+from crgame_ros.traffic.tightness import tight_lanes
 from judge.motion import off_road
 from judge.roads import JudgedRoads
 import numpy as np
 import pytest
 from traffic_drive import drive
 import traffic_support as support
-
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.spawning import CAR, TRUCK
-from crgame_ros.traffic.spec import TrafficSpec
-from crgame_ros.traffic.tightness import tight_lanes
 
 
 def bend(radius: float) -> LaneGraph:
@@ -37,9 +48,18 @@ def test_a_bend_is_too_tight_where_the_swept_width_is_more_than_the_lane(
     # 4.5 m of a lane of 3.5 m, at 25 m 3.2 m; a car of 4.5 m takes 2.5 m at 9 m and
     # more than the lane has at 3 m.
     graph = bend(radius)
-    assert tight_lanes(graph, TRUCK)[1] == truck
-    assert tight_lanes(graph, CAR)[1] == car
-    assert not tight_lanes(graph, CAR)[0]
+    for_cars, for_trucks = tight_lanes(graph, CAR, CAR, TRUCK)
+    assert for_trucks[1] == truck
+    assert for_cars[1] == car
+    assert not for_cars[0]
+
+
+def test_a_straight_lane_that_only_large_cars_are_tried_in_is_wide_enough() -> None:
+    # 2.45 m: less room beside a car of 1.9 m than asked for without a trial, more beside 1.8 m.
+    graph = LaneGraph(RoadNetwork(support.roads(support.lane_strip(
+        1, [(0.0, 0.0), (80.0, 0.0)], width=2.45)).lanelet_network))
+    for_cars, _ = tight_lanes(graph, CAR, LARGE_CAR, TRUCK)
+    assert not for_cars.any()
 
 
 @pytest.mark.parametrize('name', ['more/DEU_Moelln-10_2_T-1', 'more/BEL_Putte-8_2_T-1',
@@ -53,3 +73,14 @@ def test_trucks_stay_on_published_roads(name: str, shared_scenarios: Path) -> No
     events, away = off_road(driven.history, roads)
     assert [x for x in events if x.what == 'off road'] == []
     assert away[:, trucks].max() < 0.25
+
+
+def test_a_recorded_truck_swings_out_where_its_way_is_too_tight(shared_scenarios: Path) -> None:
+    driven = drive(shared_scenarios / 'more' / 'DEU_Moelln-10_2_T-1.xml', TrafficSpec(
+        recorded='reactive'), 9.0, 0)
+    roads = JudgedRoads(driven.scenario.scenario.lanelet_network)
+    events, away = off_road(driven.history, roads)
+    assert [x.ids for x in events if x.what == 'off road'] == []
+    # It is there, and takes all the room that it has.
+    truck = driven.history.ids.index('o30')
+    assert 0.05 < away[:, truck].max() < 0.2

@@ -1,20 +1,31 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Traffic as a whole: agents see the human and react, and the same calls give the same bits."""
 
 from pathlib import Path
 
 from commonroad.scenario.scenario import Scenario
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.speed_limits import set_speed_limit
+from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.car_following import CarFollowing
 import numpy as np
 import pytest
 import traffic_support as support
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.speed_limits import set_speed_limit
-from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.car_following import CarFollowing
-from crgame_ros.traffic.spec import TrafficSpec
 
 MERGE, CROSSING = 'ZAM_Merge-1_1_T-1.xml', 'ZAM_Intersection-1_1_T-1.xml'
 

@@ -1,11 +1,27 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Everything that traffic runs is compiled, and loaded, before it is needed."""
 
 import json
 from pathlib import Path
+import shutil
 import subprocess
 import sys
+
+from crgame_ros.traffic import cache
+import pytest
 
 # Counts what each compiled function has been compiled or loaded for, before and after drives.
 SCRIPT = """
@@ -22,7 +38,7 @@ def count():
 drive_everything()
 before = count()
 from traffic_drive import drive
-from crgame_ros.traffic.spec import TrafficSpec
+from crgame_ros.game.traffic_spec import TrafficSpec
 for path in sys.argv[2:]:
     drive(Path(path), TrafficSpec(recorded='reactive', agents=30, flow=600.0), 25.0)
 print(json.dumps([len(before), {x: n for x, n in count().items() if n != before[x]}]))
@@ -41,3 +57,20 @@ def test_a_run_compiles_and_loads_nothing_more(maps: Path,
     assert done.returncode == 0, done.stderr
     functions, more = json.loads(done.stdout.splitlines()[-1])
     assert functions > 40 and more == {}
+
+
+@pytest.mark.parametrize('file', ['traffic/agents.py', 'vehicle/standstill.py'])
+def test_what_is_compiled_in_names_the_cache(file: str, tmp_path: Path,
+                                             monkeypatch: pytest.MonkeyPatch) -> None:
+    """`waiting` uses agents and a threshold: code compiled with others is not loaded again."""
+    package = Path(cache.__file__).parents[1]
+    for folder in ('traffic', 'vehicle'):
+        shutil.copytree(package / folder, tmp_path / folder,
+                        ignore=shutil.ignore_patterns('__pycache__'))
+    monkeypatch.setattr(cache, '_HERE', tmp_path / 'traffic')
+    before = cache.digest.__wrapped__('waiting')
+    assert before == cache.digest('waiting')
+    with (tmp_path / file).open('a') as changed:
+        changed.write('# Changed.\n')
+    assert cache.digest.__wrapped__('waiting') != before
+    assert cache.digest.__wrapped__('driving_side') == cache.digest('driving_side')

@@ -1,5 +1,17 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Running traffic in tests, and looking for overlaps independently of its own geometry."""
 
 from collections.abc import Sequence
@@ -9,19 +21,18 @@ from pathlib import Path
 
 from commonroad.scenario.lanelet import Lanelet
 from commonroad.scenario.scenario import Scenario
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.traffic import Traffic
+from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 import shapely
 from shapely import affinity
-
-from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.scenario.objects import ObjectDescription, Role
-from crgame_ros.scenario.road_network import RoadNetwork
-from crgame_ros.scenario.signals import TrafficLights
-from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.spec import TrafficSpec
-from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world import WorldView
 
 CAR = Shape.rectangle(4.5, 1.8)
 SUBSTEPS = 10

@@ -1,18 +1,29 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Vehicle parameters: the shipped car against its sources, and refusals."""
 
 import math
 from pathlib import Path
 from typing import Any
 
-import pytest
-from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
-import yaml
-
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
+import pytest
+from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
+import yaml
 
 SHIPPED = config_directory() / 'vehicles' / 'bmw_320i.yaml'
 
@@ -68,7 +79,10 @@ def test_file_of_the_users_own(tmp_path: Path) -> None:
     ({'mass': 'heavy'}, '"mass" is \'heavy\''), ({'mass': True}, '"mass" is True'),
     ({'mass': math.nan}, '"mass" is nan'), ({'mass': -1.0}, '"mass" is -1.0'),
     ({'mass': 0.0}, '"mass" is 0.0'), ({'mass': math.inf}, '"mass" is inf'),
-    ({'mass': 10**400}, '"mass" is 1000'), ({'wheelbase': 0}, '"wheelbase" is 0'),
+    ({'mass': 10**400}, 'is no YAML (a number has 401 digits'),
+    ({'rear_to_center': 1e308}, '"rear_to_center" is 1e+308'),
+    ({'length': 101}, '"length" is 101'),
+    ({'wheelbase': 0}, '"wheelbase" is 0'), ({'mass': 1e-300}, '"mass" is 1e-300'),
     ({'longitudinal_lag': 0.0}, '"longitudinal_lag" is 0.0'),
     ({'max_steering_rate': -0.4}, '"max_steering_rate" is -0.4'),
     ({'rolling_resistance': -0.1}, '"rolling_resistance" is -0.1')])
@@ -93,5 +107,5 @@ def test_other_content_is_refused(tmp_path: Path, content: bytes, named: str) ->
 
 def test_unknown_name_is_refused() -> None:
     """The remedy says where the names are."""
-    with pytest.raises(InputError, match='trabant.yaml: cannot read the vehicle .*; name a file'):
+    with pytest.raises(InputError, match='trabant.yaml: there is no such vehicle; name a file'):
         load_vehicle_parameters('trabant')

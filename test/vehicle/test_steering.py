@@ -1,19 +1,30 @@
 # Copyright 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 """Steering wheel to front wheels (CRG 26-27)."""
 
 from dataclasses import replace
 import math
 from pathlib import Path
 
+from crgame_ros.errors import InputError
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from crgame_ros.vehicle.steering import load_steering_ratio, Steering, steering_rate
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 import yaml
-
-from crgame_ros.errors import InputError
-from crgame_ros.vehicle.parameters import load_vehicle_parameters
-from crgame_ros.vehicle.steering import load_steering_ratio, Steering
 
 VEHICLE = load_vehicle_parameters()
 GOOD = {'speed': [0.0, 10.0], 'steering_wheel_angle': [0.0, 4.0],
@@ -73,30 +84,29 @@ def test_steering_grows_less_direct_with_speed() -> None:
 
 def test_rate_reaches_the_target_within_the_step() -> None:
     """CRG 27: (delta* - delta) / dt, up to the 0.4 rad/s of vehicle 2."""
-    steering = Steering(VEHICLE)
-    assert steering.rate(0.102, 0.1, 0.01) == pytest.approx(0.2)
-    assert steering.rate(0.098, 0.1, 0.01) == pytest.approx(-0.2)
-    assert steering.rate(0.5, 0.1, 0.01) == 0.4
-    assert steering.rate(-0.5, 0.1, 0.01) == -0.4
+    limit = VEHICLE.max_steering_rate
+    assert steering_rate(0.102, 0.1, 0.01, limit) == pytest.approx(0.2)
+    assert steering_rate(0.098, 0.1, 0.01, limit) == pytest.approx(-0.2)
+    assert steering_rate(0.5, 0.1, 0.01, limit) == 0.4
+    assert steering_rate(-0.5, 0.1, 0.01, limit) == -0.4
 
 
 def test_unlimited_rate_is_the_papers() -> None:
     """With `max_steering_rate: .inf` the angle is the target after any step."""
-    steering = Steering(replace(VEHICLE, max_steering_rate=math.inf))
-    assert 0.1 + 0.01 * steering.rate(0.5, 0.1, 0.01) == pytest.approx(0.5)
+    assert 0.1 + 0.01 * steering_rate(0.5, 0.1, 0.01, math.inf) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(('changes', 'named'), [
-    ({'speed': None}, '"speed" is missing'),
+    ({'speed': None}, '"speed" is None; give a list of numbers'),
     ({'speed': [10.0, 0.0]}, '"speed" does not ascend'),
-    ({'speed': [0.0, math.nan]}, '"speed" does not ascend'),
+    ({'speed': [0.0, math.nan]}, '"speed" holds nan; give a list of numbers'),
     ({'steering_wheel_angle': [0.0]}, '"steering_wheel_angle" does not ascend'),
-    ({'steering_wheel_angle': ['left', 'right']}, 'no number'),
+    ({'steering_wheel_angle': ['left', 'right']}, "holds 'left'"),
     ({'ratio': [[5.0, 4.0]]}, '"ratio" does not fit the grid'),
     ({'ratio': [[5.0], [4.0]]}, '"ratio" does not fit the grid'),
-    ({'ratio': 5.0}, 'no number'),
-    ({'ratio': [[5.0, 4.0], [0.0, 3.0]]}, 'not positive'),
-    ({'ratio': [[5.0, 4.0], [math.inf, 3.0]]}, 'not positive')])
+    ({'ratio': 5.0}, '"ratio" is 5.0; give a list of lists of numbers above 0'),
+    ({'ratio': [[5.0, 4.0], [0.0, 3.0]]}, 'ratio[1]: holds 0.0; give a list of numbers above 0'),
+    ({'ratio': [[5.0, 4.0], [math.inf, 3.0]]}, 'ratio[1]: holds inf; give')])
 def test_bad_table_is_refused(tmp_path: Path, changes: dict[str, object], named: str) -> None:
     """The message names the file and what is wrong in it."""
     path = write_table(tmp_path, **changes)
@@ -108,5 +118,5 @@ def test_bad_table_is_refused(tmp_path: Path, changes: dict[str, object], named:
 
 def test_missing_table_is_refused(tmp_path: Path) -> None:
     """A vehicle that names a table which isn't there."""
-    with pytest.raises(InputError, match='cannot read the steering ratios'):
+    with pytest.raises(InputError, match='cannot read the table of steering ratios'):
         load_steering_ratio(str(tmp_path / 'none.yaml'))

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The WebSocket to the cockpit's server: it comes back by itself and feeds the store. */
 
+/** @import { PageMessage, Reply, RequestMessage, ServerMessage } from './messages.js' */
+/** @import { Store } from './store.js' */
+
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 2000;
 const REPLY_WITHIN_MS = 10000;
@@ -11,7 +14,9 @@ const PING_EVERY_MS = 1000;
 export class Connection {
   #store;
   #url;
+  /** @type {WebSocket|null} */
   #socket = null;
+  /** @type {Map<number, {resolve: (reply: Reply) => void, timer: number}>} */
   #pending = new Map();
   #lastId = 0;
   #retry_ms = FIRST_RETRY_MS;
@@ -20,7 +25,7 @@ export class Connection {
   #closed = false;
 
   /**
-   * @param {import('./store.js').Store} store told everything that arrives
+   * @param {Store} store told everything that arrives
    * @param {string} [url] of the WebSocket; that of this page's server by default
    */
   constructor(store, url = socketUrl(window.location)) {
@@ -39,22 +44,22 @@ export class Connection {
   /**
    * Send a message that needs no answer.
    *
-   * @param {object} message with its `type`
+   * @param {PageMessage} message with its `type`
    * @returns {boolean} false when there is no connection
    */
   send(message) {
     if (!this.open) {
       return false;
     }
-    this.#socket.send(JSON.stringify(message));
+    this.#socket?.send(JSON.stringify(message));
     return true;
   }
 
   /**
    * Send a message and wait for the server's reply.
    *
-   * @param {object} message with its `type`; gets its `id` here
-   * @returns {Promise<{ok: boolean, text: string}>} never rejects
+   * @param {RequestMessage} message with its `type`; gets its `id` here
+   * @returns {Promise<Reply>} never rejects
    */
   request(message) {
     this.#lastId += 1;
@@ -105,11 +110,13 @@ export class Connection {
     }
   }
 
+  /** @param {ArrayBuffer|string} data */
   #receive(data) {
     if (data instanceof ArrayBuffer) {
       this.#store.receiveFrame(data, performance.now());
       return;
     }
+    /** @type {ServerMessage} */
     const message = JSON.parse(data);
     if (message.type === 'reply') {
       this.#settle(message.to, message);
@@ -120,6 +127,10 @@ export class Connection {
     }
   }
 
+  /**
+   * @param {number} id
+   * @param {Reply} reply
+   */
   #settle(id, reply) {
     const waiting = this.#pending.get(id);
     if (waiting !== undefined) {
@@ -130,6 +141,7 @@ export class Connection {
   }
 }
 
+/** @param {Location} location */
 function socketUrl(location) {
   return `${location.protocol === 'https:' ? 'wss:' : 'ws:'}//${location.host}/ws`;
 }

@@ -21,52 +21,121 @@ export const PLAN_WIDTH = 5;
 const HEADER = 5;
 
 /**
+ * @typedef {object} Head
+ * @property {number} epoch counts resets
+ * @property {number} n simulation step
+ * @property {number} k scenario step
+ * @property {number} t simulation time [s]
+ */
+
+/**
+ * Rows are flat; an index is that of a vehicle, a column counts vehicles, then objects.
+ *
+ * @typedef {Head & {kind: typeof KIND.STATE, vehicles: Float64Array}} StateFrame
+ * @typedef {Head & {kind: typeof KIND.OBJECTS, objects: Float64Array}} ObjectsFrame
+ * @typedef {Head & {kind: typeof KIND.PLAN, index: number, points: Float64Array}} PlanFrame
+ * @typedef {{column: number, points: Float64Array}} PredictionEntry
+ * @typedef {Head & {kind: typeof KIND.PREDICTION, index: number, steps: number,
+ *   entries: PredictionEntry[]}} PredictionFrame
+ * @typedef {Head & {kind: typeof KIND.SEEN, index: number, columns: Float64Array}} SeenFrame
+ * @typedef {Head & {kind: typeof KIND.SCAN} & Scan} ScanFrame
+ * @typedef {Head & {kind: typeof KIND.ESTIMATE} & Estimate} EstimateFrame
+ * @typedef {Head & {kind: typeof KIND.OCCUPANCY} & Occupancy} OccupancyFrame
+ * @typedef {ScanFrame|EstimateFrame|SeenFrame|OccupancyFrame} PerceptionFrame
+ * @typedef {StateFrame|ObjectsFrame|PlanFrame|PredictionFrame|PerceptionFrame} Frame
+ */
+
+/**
+ * @typedef {object} Scan
+ * @property {number} index
+ * @property {number} sensor
+ * @property {number} x of the sensor when it looked [m]
+ * @property {number} y [m]
+ * @property {number} yaw [rad]
+ * @property {number} first angle of the first ray [rad]
+ * @property {number} increment from ray to ray [rad]
+ * @property {number} longest horizon [m]
+ * @property {number} period_s
+ * @property {Float64Array} ranges [m]
+ */
+
+/**
+ * @typedef {object} Estimate
+ * @property {number} index
+ * @property {number} x of the rear axle [m]
+ * @property {number} y [m]
+ * @property {number} yaw [rad]
+ * @property {number} speed [m/s]
+ * @property {number} yaw_rate [rad/s]
+ * @property {number} xx covariance [m^2]
+ * @property {number} xy
+ * @property {number} yy
+ */
+
+/**
+ * @typedef {object} Occupancy
+ * @property {number} x of the lower left corner [m]
+ * @property {number} y [m]
+ * @property {number} resolution [m]
+ * @property {number} rows
+ * @property {number} columns
+ * @property {Uint8Array} bits one for each cell, row by row
+ */
+
+/** @typedef {(from: number, count: number, width: number) => Float64Array} ReadRows */
+
+/**
  * Read one frame without copying its values.
  *
  * @param {ArrayBuffer} buffer the frame
- * @returns {object|null} kind, epoch, n, k, t [s] and by kind: vehicles | objects (rows) |
- *   index and points | index, steps and entries of {column, points} | index, sensor, x, y [m],
- *   yaw, first, increment [rad], longest [m], period_s and ranges | index, x, y, yaw, speed,
- *   yaw_rate and the covariance xx, xy, yy | index and columns | x, y, resolution [m], rows,
- *   columns and bits; null for an unknown kind
+ * @returns {Frame|null} null for an unknown kind
  * @throws {RangeError} when the frame is shorter than it says
  */
 export function decodeFrame(buffer) {
   const values = new Float64Array(buffer);
-  const head = { kind: values[0], epoch: values[1], n: values[2], k: values[3], t: values[4] };
+  const kind = values[0];
+  const head = { epoch: values[1], n: values[2], k: values[3], t: values[4] };
+  /** @type {ReadRows} */
   const rows = (from, count, width) => {
     if (!(count >= 0) || values.length < from + count * width) {
-      throw new RangeError(`frame of kind ${head.kind} ends after ${values.length} values`);
+      throw new RangeError(`frame of kind ${kind} ends after ${values.length} values`);
     }
     return values.subarray(from, from + count * width);
   };
-  switch (head.kind) {
+  switch (kind) {
     case KIND.STATE:
-      return { ...head, vehicles: rows(HEADER + 1, values[HEADER], VEHICLE_WIDTH) };
+      return { ...head, kind, vehicles: rows(HEADER + 1, values[HEADER], VEHICLE_WIDTH) };
     case KIND.OBJECTS:
-      return { ...head, objects: rows(HEADER + 1, values[HEADER], OBJECT_WIDTH) };
+      return { ...head, kind, objects: rows(HEADER + 1, values[HEADER], OBJECT_WIDTH) };
     case KIND.PLAN:
       return {
-        ...head, index: values[HEADER],
+        ...head, kind, index: values[HEADER],
         points: rows(HEADER + 2, values[HEADER + 1], PLAN_WIDTH),
       };
     case KIND.PREDICTION:
-      return { ...head, index: values[HEADER], ...predictions(values, rows) };
+      return { ...head, kind, index: values[HEADER], ...predictions(values, rows) };
     case KIND.SCAN:
-      return { ...head, ...scan(values, rows) };
+      return { ...head, kind, ...scan(values, rows) };
     case KIND.ESTIMATE: {
       const [x, y, yaw, speed, yaw_rate, xx, xy, yy] = rows(HEADER + 1, 1, 8);
-      return { ...head, index: values[HEADER], x, y, yaw, speed, yaw_rate, xx, xy, yy };
+      return { ...head, kind, index: values[HEADER], x, y, yaw, speed, yaw_rate, xx, xy, yy };
     }
     case KIND.SEEN:
-      return { ...head, index: values[HEADER], columns: rows(HEADER + 2, values[HEADER + 1], 1) };
+      return {
+        ...head, kind, index: values[HEADER], columns: rows(HEADER + 2, values[HEADER + 1], 1),
+      };
     case KIND.OCCUPANCY:
-      return { ...head, ...occupancy(buffer, rows) };
+      return { ...head, kind, ...occupancy(buffer, rows) };
     default:
       return null;
   }
 }
 
+/**
+ * @param {Float64Array} values
+ * @param {ReadRows} rows
+ * @returns {Scan}
+ */
 function scan(values, rows) {
   const [index, sensor, x, y, yaw, first, increment, longest, period_s] = rows(HEADER, 1, 9);
   return {
@@ -75,6 +144,11 @@ function scan(values, rows) {
   };
 }
 
+/**
+ * @param {ArrayBuffer} buffer
+ * @param {ReadRows} rows
+ * @returns {Occupancy}
+ */
 function occupancy(buffer, rows) {
   const [x, y, resolution, height, width] = rows(HEADER, 1, 5);
   const words = Math.ceil(height * width / 64);
@@ -85,6 +159,11 @@ function occupancy(buffer, rows) {
   };
 }
 
+/**
+ * @param {Float64Array} values
+ * @param {ReadRows} rows
+ * @returns {{steps: number, entries: PredictionEntry[]}}
+ */
 function predictions(values, rows) {
   const steps = values[HEADER + 1];
   const entries = [];

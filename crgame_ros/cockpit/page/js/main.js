@@ -28,9 +28,9 @@ const PARTS = [
 
 const store = new Store();
 const connection = new Connection(store);
-const world = createWorld(document.querySelector('#world'), store, {
-  connection, covered: document.querySelector('#hud'),
-});
+const world = createWorld(
+  /** @type {HTMLCanvasElement} */ (document.querySelector('#world')), store,
+  { connection, covered: document.querySelector('#hud') });
 window.crgame = { store, connection, world };
 
 for (const [path, create, root, name] of PARTS) {
@@ -39,7 +39,8 @@ for (const [path, create, root, name] of PARTS) {
     window.crgame[name] = module[create](document.querySelector(root), store, connection);
   } catch (error) {
     console.error(`${path}: ${error}`);
-    store.receive({ type: 'notice', level: 'error', text: `${path} failed: ${error.message}` });
+    const text = `${path} failed: ${error instanceof Error ? error.message : error}`;
+    store.receive({ type: 'notice', level: 'error', text });
   }
 }
 // Every part had its turn.

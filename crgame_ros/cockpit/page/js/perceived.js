@@ -6,6 +6,9 @@ import { KIND } from './frames.js';
 import { turn } from './interpolation.js';
 import { SampleRing } from './samples.js';
 
+/** @import { EstimateFrame, OccupancyFrame, PerceptionFrame, ScanFrame } from './frames.js' */
+/** @import { SeenFrame } from './frames.js' */
+
 // 3 s at the 30 Hz of a live run, 1 s at the 100 Hz of a recording.
 const ESTIMATES = 100;
 // A planner is told 10 times a second: what it was told so long ago it may have forgotten [s].
@@ -18,18 +21,32 @@ const SCAN_LASTS_S = 0.3;
 // Frames may be ahead of what is shown by the delay of the display [s].
 const AHEAD_S = 0.5;
 
+/**
+ * Rear axle [m, rad] and covariance [m^2], n of the estimate.
+ *
+ * @typedef {{n: number, x: number, y: number, yaw: number, xx: number, xy: number,
+ *   yy: number}} ShownEstimate
+ */
+
 /** Frames of perception by AV, and the newest map. */
 export class Perceived {
-  /** {x, y, resolution, rows, columns, bits} of the permanent obstacles, null for none. */
+  /**
+   * {x, y, resolution, rows, columns, bits} of the permanent obstacles, null for none.
+   *
+   * @type {OccupancyFrame|null}
+   */
   occupancy = null;
+  /** @type {Map<number, SeenFrame>} */
   #seen = new Map();
+  /** @type {Map<number, SampleRing<EstimateFrame>>} */
   #estimates = new Map();
+  /** @type {Map<string, ScanFrame>} */
   #scans = new Map();
 
   /**
    * Take in a frame of one of these kinds.
    *
-   * @param {object} frame as decodeFrame gives it
+   * @param {PerceptionFrame} frame as decodeFrame gives it
    */
   take(frame) {
     switch (frame.kind) {
@@ -71,8 +88,7 @@ export class Perceived {
    *
    * @param {number} av index of the AV
    * @param {number} t time that is shown [s]
-   * @returns {{n: number, x: number, y: number, yaw: number, xx: number, xy: number,
-   *   yy: number}|null} rear axle [m, rad] and covariance [m^2], n of the estimate
+   * @returns {ShownEstimate|null}
    */
   estimateOf(av, t) {
     const ring = this.#estimates.get(av);
@@ -96,7 +112,7 @@ export class Perceived {
    *
    * @param {number} av index of the AV
    * @param {number} t time that is shown [s]
-   * @returns {object[]} SCAN frames
+   * @returns {ScanFrame[]}
    */
   scansOf(av, t) {
     return [...this.#scans.values()].filter((scan) => scan.index === av

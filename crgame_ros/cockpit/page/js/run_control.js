@@ -2,11 +2,25 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The run in the header: start, pause, step, reset, stop, speed of time, clock, recording. */
 
-import { element, part, setAttribute, setText } from './driving/dom.js';
+import { element, part, setAttribute, setText } from './dom.js';
 import { isTyping } from './driving/focus.js';
 import { icon } from './driving/icons.js';
 
+/** @import { Connection } from './connection.js' */
+/** @import { Recording, RequestMessage, RunAction, Status } from './messages.js' */
+/** @import { Store } from './store.js' */
+
 // In which states of the run an order makes sense, its key, and what it says.
+/**
+ * @typedef {object} Order
+ * @property {string} label
+ * @property {string} [key] by its place on the keyboard
+ * @property {string[]} in which states of the run
+ * @property {string} title
+ * @property {[question: string, consequence: string]} [confirm]
+ */
+
+/** @type {Record<RunAction, Order>} */
 const ORDERS = {
   start: { label: 'Start', key: 'KeyP', in: ['waiting', 'paused'], title: 'Start or go on (P)' },
   pause: { label: 'Pause', key: 'KeyP', in: ['running'],
@@ -20,7 +34,9 @@ const ORDERS = {
     confirm: ['Stop the run?',
       'It ends for everybody and its recording is closed. It cannot go on afterwards.'] },
 };
+const ACTIONS = /** @type {RunAction[]} */ (Object.keys(ORDERS));
 const FACTORS = [0.1, 0.2, 0.25, 0.5, 1, 2, 3, 5, 10];
+/** @type {Record<string, string>} */
 const RUN_TEXTS = {
   waiting: 'Waiting', running: 'Running', paused: 'Paused', ended: 'Ended',
 };
@@ -29,7 +45,7 @@ const RUN_TEXTS = {
 class RunControl {
   #store;
   #connection;
-  #buttons = {};
+  #buttons = /** @type {Record<RunAction, HTMLButtonElement>} */ ({});
   #factor = element('select', { 'aria-label': 'Real-time factor',
     title: 'Simulated seconds per second' });
   #root;
@@ -37,13 +53,19 @@ class RunControl {
   #clock;
   #lamp;
 
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   * @param {Connection} connection
+   */
   constructor(root, store, connection) {
     this.#store = store;
     this.#connection = connection;
     this.#root = part(root, 'run-control');
     this.#clock = buildClock(part(root, 'clock'));
     this.#lamp = buildLamp(part(root, 'recording'));
-    for (const [action, order] of Object.entries(ORDERS)) {
+    for (const action of ACTIONS) {
+      const order = ORDERS[action];
       this.#buttons[action] = element('button', { type: 'button', class: 'run-button',
         'data-action': action, title: order.title, 'aria-label': order.label,
         'aria-keyshortcuts': order.key?.slice(-1), on: { click: () => this.#order(action) } },
@@ -54,7 +76,7 @@ class RunControl {
     this.#root.append(...Object.values(this.#buttons),
       element('label', { class: 'run-factor' }, element('span', { text: 'Speed' }), this.#factor));
     window.addEventListener('keydown', (event) => this.#key(event));
-    for (const name of ['hello', 'status', 'connection']) {
+    for (const name of /** @type {const} */ (['hello', 'status', 'connection'])) {
       store.on(name, () => this.#show());
     }
     this.#show();
@@ -64,9 +86,9 @@ class RunControl {
     const { status, connected, mode } = this.#store;
     setAttribute(this.#root, 'hidden', mode === 'replay');
     setAttribute(this.#lamp.node, 'hidden', mode === 'replay' || status === null);
-    for (const [action, order] of Object.entries(ORDERS)) {
+    for (const action of ACTIONS) {
       setAttribute(this.#buttons[action], 'disabled', !connected || !status
-        || !order.in.includes(status.run));
+        || !ORDERS[action].in.includes(status.run));
     }
     setAttribute(this.#factor, 'disabled', !connected || !status || status.run === 'ended');
     setAttribute(this.#clock.node, 'hidden', status === null);
@@ -79,7 +101,11 @@ class RunControl {
     }
   }
 
-  /** List the usual factors, and the present one where it is another. */
+  /**
+   * List the usual factors, and the present one where it is another.
+   *
+   * @param {number} present
+   */
   #offer(present) {
     const factors = [...new Set([...FACTORS, present])].sort((a, b) => a - b);
     if (factors.length !== this.#factor.options.length
@@ -98,6 +124,7 @@ class RunControl {
     this.#show();
   }
 
+  /** @param {RunAction} action */
   async #order(action) {
     const { confirm } = ORDERS[action];
     if (!confirm || await this.#confirm.ask(...confirm, ORDERS[action].label)) {
@@ -105,6 +132,7 @@ class RunControl {
     }
   }
 
+  /** @param {RequestMessage} message */
   async #request(message) {
     const { ok, text } = await this.#connection.request(message);
     if (!ok) {
@@ -112,12 +140,13 @@ class RunControl {
     }
   }
 
+  /** @param {KeyboardEvent} event */
   #key(event) {
     if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)
         || document.querySelector('dialog[open]') || this.#root.hidden) {
       return;
     }
-    const action = Object.keys(ORDERS).find((name) => ORDERS[name].key === event.code
+    const action = ACTIONS.find((name) => ORDERS[name].key === event.code
       && !this.#buttons[name].disabled);
     if (action) {
       event.preventDefault();
@@ -126,6 +155,7 @@ class RunControl {
   }
 }
 
+/** @param {HTMLElement} node */
 function buildClock(node) {
   const time = element('span', { class: 'clock-time', text: '–' });
   const step = element('span', { class: 'clock-step' });
@@ -134,11 +164,15 @@ function buildClock(node) {
   node.replaceChildren(time, element('span', { class: 'clock-small' }, step, factor), state);
   return {
     node,
+    /**
+     * @param {Status} status
+     * @param {boolean} connected
+     */
     show({ t, k, measured_factor, run }, connected) {
       setText(time, Number.isFinite(t) ? `${t.toFixed(1)} s` : '–');
       setText(step, `k ${k ?? '–'}`);
       setText(factor, run === 'running' && Number.isFinite(measured_factor)
-        ? `× ${measured_factor.toFixed(2)}` : '');
+        ? `× ${Number(measured_factor).toFixed(2)}` : '');
       const told = connected || run === 'ended';
       setText(state, told ? RUN_TEXTS[run] ?? run : 'No connection');
       setAttribute(state, 'data-run', told ? run : 'lost');
@@ -146,24 +180,33 @@ function buildClock(node) {
   };
 }
 
+/** @param {HTMLElement} node */
 function buildLamp(node) {
   const text = element('span', { class: 'lamp-text' });
   node.replaceChildren(element('span', { class: 'lamp', 'aria-hidden': 'true' }), text);
   return {
     node,
+    /** @param {Recording} recording */
     show({ state, megabytes, text: reason }) {
       setAttribute(node, 'data-state', state);
-      const size = Number.isFinite(megabytes) ? ` ${megabytes.toFixed(1)} MB` : '';
+      const size = megabytes === undefined || !Number.isFinite(megabytes) ? ''
+        : ` ${megabytes.toFixed(1)} MB`;
       setText(text, {
         recording: `Recording${size}`, recorded: `Recorded${size}`, unknown: '',
-        failed: `Recording failed: ${reason || 'no reason given'}`,
+        failed: `Recording failed: ${reason || 'no reason given'}`, none: 'Not recording',
       }[state] ?? 'Not recording');
       setAttribute(node, 'title', reason || null);
     },
   };
 }
 
-/** What is known of the recording: nothing without a connection, unless the run was over before. */
+/**
+ * What is known of the recording: nothing without a connection, unless the run was over before.
+ *
+ * @param {Status} status
+ * @param {boolean} connected
+ * @returns {Recording}
+ */
 function recordingNow({ recording, run }, connected) {
   const told = recording ?? { state: 'none' };
   if (connected) {
@@ -184,6 +227,12 @@ function buildConfirmation() {
   no.addEventListener('click', () => dialog.close('no'));
   yes.addEventListener('click', () => dialog.close('yes'));
   return {
+    /**
+     * @param {string} question
+     * @param {string} consequence
+     * @param {string} verb
+     * @returns {Promise<boolean>}
+     */
     ask(question, consequence, verb) {
       setText(title, question);
       setText(text, consequence);
@@ -203,9 +252,9 @@ function buildConfirmation() {
  * Put the run control, the clock and the recording lamp into the header.
  *
  * @param {HTMLElement} root the header
- * @param {import('./store.js').Store} store
- * @param {import('./connection.js').Connection} connection
- * @returns {object}
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {RunControl}
  */
 export function createRunControl(root, store, connection) {
   return new RunControl(root, store, connection);

@@ -2,8 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A bounded ring of received samples in the order of their simulation time. */
 
-/** Samples {n, t, …}, oldest first; a new one beyond the capacity replaces the oldest. */
+import { countWhile } from './search.js';
+
+/**
+ * Samples {n, t, …}, oldest first; a new one beyond the capacity replaces the oldest.
+ *
+ * @template {{n: number, t: number}} Sample
+ */
 export class SampleRing {
+  /** @type {(Sample|undefined)[]} */
   #items;
   #start = 0;
   #length = 0;
@@ -30,7 +37,7 @@ export class SampleRing {
 
   /**
    * @param {number} index 0 is the oldest
-   * @returns {object|undefined} the sample
+   * @returns {Sample|undefined} the sample
    */
   at(index) {
     return index < 0 || index >= this.#length ? undefined
@@ -40,7 +47,7 @@ export class SampleRing {
   /**
    * Add a sample; one of the newest sample's step replaces it.
    *
-   * @param {object} sample with n and t
+   * @param {Sample} sample with n and t
    * @returns {boolean} false for a sample that is too old or too close
    */
   push(sample) {
@@ -77,21 +84,19 @@ export class SampleRing {
    * @returns {number} its index, -1 when all are later
    */
   indexAt(t) {
-    let low = 0;
-    let high = this.#length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.at(middle).t <= t) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    return low - 1;
+    return countWhile(this.#length, (index) => this.#kept(index).t <= t) - 1;
   }
 
   /** All samples, oldest first, in a new array. */
   toArray() {
-    return Array.from({ length: this.#length }, (_, index) => this.at(index));
+    return Array.from({ length: this.#length }, (_, index) => this.#kept(index));
+  }
+
+  /**
+   * @param {number} index of a sample that is there
+   * @returns {Sample}
+   */
+  #kept(index) {
+    return /** @type {Sample} */ (this.at(index));
   }
 }

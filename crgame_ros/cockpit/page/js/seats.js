@@ -2,9 +2,31 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The seats in the Drive panel: who drives what, taking a seat and passing it on. */
 
-import { element, setAttribute, setText } from './driving/dom.js';
+import { element, setAttribute, setText } from './dom.js';
 import { NameField } from './driving/name_field.js';
 import { describeSeat } from './driving/seat_text.js';
+
+/** @import { Connection } from './connection.js' */
+/** @import { Driving } from './driving/driving.js' */
+/** @import { Person, Reply, RequestMessage, SceneVehicle, Seat } from './messages.js' */
+/** @import { Store } from './store.js' */
+
+/**
+ * What a row of the list says.
+ *
+ * @typedef {object} Facts
+ * @property {string} id
+ * @property {SceneVehicle['role']} role
+ * @property {boolean} connected
+ * @property {boolean} mine
+ * @property {string|null} holder
+ * @property {boolean} left
+ * @property {Person[]} requests
+ * @property {Person[]} others
+ * @property {boolean} asked
+ * @property {string} text
+ * @property {boolean} lost
+ */
 
 /** The list of seats, with the name field above and the input devices below. */
 class Seats {
@@ -14,12 +36,19 @@ class Seats {
   #list = element('ul', { class: 'seats' });
   #news = element('p', { class: 'drive-news', role: 'status', 'aria-live': 'polite' });
   #shown = '';
+  /** @type {Record<string, Seat>} */
   #before = {};
   // After a broken connection the seats are what they were before, until they are told anew.
   #stale = false;
   #live;
   #replay;
 
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   * @param {Connection} connection
+   * @param {Driving} driving
+   */
   constructor(root, store, connection, driving) {
     this.#store = store;
     this.#connection = connection;
@@ -36,7 +65,7 @@ class Seats {
       this.#stale = false;
       this.#show();
     });
-    for (const event of ['hello', 'scene', 'status']) {
+    for (const event of /** @type {const} */ (['hello', 'scene', 'status'])) {
       store.on(event, () => this.#show());
     }
     store.on('connection', (connected) => connected || this.#disconnected());
@@ -69,6 +98,10 @@ class Seats {
       ...known.filter((id) => !inScene.includes(id))];
   }
 
+  /**
+   * @param {string} id
+   * @returns {Facts}
+   */
   #facts(id) {
     const { seats, scene, me, status } = this.#store;
     const connected = this.#store.connected && !this.#stale;
@@ -88,17 +121,25 @@ class Seats {
     };
   }
 
+  /**
+   * @param {Facts[]} rows
+   * @param {string} none
+   */
   #rebuild(rows, none) {
-    const focused = document.activeElement?.dataset?.key;
+    const focused = document.activeElement instanceof HTMLElement
+      ? document.activeElement.dataset.key : undefined;
     this.#list.replaceChildren(...rows.map((facts) => this.#row(facts)));
     if (rows.length === 0) {
       this.#list.append(element('li', { class: 'drive-note', text: none }));
     }
     if (focused) {
-      this.#list.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+      /** @type {HTMLElement|null} */
+      const again = this.#list.querySelector(`[data-key="${CSS.escape(focused)}"]`);
+      again?.focus();
     }
   }
 
+  /** @param {Facts} facts */
   #row(facts) {
     const { id, role, mine, lost, text } = facts;
     return element('li', { class: 'seat', 'data-seat': id, 'data-role': role, 'data-mine': mine,
@@ -114,7 +155,16 @@ class Seats {
     element('div', { class: 'seat-buttons' }, ...this.#buttons(facts)));
   }
 
+  /** @param {Facts} facts */
   #buttons({ id, role, mine, holder, left, requests, others, asked, connected }) {
+    /**
+     * @param {string} action
+     * @param {string} text
+     * @param {() => Promise<Reply>} act
+     * @param {string} title
+     * @param {boolean} [enabled]
+     * @returns {HTMLElement}
+     */
     const button = (action, text, act, title, enabled = connected) => element('button', {
       type: 'button', class: `drive-button ${action === 'claim' ? 'primary' : ''}`, text, title,
       'data-action': action, 'data-key': `${id} ${text}`, disabled: !enabled,
@@ -124,14 +174,14 @@ class Seats {
       : 'Give the vehicle back to its planner');
     if (mine) {
       return [...requests.map(({ client, name }) => button('hand_over', `Hand over to ${name}`,
-        () => this.#request('hand_over', { seat: id, to: client }),
+        () => this.#request({ type: 'hand_over', seat: id, to: client }),
         `${name} asks for this seat`)),
       others.length > 0 ? this.#handOver(id, others, connected) : null,
       giveBack].filter((item) => item !== null);
     }
     if (holder !== null) {
       return [button('ask', asked ? 'Asked' : 'Ask for it',
-        () => this.#request('ask', { seat: id }), 'Tell the driver that you want this seat',
+        () => this.#request({ type: 'ask', seat: id }), 'Tell the driver that you want this seat',
         connected && !asked)];
     }
     const claim = role === 'human'
@@ -141,26 +191,35 @@ class Seats {
     return left ? [claim, giveBack] : [claim];
   }
 
-  /** A choice of those who have not asked. */
+  /**
+   * A choice of those who have not asked.
+   *
+   * @param {string} id
+   * @param {Person[]} others
+   * @param {boolean} connected
+   */
   #handOver(id, others, connected) {
     const choice = element('select', { class: 'seat-hand-over', disabled: !connected,
       'aria-label': `Hand ${id} over to`, 'data-key': `${id} hand over`,
       on: { change: () => this.#report(
-        this.#request('hand_over', { seat: id, to: choice.value })) } },
+        this.#request({ type: 'hand_over', seat: id, to: choice.value })) } },
     element('option', { value: '', text: 'Hand over to …' }),
     ...others.map(({ client, name }) => element('option', { value: client, text: name })));
     return choice;
   }
 
+  /** @param {string} id */
   #giveBack(id) {
     return this.#driving.seat === id ? this.#driving.release()
-      : this.#request('release', { seat: id });
+      : this.#request({ type: 'release', seat: id });
   }
 
-  #request(type, content) {
-    return this.#connection.request({ type, ...content });
+  /** @param {RequestMessage} message */
+  #request(message) {
+    return this.#connection.request(message);
   }
 
+  /** @param {Promise<Reply>} reply */
   async #report(reply) {
     const { ok, text } = await reply;
     if (!ok) {
@@ -181,7 +240,11 @@ class Seats {
     this.#show();
   }
 
-  /** Say what changed for this person since the last document. */
+  /**
+   * Say what changed for this person since the last document.
+   *
+   * @param {Record<string, Seat>} seats
+   */
   #tell(seats) {
     const { me } = this.#store;
     for (const [id, seat] of Object.entries(seats)) {
@@ -193,7 +256,7 @@ class Seats {
         setText(this.#news, seat.holder === null ? `${id} is given back.`
           : `${id} is now driven by ${seat.holder_name}.`);
       } else if (had && (seat.requests?.length ?? 0) > (before.requests?.length ?? 0)) {
-        setText(this.#news, `${seat.requests.at(-1).name} asks for ${id}.`);
+        setText(this.#news, `${seat.requests?.at(-1)?.name} asks for ${id}.`);
       }
     }
   }
@@ -203,10 +266,10 @@ class Seats {
  * Put the seats into the Drive panel.
  *
  * @param {HTMLElement} root the panel
- * @param {import('./store.js').Store} store
- * @param {import('./connection.js').Connection} connection
- * @param {import('./driving/driving.js').Driving} driving
- * @returns {object}
+ * @param {Store} store
+ * @param {Connection} connection
+ * @param {Driving} driving
+ * @returns {Seats}
  */
 export function createSeats(root, store, connection, driving) {
   return new Seats(root, store, connection, driving);

@@ -3,10 +3,19 @@
 /** Everything the page knows: the server's documents, and the samples of the running epoch. */
 
 import { DisplayClock } from './display_clock.js';
-import { decodeFrame, KIND, VEHICLE, VEHICLE_WIDTH } from './frames.js';
+import { decodeFrame, KIND } from './frames.js';
+import { addToHistory, emptyHistory } from './history.js';
 import { extrapolateVehicles, interpolateVehicles, moveObjects } from './interpolation.js';
 import { Perceived } from './perceived.js';
 import { SampleRing } from './samples.js';
+
+/** @import { ObjectsFrame, PerceptionFrame, PlanFrame, PredictionFrame } from './frames.js' */
+/** @import { StateFrame } from './frames.js' */
+/** @import { History } from './history.js' */
+/** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
+/** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
+/** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
+/** @import { StatusMessage, StoreMessage } from './messages.js' */
 
 // At 100 Hz the ring of raw samples holds 5 s, that of scenario steps at 10 Hz 10 s.
 const RAW_SAMPLES = 500;
@@ -16,16 +25,53 @@ const HISTORY_S = 120;
 // An object whose next step is late moves on so long beyond it [s].
 const LATE_S = 0.1;
 
+/**
+ * What is to be seen at a time: the rows of all vehicles and objects.
+ *
+ * @typedef {{t: number, n: number, k: number, epoch: number, vehicles: Float64Array,
+ *   objects: Float64Array}} Shown
+ * @typedef {(index: number, seconds: number) => History} HistorySource
+ */
+
+/**
+ * What a listener gets, by event.
+ *
+ * @typedef {object} StoreEvents
+ * @property {HelloMessage} hello
+ * @property {SceneMessage} scene
+ * @property {SeatsMessage} seats
+ * @property {SignalsMessage} signals
+ * @property {EventsMessage} events
+ * @property {StatusMessage} status
+ * @property {AlarmsMessage} alarms
+ * @property {FilesMessage} files
+ * @property {NoticeMessage} notice
+ * @property {boolean} connection whether there is one
+ * @property {StateFrame} state
+ * @property {ObjectsFrame} objects
+ * @property {PlanFrame} plan
+ * @property {PredictionFrame} prediction
+ * @property {PerceptionFrame} perception
+ * @property {number} epoch
+ */
+
 /** The page's data; see `on` for the events by which parts learn of changes. */
 export class Store {
-  /** Documents as the server sent them last; null or empty before. */
+  // Documents as the server sent them last; null or empty before.
+  /** @type {Scene|null} */
   scene = null;
+  /** @type {Record<string, Seat>} */
   seats = {};
+  /** @type {Omit<SignalsMessage, 'type'>} */
   signals = { k: 0, states: {} };
+  /** @type {FiredEvent[]} */
   fired = [];
+  /** @type {Status|null} */
   status = null;
+  /** @type {Alarm[]} */
   alarms = [];
   me = { id: '', name: '' };
+  /** @type {HelloMessage['mode']|null} */
   mode = null;
   version = '';
   connected = false;
@@ -33,35 +79,52 @@ export class Store {
 
   /** Counts resets; -1 before the first frame. */
   epoch = -1;
-  /** Vehicle index -> its newest plan {epoch, n, k, t, index, points}. */
+  /**
+   * The newest plan by vehicle's index.
+   *
+   * @type {Map<number, PlanFrame>}
+   */
   plans = new Map();
-  /** Index of the asking AV -> {epoch, n, k, t, index, steps, entries}. */
+  /**
+   * The newest predictions by index of the asking AV.
+   *
+   * @type {Map<number, PredictionFrame>}
+   */
   predictions = new Map();
   /** What AVs perceive, and the map of permanent obstacles. */
   perceived = new Perceived();
-  /** Received raw samples, a few seconds: states and scenario steps. */
+  // Received raw samples, a few seconds: states and scenario steps.
+  /** @type {SampleRing<StateFrame>} */
   samples = new SampleRing(RAW_SAMPLES);
+  /** @type {SampleRing<ObjectsFrame>} */
   steps = new SampleRing(RAW_STEPS);
   clock = new DisplayClock();
 
   // After each hello, until the first state: it may be another simulation, which began anew.
   #fresh = true;
+  // Each set holds listeners of one event, which get what StoreEvents says.
+  /** @type {Map<string, Set<(content: any) => void>>} */
   #listeners = new Map();
+  /** @type {SampleRing<StateFrame>} */
   #history = new SampleRing(HISTORY_S / HISTORY_SPACING_S, HISTORY_SPACING_S);
+  /** @type {Shown} */
   #shown = {
     t: 0, n: 0, k: 0, epoch: -1, vehicles: new Float64Array(0), objects: new Float64Array(0),
   };
   #shownFor_ms = NaN;
+  /** @type {((now_ms: number) => number)|null} */
   #timeSource = null;
+  /** @type {HistorySource|null} */
   #historySource = null;
 
   /**
-   * Listen to an event: hello, scene, seats, signals, events, status, alarms, notice, connection,
-   * state, objects, plan, prediction, perception, epoch. The listener gets what came.
+   * Listen to an event.
    *
-   * @param {string} name of the event
-   * @param {function(any): void} listener called after the store has taken the content in
-   * @returns {function(): void} ends it
+   * @template {keyof StoreEvents} Name
+   * @param {Name} name of the event
+   * @param {(content: StoreEvents[Name]) => void} listener called after the store has taken the
+   *   content in
+   * @returns {() => void} ends it
    */
   on(name, listener) {
     const listeners = this.#listeners.get(name) ?? new Set();
@@ -72,7 +135,7 @@ export class Store {
   /**
    * Take in a document or an event of the server.
    *
-   * @param {object} message with its `type`
+   * @param {StoreMessage} message with its `type`
    */
   receive(message) {
     switch (message.type) {
@@ -82,14 +145,18 @@ export class Store {
         this.version = message.version;
         this.#fresh = true;
         break;
-      case 'scene':
+      case 'scene': {
+        // A recording that is played once more begins the same epoch again.
+        const again = message.time?.epoch === this.scene?.time?.epoch
+          && (message.again ?? 0) !== (this.scene?.again ?? 0);
         this.scene = message;
         this.perceived.occupancy = null;
-        if ((message.time?.epoch ?? -1) > this.epoch
+        if ((message.time?.epoch ?? -1) > this.epoch || again
             || (this.#fresh && message.time?.epoch < this.epoch)) {
           this.restart(message.time.epoch);
         }
         break;
+      }
       case 'seats': this.seats = message.seats; break;
       case 'signals': this.signals = message; break;
       case 'events': this.fired = message.fired; break;
@@ -114,7 +181,7 @@ export class Store {
     if (frame === null || (frame.epoch < this.epoch && !this.#fresh)) {
       return;
     }
-    const wentBack = this.#fresh && frame.kind === KIND.STATE && frame.n < this.latest?.n;
+    const wentBack = this.#fresh && frame.kind === KIND.STATE && frame.n < (this.latest?.n ?? NaN);
     if (frame.epoch !== this.epoch || wentBack) {
       this.restart(frame.epoch);
     }
@@ -162,7 +229,7 @@ export class Store {
   /**
    * Show the times that a function gives instead of those of the live clock.
    *
-   * @param {null|function(number): number} source wall time [ms] -> simulation time [s]
+   * @param {((now_ms: number) => number)|null} source wall time [ms] -> simulation time [s]
    */
   useTimeSource(source) {
     this.#timeSource = source;
@@ -172,13 +239,13 @@ export class Store {
   /**
    * Take the past of vehicles from a function instead of the samples received.
    *
-   * @param {null|function(number, number): object} source as `history`
+   * @param {HistorySource|null} source as `history`
    */
   useHistorySource(source) {
     this.#historySource = source;
   }
 
-  /** The newest state sample {epoch, n, k, t, vehicles}, undefined before the first. */
+  /** The newest state sample, undefined before the first. */
   get latest() {
     return this.samples.newest;
   }
@@ -190,8 +257,7 @@ export class Store {
    * newest where that is late; objects stand at pose + velocity * (t - t of their step).
    *
    * @param {number} now_ms the frame's time, as requestAnimationFrame gives it
-   * @returns {{t: number, n: number, k: number, epoch: number, vehicles: Float64Array,
-   *   objects: Float64Array}|null} the same object each time, refilled; null before any sample
+   * @returns {Shown|null} the same object each time, refilled; null before any sample
    */
   displayed(now_ms) {
     const newest = this.samples.newest;
@@ -217,24 +283,17 @@ export class Store {
    *
    * @param {number} index of the vehicle in the scene
    * @param {number} seconds how far back, at most 120 s
-   * @returns {object} t and each column of VEHICLE by its name, arrays of the same length
+   * @returns {History}
    */
   history(index, seconds) {
     if (this.#historySource !== null) {
       return this.#historySource(index, seconds);
     }
     const newest = this.#history.newest;
-    const past = { t: [] };
-    for (const name of Object.keys(VEHICLE)) {
-      past[name] = [];
-    }
+    const past = emptyHistory();
     const first = newest === undefined ? 0 : this.#history.indexAt(newest.t - seconds) + 1;
-    for (let i = first; i < this.#history.length; i += 1) {
-      const sample = this.#history.at(i);
-      past.t.push(sample.t);
-      for (const [name, column] of Object.entries(VEHICLE)) {
-        past[name].push(sample.vehicles[index * VEHICLE_WIDTH + column]);
-      }
+    for (const sample of this.#history.toArray().slice(first)) {
+      addToHistory(past, sample, index);
     }
     return past;
   }
@@ -247,9 +306,13 @@ export class Store {
     return this.scene === null ? -1 : this.scene.vehicles.findIndex((v) => v.id === id);
   }
 
+  /**
+   * @param {StateFrame} frame
+   * @param {number} now_ms
+   */
   #takeState(frame, now_ms) {
-    if (this.samples.length > 0
-        && this.samples.newest.vehicles.length !== frame.vehicles.length) {
+    if ((this.samples.newest?.vehicles.length ?? frame.vehicles.length)
+        !== frame.vehicles.length) {
       this.samples.clear();
       this.#history.clear();
     }
@@ -261,9 +324,11 @@ export class Store {
     this.#emit('state', frame);
   }
 
+  /** @param {Shown} shown */
   #fillVehicles(shown) {
     const index = Math.max(this.samples.indexAt(shown.t), 0);
-    const before = this.samples.at(index);
+    // There is one: nothing is displayed before.
+    const before = /** @type {StateFrame} */ (this.samples.at(index));
     const after = this.samples.at(index + 1);
     if (shown.vehicles.length !== before.vehicles.length) {
       shown.vehicles = new Float64Array(before.vehicles.length);
@@ -278,19 +343,24 @@ export class Store {
     }
   }
 
+  /** @param {Shown} shown */
   #fillObjects(shown) {
     const step = this.steps.at(Math.max(this.steps.indexAt(shown.t), 0));
-    const size = step === undefined ? 0 : step.objects.length;
+    const size = step?.objects.length ?? 0;
     if (shown.objects.length !== size) {
       shown.objects = new Float64Array(size);
     }
-    if (size > 0) {
+    if (step !== undefined) {
       const most = (this.scene?.time?.dt_c_s ?? 0.1) + LATE_S;
       moveObjects(shown.objects, step.objects,
         Math.min(Math.max(shown.t - step.t, 0), most));
     }
   }
 
+  /**
+   * @param {keyof StoreEvents} name
+   * @param {StoreEvents[keyof StoreEvents]} content
+   */
   #emit(name, content) {
     for (const listener of this.#listeners.get(name) ?? []) {
       listener(content);

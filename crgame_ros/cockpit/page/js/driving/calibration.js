@@ -2,13 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The dialog that finds out which axes of a device steer, and how far they go. */
 
+import { element, setAttribute, setText } from '../dom.js';
 import { CalibrationRun, STEPS } from './calibration_run.js';
 import { CalibrationTest } from './calibration_test_view.js';
-import { element, setAttribute, setText } from './dom.js';
 import { connectedPads } from './gamepad.js';
 import { loadProfile, sampleOf } from './gamepad_profile.js';
 import { RawBars } from './raw_bars.js';
 
+/** @import { CalibrationStep } from './calibration_run.js' */
+/** @import { Profile, Sample } from './gamepad_profile.js' */
+
+/** @type {Record<CalibrationStep, [title: string, instruction: string]>} */
 const TEXTS = {
   centre: ['Rest', 'Hold the wheel or stick straight, take your feet off the pedals, then press '
     + 'Next.'],
@@ -24,9 +28,12 @@ const TEXTS = {
 /** One dialog, opened for one device after the other. */
 export class CalibrationDialog {
   #save;
+  /** @type {Gamepad|null} */
   #pad = null;
+  /** @type {CalibrationRun|null} */
   #run = null;
   #frame = 0;
+  /** @type {RawBars|null} */
   #bars = null;
   #test = new CalibrationTest();
   #heading = element('h2', { id: 'calibration-title' });
@@ -34,7 +41,7 @@ export class CalibrationDialog {
   #instruction = element('p', { class: 'calibration-instruction', 'aria-live': 'assertive' });
   #found = element('p', { class: 'calibration-found', role: 'status' });
   #live = element('div', { class: 'calibration-live' });
-  #skip = this.#button('Skip', () => this.#run.skip());
+  #skip = this.#button('Skip', () => this.#run?.skip());
   #next = this.#button('Next', () => this.#finishStep(), 'primary');
   #dialog = element('dialog', {
     class: 'calibration', 'aria-labelledby': 'calibration-title', on: { close: () => this.#end() },
@@ -45,7 +52,7 @@ export class CalibrationDialog {
     this.#button('Cancel', () => this.#dialog.close()), this.#skip, this.#next));
 
   /**
-   * @param {(index: number, profile: import('./gamepad_profile.js').Profile|null) => void} save
+   * @param {(index: number, profile: Profile|null) => void} save
    *   told the new mapping of the device with this index, null for its default
    */
   constructor(save) {
@@ -68,21 +75,26 @@ export class CalibrationDialog {
     this.#poll(performance.now());
   }
 
+  /** @param {number} now_ms */
   #poll(now_ms) {
-    const pad = connectedPads().find(({ index }) => index === this.#pad.index);
+    const pad = connectedPads().find(({ index }) => index === this.#pad?.index);
     if (pad === undefined) {
       setText(this.#instruction, 'The device is unplugged. Plug it in again and press a button.');
-    } else {
+    } else if (this.#run !== null) {
       const sample = sampleOf(pad);
       this.#run.feed(sample, now_ms);
-      this.#bars.show(sample, this.#run.found);
-      this.#show(sample);
+      this.#bars?.show(sample, this.#run.found);
+      this.#show(sample, this.#run);
     }
     this.#frame = requestAnimationFrame((at_ms) => this.#poll(at_ms));
   }
 
-  #show(sample) {
-    const { step, found } = this.#run;
+  /**
+   * @param {Sample} sample
+   * @param {CalibrationRun} run
+   */
+  #show(sample, run) {
+    const { step, found } = run;
     const testing = step === 'test';
     this.#steps.forEach((item, i) => {
       setAttribute(item, 'aria-current', STEPS[i] === step ? 'step' : null);
@@ -96,19 +108,22 @@ export class CalibrationDialog {
     setText(this.#next, testing ? 'Save' : 'Next');
     setAttribute(this.#next, 'disabled', measures && found === null);
     setAttribute(this.#skip, 'hidden', !measures);
-    this.#test.show(testing ? this.#run.profile : null, sample);
+    this.#test.show(testing ? run.profile : null, sample);
   }
 
   #finishStep() {
-    if (this.#run.step === 'test') {
+    if (this.#run?.step === 'test') {
       this.#close(this.#run.profile);
     } else {
-      this.#run.next();
+      this.#run?.next();
     }
   }
 
+  /** @param {Profile|null} profile */
   #close(profile) {
-    this.#save(this.#pad.index, profile);
+    if (this.#pad !== null) {
+      this.#save(this.#pad.index, profile);
+    }
     this.#dialog.close();
   }
 
@@ -117,6 +132,11 @@ export class CalibrationDialog {
     this.#test.show(null);
   }
 
+  /**
+   * @param {string} text
+   * @param {() => void} act
+   * @param {string} [kind]
+   */
   #button(text, act, kind = '') {
     return element('button', { type: 'button', class: `drive-button ${kind}`, text,
       on: { click: act } });

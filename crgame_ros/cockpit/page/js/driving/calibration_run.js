@@ -6,10 +6,24 @@
  * It has no clock and no page: samples and times are handed to it.
  */
 
+/** @import { Control, Profile, Sample } from './gamepad_profile.js' */
+
+/**
+ * The steering's axis at its left end, as measured in its step.
+ *
+ * @typedef {Place & {centre: number, end: number}} LeftEnd
+ */
+
+/**
+ * @typedef {'centre'|'left'|'right'|'throttle'|'brake'|'reverse'|'test'} CalibrationStep
+ * @typedef {Control['kind']} Kind
+ * @typedef {{kind: Kind, index: number}} Place of an axis or button
+ */
+
 /** The steps in their order. */
-export const STEPS = Object.freeze([
+export const STEPS = Object.freeze(/** @type {CalibrationStep[]} */ ([
   'centre', 'left', 'right', 'throttle', 'brake', 'reverse', 'test',
-]);
+]));
 
 // A smaller movement of an axis or button is none that was asked for.
 const LEAST_SPAN = 0.3;
@@ -22,24 +36,31 @@ const MADE_UP = 0.5;
 
 /** One run through the steps. */
 export class CalibrationRun {
+  /** @type {Sample|null} */
   #start = null;
+  /** @type {Sample|null} */
   #first = null;
+  /** @type {Sample|null} */
   #low = null;
+  /** @type {Sample|null} */
   #high = null;
+  /** @type {Sample|null} */
   #sample = null;
+  /** @type {Sample|null} */
   #centre = null;
+  /** @type {LeftEnd|null} */
   #left = null;
   #backSince_ms = NaN;
 
   /**
-   * @param {import('./gamepad_profile.js').Profile} profile what is kept where a step is skipped
+   * @param {Profile} profile what is kept where a step is skipped
    */
   constructor(profile) {
     this.profile = structuredClone(profile);
     this.step = STEPS[0];
   }
 
-  /** @returns {{kind: string, index: number, span: number}|null} what is moved in this step */
+  /** @returns {(Place & {span: number})|null} what is moved in this step */
   get found() {
     return this.#sample && this.#asksForMovement ? this.#largest() : null;
   }
@@ -51,7 +72,7 @@ export class CalibrationRun {
   /**
    * Take a sample in; a step ends by itself when what was moved is back at rest.
    *
-   * @param {import('./gamepad_profile.js').Sample} sample
+   * @param {Sample} sample
    * @param {number} now_ms
    * @returns {boolean} whether the step ended
    */
@@ -110,16 +131,17 @@ export class CalibrationRun {
     this.#backSince_ms = NaN;
   }
 
+  /** @param {Place} place */
   #keep({ kind, index }) {
     const [low, high] = [this.#low, this.#high].map((sample) => valueOf(sample, kind, index));
     if (this.step === 'left') {
       const centre = valueOf(this.#centre, kind, index);
       this.#left = { kind, index, centre, end: farther(low, high, centre) };
     } else if (this.step === 'right') {
-      this.profile.steering = this.#steering(farther(low, high, this.#left.end));
+      this.profile.steering = this.#steering(low, high);
     } else if (this.step === 'reverse') {
       this.profile.reverse = { on: [], off: [], toggle: [index], held: [] };
-    } else {
+    } else if (this.step === 'throttle' || this.step === 'brake') {
       const rest = this.#rest(kind, index);
       const full = farther(low, high, rest);
       this.profile[this.step] = { kind, index, min: Math.min(rest, full),
@@ -127,30 +149,45 @@ export class CalibrationRun {
     }
   }
 
-  #steering(right) {
-    const { kind, index, end: left, centre } = this.#left;
+  /**
+   * @param {number} low
+   * @param {number} high
+   * @returns {Control}
+   */
+  #steering(low, high) {
+    const { kind, index, end: left, centre } = /** @type {LeftEnd} */ (this.#left);
+    const right = farther(low, high, left);
     const [min, max] = [Math.min(left, right), Math.max(left, right)];
     const share = (centre - min) / (max - min);
     return { kind, index, min, max, centre: share > 0.3 && share < 0.7 ? centre : (min + max) / 2,
       invert: left > right, deadzone: DEADZONE };
   }
 
+  /** @returns {(Place & {span: number})|null} */
   #largest() {
+    /** @type {(Place & {span: number})|null} */
     let best = null;
+    /** @type {Kind[]} */
     const kinds = this.step === 'reverse' ? ['button'] : ['axis', 'button'];
     for (const kind of kinds) {
-      listOf(this.#sample, kind).forEach((_, index) => {
+      for (const index of listOf(this.#sample, kind).keys()) {
         const span = valueOf(this.#high, kind, index) - valueOf(this.#low, kind, index);
         if (span > LEAST_SPAN && span > (best?.span ?? 0) && this.#isFree(kind, index)) {
           best = { kind, index, span };
         }
-      });
+      }
     }
     return best;
   }
 
+  /**
+   * @param {Kind} kind
+   * @param {number} index
+   */
   #isFree(kind, index) {
     const { steering, throttle } = this.profile;
+    /** @param {Place|null} control */
+    /** @param {Place|null} control */
     const is = (control) => control?.kind === kind && control.index === index;
     switch (this.step) {
       case 'left': return kind === 'axis';
@@ -162,6 +199,7 @@ export class CalibrationRun {
     }
   }
 
+  /** @param {Control} throttle */
   #isOpposite(throttle) {
     const { kind, index } = throttle;
     const rest = throttle.invert ? throttle.max : throttle.min;
@@ -170,6 +208,7 @@ export class CalibrationRun {
     return throttle.invert ? up > down : down > up;
   }
 
+  /** @param {Place} place */
   #isBack({ kind, index }) {
     const low = valueOf(this.#low, kind, index);
     const high = valueOf(this.#high, kind, index);
@@ -178,7 +217,12 @@ export class CalibrationRun {
     return Math.abs(valueOf(this.#sample, kind, index) - rest) < BACK_SHARE * far;
   }
 
-  /** Where a control stands when nobody touches it. */
+  /**
+   * Where a control stands when nobody touches it.
+   *
+   * @param {Kind} kind
+   * @param {number} index
+   */
   #rest(kind, index) {
     if (this.step === 'left' || this.step === 'right') {
       return valueOf(this.#centre, kind, index);
@@ -191,21 +235,43 @@ export class CalibrationRun {
   }
 }
 
+/**
+ * @param {Sample|null} sample
+ * @param {Kind} kind
+ * @returns {number[]}
+ */
 function listOf(sample, kind) {
-  return kind === 'axis' ? sample.axes : sample.buttons;
+  return (kind === 'axis' ? sample?.axes : sample?.buttons) ?? [];
 }
 
+/**
+ * @param {Sample|null} sample
+ * @param {Kind} kind
+ * @param {number} index
+ */
 function valueOf(sample, kind, index) {
   return listOf(sample, kind)[index] ?? 0;
 }
 
+/**
+ * @param {number} low
+ * @param {number} high
+ * @param {number} from
+ */
 function farther(low, high, from) {
   return Math.abs(low - from) > Math.abs(high - from) ? low : high;
 }
 
-/** Combine samples value by value. */
+/**
+ * Combine samples value by value.
+ *
+ * @param {(...values: number[]) => number} combine
+ * @param {...Sample} samples
+ * @returns {Sample}
+ */
 function merged(combine, ...samples) {
-  const last = samples.at(-1);
+  const last = /** @type {Sample} */ (samples.at(-1));
+  /** @param {'axes'|'buttons'} name */
   const each = (name) => last[name].map(
     (value, i) => combine(...samples.map((sample) => sample[name][i] ?? value)));
   return { axes: each('axes'), buttons: each('buttons') };

@@ -2,18 +2,26 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The last step of the calibration: what the mapping makes of the device, with fine tuning. */
 
-import { element, setAttribute, setText } from './dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { gearAfter, pedalValue, steeringValue } from './gamepad_profile.js';
 import { PedalBar, SteeringBar } from './gauges.js';
 import { SteeringWheel } from './steering_wheel.js';
 
+/** @import { Control, Profile, Sample } from './gamepad_profile.js' */
+
+/** @typedef {'steering'|'throttle'|'brake'} ControlName */
+
+/** @type {Record<ControlName, string>} */
 const NAMES = { steering: 'Steering', throttle: 'Throttle', brake: 'Brake' };
+const CONTROLS = /** @type {ControlName[]} */ (Object.keys(NAMES));
 const MOST_DEADZONE = 0.3;
 
 /** Shows a profile at work; `node` goes into the dialog. */
 export class CalibrationTest {
+  /** @type {Profile|null} */
   #profile = null;
   #reverse = false;
+  /** @type {boolean[]} */
   #pressed = [];
   #wheel = new SteeringWheel();
   #bars = {
@@ -34,8 +42,8 @@ export class CalibrationTest {
   /**
    * Show what a sample means.
    *
-   * @param {import('./gamepad_profile.js').Profile|null} profile null hides this view
-   * @param {import('./gamepad_profile.js').Sample} [sample]
+   * @param {Profile|null} profile null hides this view
+   * @param {Sample} [sample]
    */
   show(profile, sample) {
     setAttribute(this.node, 'hidden', profile === null);
@@ -44,18 +52,22 @@ export class CalibrationTest {
       this.#reverse = false;
       this.#pressed = [];
       this.#tuning.replaceChildren(...profile === null ? []
-        : Object.keys(NAMES).map((name) => this.#row(name, profile[name])));
+        : CONTROLS.map((name) => this.#row(name, profile[name])));
     }
-    if (profile !== null) {
+    if (profile !== null && sample !== undefined) {
       this.#move(profile, sample);
     }
   }
 
+  /**
+   * @param {Profile} profile
+   * @param {Sample} sample
+   */
   #move(profile, sample) {
     const steering = steeringValue(sample, profile.steering);
     this.#wheel.turn(steering);
     this.#bars.steering.show(steering, false, false);
-    for (const name of ['throttle', 'brake']) {
+    for (const name of /** @type {const} */ (['throttle', 'brake'])) {
       const value = pedalValue(sample, profile[name]);
       this.#bars[name].show(value, false);
       this.#bars[name].write(value);
@@ -70,6 +82,10 @@ export class CalibrationTest {
     setAttribute(this.#gear, 'data-gear', this.#reverse ? 'R' : 'D');
   }
 
+  /**
+   * @param {ControlName} name
+   * @param {Control} control
+   */
   #row(name, control) {
     const shown = element('output', { text: percent(control.deadzone) });
     const range = element('input', { type: 'range', min: 0, max: MOST_DEADZONE, step: 0.01,
@@ -91,6 +107,7 @@ export class CalibrationTest {
   }
 }
 
+/** @param {number} share */
 function percent(share) {
   return `${Math.round(100 * share)} %`;
 }

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The list of input devices in the Drive panel: which one drives, and its calibration. */
 
-import { element } from './dom.js';
+import { element } from '../dom.js';
+
+/** @import { Gamepads } from './gamepad.js' */
 
 /** A section of the panel; `node` goes into the page. */
 export class DevicePanel {
@@ -11,7 +13,7 @@ export class DevicePanel {
   #list = element('ul', { class: 'devices' });
 
   /**
-   * @param {import('./gamepad.js').Gamepads} gamepads
+   * @param {Gamepads} gamepads
    * @param {(index: number) => void} calibrate opens the dialog for a device
    */
   constructor(gamepads, calibrate) {
@@ -35,6 +37,13 @@ export class DevicePanel {
         () => this.#gamepads.choose(device.index), device.index)));
   }
 
+  /**
+   * @param {string} name
+   * @param {string} note
+   * @param {boolean} active
+   * @param {() => void} choose
+   * @param {number|null} [index]
+   */
   #row(name, note, active, choose, index = null) {
     return element('li', { class: 'device', 'data-active': active },
       element('button', { type: 'button', class: 'device-choose', 'aria-pressed': String(active),

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Driving from the page: seats, hands and instruments put together. */
 
+import { part } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { createSeats } from '../seats.js';
 import { CalibrationDialog } from './calibration.js';
 import { DevicePanel, shortName } from './device_panel.js';
-import { part } from './dom.js';
 import { Focus } from './focus.js';
 import { Gamepads } from './gamepad.js';
 import { Hud } from './hud.js';
@@ -14,11 +14,16 @@ import { Keyboard } from './keyboard.js';
 import { describeSeat } from './seat_text.js';
 import { InputSender } from './sender.js';
 
+/** @import { Connection } from '../connection.js' */
+/** @import { Hands, Reply } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+
 /** What a page does with its hands; in `window.crgame.driving`. */
 export class Driving {
   #store;
   #connection;
   #sender;
+  /** @type {DevicePanel|null} */
   #devicePanel = null;
   #reverse = false;
   // After the device that drove was unplugged nothing moves before a person moves something.
@@ -28,8 +33,8 @@ export class Driving {
 
   /**
    * @param {HTMLElement} root `#hud`, or an ancestor of it
-   * @param {import('../store.js').Store} store
-   * @param {import('../connection.js').Connection} connection
+   * @param {Store} store
+   * @param {Connection} connection
    */
   constructor(root, store, connection) {
     this.#store = store;
@@ -65,7 +70,7 @@ export class Driving {
     return this.focus.reason ?? (this.#unplugged ? 'unplugged' : null);
   }
 
-  /** @returns {object} what the hands do, as an input message says it */
+  /** @returns {Hands} what the hands do, as an input message says it */
   get hands() {
     if (this.away !== null) {
       return { away: true };
@@ -77,14 +82,14 @@ export class Driving {
 
   /** @returns {HTMLElement} the list of input devices, for the Drive panel */
   get devices() {
-    return this.#devicePanel.node;
+    return /** @type {DevicePanel} */ (this.#devicePanel).node;
   }
 
   /**
    * Take a seat, giving back the one held before.
    *
    * @param {string} seat
-   * @returns {Promise<{ok: boolean, text: string}>}
+   * @returns {Promise<Reply>}
    */
   async claim(seat) {
     if (this.seat !== null && this.seat !== seat) {
@@ -93,15 +98,20 @@ export class Driving {
     return this.#connection.request({ type: 'claim', seat });
   }
 
-  /** Let go of the controls at once, and give the seat back. */
+  /**
+   * Let go of the controls at once, and give the seat back.
+   *
+   * @returns {Promise<Reply>}
+   */
   async release() {
     const { seat } = this;
     this.#leaveSeat();
-    const reply = await this.#connection.request({ type: 'release', seat });
+    const reply = await this.#connection.request({ type: 'release', seat: seat ?? '' });
     this.#takeSeat();
     return reply;
   }
 
+  /** @param {boolean} connected */
   #connectionChanged(connected) {
     if (connected) {
       this.#lost = '';
@@ -119,11 +129,12 @@ export class Driving {
     const mine = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
     if (this.#store.mode !== 'live' || !this.#store.connected || mine.length === 0) {
       this.#leaveSeat();
-    } else if (!mine.includes(this.seat)) {
+    } else if (this.seat === null || !mine.includes(this.seat)) {
       this.#enterSeat(mine[0]);
     }
   }
 
+  /** @param {string} seat */
   #enterSeat(seat) {
     this.#unplugged = false;
     this.#reverse = this.#gearOf(seat) || this.gamepads.gateHeld;
@@ -131,7 +142,9 @@ export class Driving {
     this.#sender.seat = seat;
     window.crgame?.world?.follow?.(seat, true);
     // A focused button would show its ring on, and widgets might take the keys.
-    document.activeElement?.blur?.();
+    if (document.activeElement instanceof HTMLElement) {
+      document.activeElement.blur();
+    }
   }
 
   #leaveSeat() {
@@ -144,12 +157,17 @@ export class Driving {
     }
   }
 
-  /** Whoever takes over a vehicle keeps its gear. */
+  /**
+   * Whoever takes over a vehicle keeps its gear.
+   *
+   * @param {string} seat
+   */
   #gearOf(seat) {
     const row = this.#store.vehicleIndex(seat) * VEHICLE_WIDTH;
-    return this.#store.latest?.vehicles[row + VEHICLE.reverse] > 0.5;
+    return (this.#store.latest?.vehicles[row + VEHICLE.reverse] ?? NaN) > 0.5;
   }
 
+  /** @param {string|null} reason */
   #focusChanged(reason) {
     if (reason !== null) {
       this.keyboard.release();
@@ -157,6 +175,7 @@ export class Driving {
     this.#sender?.update();
   }
 
+  /** @param {boolean} really */
   #moved(really) {
     if (really) {
       this.#unplugged = false;
@@ -164,6 +183,7 @@ export class Driving {
     this.#sender?.update();
   }
 
+  /** @param {boolean} reverse */
   #setReverse(reverse) {
     // A lever that is moved while the page has no focus counts; what calibration presses doesn't.
     if (this.seat !== null && this.focus.reason !== 'dialog' && reverse !== this.#reverse) {
@@ -185,11 +205,15 @@ export class Driving {
     };
   }
 
+  /** @param {string|null} id */
   #driverOf(id) {
     const { seats, scene, me, connected, mode } = this.#store;
     const { active } = this.gamepads;
     if (this.seat !== null) {
       return active && !this.keyboard.anyHeld ? shortName(active.id) : 'Keyboard';
+    }
+    if (id === null) {
+      return '';
     }
     if (mode === 'replay' && seats[id]?.source === 'cockpit') {
       // Who held the seat is not recorded.
@@ -205,8 +229,8 @@ export class Driving {
  * Put the instruments, the seats and the input devices into the page.
  *
  * @param {HTMLElement} root
- * @param {import('../store.js').Store} store
- * @param {import('../connection.js').Connection} connection
+ * @param {Store} store
+ * @param {Connection} connection
  * @returns {Driving}
  */
 export function createDriving(root, store, connection) {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Whether a person's hands can be on the controls of this page right now. */
 
+/** @import { Store } from '../store.js' */
+
 const EDITABLE = 'input:not([type=checkbox]):not([type=radio]):not([type=button]),'
   + 'select, textarea, [contenteditable=""], [contenteditable=true]';
 
@@ -23,7 +25,7 @@ export class Focus {
   #focused = document.hasFocus();
 
   /**
-   * @param {import('../store.js').Store} store its `connected` counts
+   * @param {Store} store its `connected` counts
    * @param {(reason: string|null) => void} changed called at once at each change of `reason`
    */
   constructor(store, changed) {
@@ -38,10 +40,12 @@ export class Focus {
   }
 
   #listen() {
+    /** @param {boolean} value */
     const focused = (value) => () => {
       this.#focused = value;
       this.#update();
     };
+    /** @param {boolean} value */
     const gone = (value) => () => {
       this.#gone = value;
       this.#update();

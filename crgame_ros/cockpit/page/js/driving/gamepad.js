@@ -6,34 +6,45 @@ import {
   gearAfter, loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
 } from './gamepad_profile.js';
 
+/** @import { Control, Profile } from './gamepad_profile.js' */
+
 // Beyond this change of any axis or button a person means it, and not a trembling sensor.
 const MEANT = 0.2;
 // A pedal counts only after it was seen at rest: browsers report 0, half of a wheel's pedal
 // travel, for axes that have not moved since the device was plugged in.
 const AT_REST = 0.1;
 const STEPS = 1000;
+const PEDALS = /** @type {const} */ (['throttle', 'brake']);
 
 /** One connected device with its mapping. */
 class Device {
+  /** @param {Gamepad} pad */
   constructor(pad) {
     this.id = pad.id;
     this.index = pad.index;
     this.baseline = sampleOf(pad);
     this.sample = this.baseline;
     this.rested = { throttle: false, brake: false };
-    Object.assign(this, loadProfile(pad));
+    const { profile, calibrated } = loadProfile(pad);
+    this.profile = profile;
+    this.calibrated = calibrated;
   }
 
-  /** Take the values of this frame. */
+  /**
+   * Take the values of this frame.
+   *
+   * @param {Gamepad} pad
+   */
   read(pad) {
     this.sample = sampleOf(pad);
-    for (const name of Object.keys(this.rested)) {
+    for (const name of PEDALS) {
       this.rested[name] ||= pedalValue(this.sample, this.profile[name]) < AT_REST;
     }
   }
 
   /** Whether somebody moved something clearly since the device was connected. */
   get moved() {
+    /** @type {(values: number[], base: number[]) => boolean} */
     const differs = (values, base) => values.some((v, i) => Math.abs(v - (base[i] ?? 0)) > MEANT);
     return differs(this.sample.axes, this.baseline.axes)
       || differs(this.sample.buttons, this.baseline.buttons);
@@ -42,6 +53,7 @@ class Device {
   /** Throttle, brake and steering after calibration. */
   get axes() {
     const { throttle, brake, steering } = this.profile;
+    /** @type {(name: 'throttle'|'brake', control: Control) => number} */
     const pedal = (name, control) => (
       this.rested[name] ? pedalValue(this.sample, control) : 0);
     return [pedal('throttle', throttle), pedal('brake', brake),
@@ -51,8 +63,11 @@ class Device {
 
 /** All connected devices; polled in every animation frame while there is one. */
 export class Gamepads {
+  /** @type {Map<number, Device>} */
   #devices = new Map();
+  /** @type {Device|null} */
   #active = null;
+  /** @type {boolean[]} */
   #pressed = [];
   #report;
   #frame = 0;
@@ -97,7 +112,7 @@ export class Gamepads {
    * @param {number|null} index of the device; null leaves the keyboard alone
    */
   choose(index) {
-    const device = this.#devices.get(index) ?? null;
+    const device = index === null ? null : this.#devices.get(index) ?? null;
     for (const other of this.#devices.values()) {
       // From here on only a new movement brings another device in.
       other.baseline = other.sample;
@@ -109,7 +124,7 @@ export class Gamepads {
    * Keep a mapping for a device, or forget it and take the default again.
    *
    * @param {number} index of the device
-   * @param {import('./gamepad_profile.js').Profile|null} profile
+   * @param {Profile|null} profile
    */
   setProfile(index, profile) {
     const device = this.#devices.get(index);
@@ -122,6 +137,7 @@ export class Gamepads {
     }
   }
 
+  /** @param {Device|null} device */
   #activate(device) {
     this.#active = device;
     this.#pressed = device ? device.sample.buttons.map((value) => value > 0.5) : [];
@@ -134,18 +150,21 @@ export class Gamepads {
     const pads = connectedPads();
     this.#match(pads);
     for (const pad of pads) {
-      this.#devices.get(pad.index).read(pad);
+      this.#devices.get(pad.index)?.read(pad);
     }
-    this.#active ?? this.#activateMoved();
+    if (this.#active === null) {
+      this.#activateMoved();
+    }
     if (this.#active) {
-      this.#readGear();
-      this.#reportChange();
+      this.#readGear(this.#active);
+      this.#reportChange(this.#active);
     }
     if (pads.length > 0) {
       this.#frame = requestAnimationFrame(() => this.#poll());
     }
   }
 
+  /** @param {Gamepad[]} pads */
   #match(pads) {
     let listed = false;
     for (const pad of pads) {
@@ -176,8 +195,8 @@ export class Gamepads {
     }
   }
 
-  #readGear() {
-    const { sample, profile } = this.#active;
+  /** @param {Device} device */
+  #readGear({ sample, profile }) {
     sample.buttons.forEach((value, index) => {
       const pressed = value > 0.5;
       if (pressed !== this.#pressed[index]) {
@@ -187,8 +206,9 @@ export class Gamepads {
     });
   }
 
-  #reportChange() {
-    const text = this.#active.axes.join();
+  /** @param {Device} device */
+  #reportChange({ axes }) {
+    const text = axes.join();
     if (text !== this.#last) {
       this.#last = text;
       this.#report.changed();
@@ -202,5 +222,6 @@ export class Gamepads {
  * @returns {Gamepad[]}
  */
 export function connectedPads() {
-  return [...navigator.getGamepads?.() ?? []].filter((pad) => pad?.connected);
+  return [...navigator.getGamepads?.() ?? []].filter((pad) => pad !== null)
+    .filter((pad) => pad.connected);
 }

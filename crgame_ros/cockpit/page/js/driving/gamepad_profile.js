@@ -44,22 +44,37 @@ export function defaultProfile(pad) {
   };
 }
 
+/**
+ * @param {number} index
+ * @param {number} deadzone
+ * @returns {Control}
+ */
 function steeringOf(index, deadzone) {
   return { kind: 'axis', index, min: -1, centre: 0, max: 1, invert: false, deadzone };
 }
 
+/**
+ * @param {number} index
+ * @returns {Control}
+ */
 function triggerOf(index) {
   return { kind: 'button', index, min: 0, max: 1, invert: false, deadzone: 0.02 };
 }
 
+/**
+ * @param {number} index
+ * @returns {Control}
+ */
 function pedalOf(index) {
   return { kind: 'axis', index, min: -1, max: 1, invert: true, deadzone: 0.02 };
 }
 
+/** @param {Gamepad} pad */
 function isLogitechWithGate(pad) {
   return /046d.*(c24f|c266)/i.test(pad.id);
 }
 
+/** @param {Gamepad} pad */
 function pedalAxes(pad) {
   // G920 and the Xbox version of the G923 have the clutch on the last axis, the others on 1.
   if (/046d.*(c262|c26e)/i.test(pad.id)) {
@@ -110,7 +125,12 @@ export function saveProfile(id, profile) {
   }
 }
 
+/**
+ * @param {any} profile as somebody's storage has it
+ * @returns {profile is Profile}
+ */
 function isProfile(profile) {
+  /** @type {(control: any, names: string[]) => boolean} */
   const numbers = (control, names) => names.every((name) => Number.isFinite(control[name]));
   return NAMES.every((name) => {
     const control = profile?.[name];
@@ -124,7 +144,7 @@ function isProfile(profile) {
  * Read one raw value of a sample.
  *
  * @param {Sample} sample
- * @param {{kind: string, index: number}} control
+ * @param {Pick<Control, 'kind'|'index'>} control
  * @returns {number} NaN if the device has none such.
  */
 export function rawValue(sample, control) {
@@ -152,12 +172,17 @@ export function pedalValue(sample, control) {
  * @returns {number} -1 to 1, positive to the left.
  */
 export function steeringValue(sample, control) {
-  const offset = rawValue(sample, control) - control.centre;
-  const side = offset > 0 ? control.max - control.centre : control.centre - control.min;
+  const centre = control.centre ?? NaN;
+  const offset = rawValue(sample, control) - centre;
+  const side = offset > 0 ? control.max - centre : centre - control.min;
   const size = beyond(Math.abs(offset) / side, control.deadzone);
   return size === 0 ? 0 : size * Math.sign(offset) * (control.invert ? 1 : -1);
 }
 
+/**
+ * @param {number} share
+ * @param {number} deadzone
+ */
 function beyond(share, deadzone) {
   // Stretched beyond the dead zone, so that nothing jumps at its edge; no number is at rest.
   const size = (share - deadzone) / (1 - deadzone);

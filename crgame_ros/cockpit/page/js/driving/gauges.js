@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Bars that show a command, solid, beside the raw key that it comes from, outlined. */
 
-import { element, setAttribute, setText } from './dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 
+/** @param {number} share */
 const scaled = (share) => (Number.isFinite(share) ? share : 0).toFixed(3);
 
 /** An upright bar of one pedal. */

@@ -2,12 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The instruments over the world: of the driven vehicle, or of the one that is watched. */
 
+import { element, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
-import { element, setAttribute, setText } from './dom.js';
 import { PedalBar, SteeringBar } from './gauges.js';
 import { Keycaps } from './keycaps.js';
 import { SpeedLimits } from './speed_limit.js';
 import { SteeringWheel } from './steering_wheel.js';
+
+/** @import { Scene, SceneVehicle } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+/** @import { Keyboard } from './keyboard.js' */
 
 // Numbers that change faster than this cannot be read [ms].
 const NUMBERS_EVERY_MS = 100;
@@ -19,12 +23,23 @@ const DEGREES = 180 / Math.PI;
 const LIMIT_TOLERANCE = 0.3;
 
 /** Why the hands are off, by reason. */
-const AWAY_TEXTS = Object.freeze({
+const AWAY_TEXTS = Object.freeze(/** @type {Record<string, string>} */ ({
   hidden: 'Hands off: this page is hidden.',
   focus: 'Hands off: click into this page to drive on.',
   dialog: 'Hands off while a dialog is open.',
   unplugged: 'The input device is unplugged: press a driving key, or plug it in and move it.',
-});
+}));
+
+/**
+ * @typedef {object} Subject
+ * @property {string|null} id
+ * @property {boolean} driven
+ * @property {string|null} away
+ * @property {string} lost
+ * @property {boolean} reverse
+ * @property {Keyboard} keyboard
+ * @property {string} driver
+ */
 
 /** The overlay in `#hud`. */
 export class Hud {
@@ -35,15 +50,16 @@ export class Hud {
   #limits = new SpeedLimits(null);
   #numbersAt_ms = -Infinity;
   #limitAt_ms = -Infinity;
+  /** @type {string|null} */
   #vehicleId = null;
+  /** @type {SceneVehicle|null} */
   #vehicle = null;
 
   /**
    * @param {HTMLElement} root
-   * @param {import('../store.js').Store} store
-   * @param {() => {id: string|null, driven: boolean, away: string|null, lost: string,
-   *   reverse: boolean, keyboard: import('./keyboard.js').Keyboard, driver: string}} subject which
-   *   vehicle to show, what the hands do, and what has gone wrong with the connection
+   * @param {Store} store
+   * @param {() => Subject} subject which vehicle to show, what the hands do, and what has gone
+   *   wrong with the connection
    */
   constructor(root, store, subject) {
     this.#root = root;
@@ -53,6 +69,7 @@ export class Hud {
     root.classList.add('hud');
     store.on('scene', (scene) => this.#takeScene(scene));
     this.#takeScene(store.scene);
+    /** @param {number} now_ms */
     const frame = (now_ms) => {
       this.#draw(now_ms);
       requestAnimationFrame(frame);
@@ -60,11 +77,13 @@ export class Hud {
     requestAnimationFrame(frame);
   }
 
+  /** @param {Scene|null} scene */
   #takeScene(scene) {
     this.#limits = new SpeedLimits(scene);
     this.#vehicleId = null;
   }
 
+  /** @param {number} now_ms */
   #draw(now_ms) {
     const subject = this.#subject();
     const index = subject.id === null ? -1 : this.#store.vehicleIndex(subject.id);
@@ -75,7 +94,7 @@ export class Hud {
     }
     if (subject.id !== this.#vehicleId) {
       this.#vehicleId = subject.id;
-      this.#vehicle = this.#store.scene.vehicles[index];
+      this.#vehicle = this.#store.scene?.vehicles[index] ?? null;
       this.#numbersAt_ms = this.#limitAt_ms = -Infinity;
     }
     this.#show(row, subject);
@@ -89,6 +108,10 @@ export class Hud {
     }
   }
 
+  /**
+   * @param {number} index
+   * @param {number} now_ms
+   */
   #row(index, now_ms) {
     const values = this.#store.displayed(now_ms)?.vehicles;
     const from = index * VEHICLE_WIDTH;
@@ -96,7 +119,12 @@ export class Hud {
       ? values.subarray(from, from + VEHICLE_WIDTH) : null;
   }
 
-  /** What moves: in every animation frame. */
+  /**
+   * What moves: in every animation frame.
+   *
+   * @param {Float64Array} row
+   * @param {Subject} subject
+   */
   #show(row, { driven, keyboard, reverse }) {
     const p = this.#parts;
     const [throttleKey, brakeKey, left, right] = driven ? keyboard.keys : [0, 0, 0, 0];
@@ -106,14 +134,19 @@ export class Hud {
     p.steering.show(command, left === 1, right === 1);
     // A planner gives no steering command: then the wheel shows the front wheels' angle.
     p.wheel.turn(Number.isFinite(command) ? command
-      : row[VEHICLE.steering_angle] / (this.#vehicle.max_steering_angle || 1));
+      : row[VEHICLE.steering_angle] / (this.#vehicle?.max_steering_angle || 1));
     setAttribute(p.keycaps.node, 'hidden', !driven);
     if (driven) {
       p.keycaps.show(keyboard, reverse);
     }
   }
 
-  /** What is read: now and then. */
+  /**
+   * What is read: now and then.
+   *
+   * @param {Float64Array} row
+   * @param {Subject} subject
+   */
   #write(row, subject) {
     const p = this.#parts;
     const speed = row[VEHICLE.speed];
@@ -130,12 +163,13 @@ export class Hud {
     p.brake.write(row[VEHICLE.brake]);
     setText(p.who, subject.driven ? `You drive ${subject.id}` : `Watching ${subject.id}`);
     setText(p.device, subject.driver);
-    setAttribute(p.board, 'data-role', this.#vehicle.role);
+    setAttribute(p.board, 'data-role', this.#vehicle?.role ?? null);
     const text = subject.driven && subject.away ? AWAY_TEXTS[subject.away] ?? '' : subject.lost;
     setText(p.banner, text);
     setAttribute(p.banner, 'data-on', text !== '');
   }
 
+  /** @param {Float64Array} row */
   #writeLimit(row) {
     const limit = this.#limits.at(row[VEHICLE.x], row[VEHICLE.y], row[VEHICLE.yaw]);
     const { limit: sign } = this.#parts;
@@ -149,14 +183,25 @@ export class Hud {
   }
 }
 
-/** The gear that is in, and the one that is asked for: it changes only at standstill. */
+/**
+ * The gear that is in, and the one that is asked for: it changes only at standstill.
+ *
+ * @param {number} speed
+ * @param {number} reverse
+ * @returns {[gear: string, asked: string]}
+ */
 function gears(speed, reverse) {
   const asked = Number.isFinite(reverse) ? (reverse > 0.5 ? 'R' : 'D') : null;
   const gear = Math.abs(speed) < STANDSTILL ? asked ?? 'D' : speed < 0 ? 'R' : 'D';
   return [gear, asked ?? gear];
 }
 
-/** A number with its sign, and none for what rounds to zero. */
+/**
+ * A number with its sign, and none for what rounds to zero.
+ *
+ * @param {number} value
+ * @param {number} digits
+ */
 function signed(value, digits) {
   if (!Number.isFinite(value)) {
     return '–';
@@ -169,6 +214,7 @@ function signed(value, digits) {
 }
 
 function buildParts() {
+  /** @type {(name: string, title?: string) => HTMLElement} */
   const span = (name, title) => element('span', { class: `hud-${name}`, title });
   const parts = {
     kmh: span('kmh', 'Speed'), ms: span('ms', 'Signed speed'), gear: span('gear', 'Gear'),
@@ -181,7 +227,7 @@ function buildParts() {
     steering: new SteeringBar(), wheel: new SteeringWheel(), keycaps: new Keycaps(),
     banner: element('div', { class: 'hud-banner', role: 'status', 'aria-live': 'polite' }),
   };
-  parts.board = element('div', { class: 'hud-board' },
+  const board = element('div', { class: 'hud-board' },
     element('div', { class: 'hud-title' }, parts.who, parts.device, parts.seen),
     element('div', { class: 'hud-row' },
       element('div', { class: 'hud-pedals' }, parts.brake.node, parts.throttle.node),
@@ -189,9 +235,10 @@ function buildParts() {
       element('div', { class: 'hud-signs' }, parts.gear, parts.limit),
       element('div', { class: 'hud-steering' }, parts.wheel.node, turnBlock(parts)),
       parts.keycaps.node));
-  return parts;
+  return { ...parts, board };
 }
 
+/** @param {Record<'kmh'|'ms'|'acceleration', HTMLElement>} parts */
 function speedBlock({ kmh, ms, acceleration }) {
   return element('div', { class: 'hud-speed' },
     element('div', { class: 'hud-main' }, kmh,
@@ -199,11 +246,16 @@ function speedBlock({ kmh, ms, acceleration }) {
     element('div', { class: 'hud-small' }, ms, acceleration));
 }
 
+/** @param {{angle: HTMLElement, command: HTMLElement, steering: SteeringBar}} parts */
 function turnBlock({ angle, command, steering }) {
   return element('div', { class: 'hud-turn' }, element('div', { class: 'hud-angles' },
     label('Wheels', angle), label('Steering', command)), steering.node);
 }
 
+/**
+ * @param {string} text
+ * @param {HTMLElement} value
+ */
 function label(text, value) {
   return element('div', { class: 'hud-labelled' },
     element('span', { class: 'bar-label', text }), value);

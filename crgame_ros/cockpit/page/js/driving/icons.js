@@ -2,8 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Drawn icons of the run control. */
 
-import { svg } from './dom.js';
+import { svg } from '../dom.js';
 
+/** @import { RunAction } from '../messages.js' */
+
+/** @type {Record<RunAction, string>} */
 const PATHS = {
   start: 'M6 4 L20 12 L6 20 Z',
   pause: 'M6 4 H10 V20 H6 Z M14 4 H18 V20 H14 Z',
@@ -15,7 +18,7 @@ const PATHS = {
 /**
  * Draw an icon in the colour of the text around it.
  *
- * @param {string} name one of start, pause, step, reset and stop
+ * @param {RunAction} name one of start, pause, step, reset and stop
  * @returns {SVGElement}
  */
 export function icon(name) {

@@ -4,21 +4,25 @@
 
 import { isTyping } from './focus.js';
 
+/** @typedef {'throttle'|'brake'|'left'|'right'|'reverse'} KeyAction */
+
 /** What each key does, by its place on the keyboard, so that every layout drives alike. */
-export const ACTIONS = Object.freeze({
+export const ACTIONS = Object.freeze(/** @type {Record<string, KeyAction|undefined>} */ ({
   KeyW: 'throttle', ArrowUp: 'throttle',
   KeyS: 'brake', ArrowDown: 'brake', Space: 'brake',
   KeyA: 'left', ArrowLeft: 'left',
   KeyD: 'right', ArrowRight: 'right',
   KeyR: 'reverse',
-});
+}));
 
+/** @type {KeyAction[]} */
 const ORDER = ['throttle', 'brake', 'left', 'right'];
 
 /** Listens to the driving keys while `enabled` says so. */
 export class Keyboard {
   #enabled;
   #report;
+  /** @type {Set<string>} */
   #held = new Set();
 
   /**
@@ -66,6 +70,7 @@ export class Keyboard {
     }
   }
 
+  /** @param {KeyboardEvent} event */
   #down(event) {
     // While the command key is held, macOS tells no key's release.
     if (event.key === 'Meta') {
@@ -90,6 +95,7 @@ export class Keyboard {
     }
   }
 
+  /** @param {KeyboardEvent} event */
   #up(event) {
     if (this.#held.delete(event.code)) {
       // Firefox activates a focused button when the space bar is released.

@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The driving keys as they lie on the keyboard, lit while they are held. */
 
-import { element, setAttribute, setText } from './dom.js';
+import { element, setAttribute, setText } from '../dom.js';
+
+/** @import { Keyboard } from './keyboard.js' */
 
 // The place of a key, what it reads, and the other key that does the same.
+/** @type {[code: string, text: string, twin: string|null, title: string][]} */
 const CAPS = [
   ['KeyW', 'W', 'ArrowUp', 'Throttle'], ['KeyR', 'R', null, 'Reverse gear'],
   ['KeyA', 'A', 'ArrowLeft', 'Left'], ['KeyS', 'S', 'ArrowDown', 'Brake'],
@@ -13,6 +16,7 @@ const CAPS = [
 
 /** The drawn keys; `node` goes into the page. */
 export class Keycaps {
+  /** @type {Map<string, HTMLElement>} */
   #caps = new Map();
 
   constructor() {
@@ -28,22 +32,30 @@ export class Keycaps {
   /**
    * Light the held keys.
    *
-   * @param {import('./keyboard.js').Keyboard} keyboard
+   * @param {Keyboard} keyboard
    * @param {boolean} reverse whether the reverse gear is asked for
    */
   show(keyboard, reverse) {
     for (const [code, , twin] of CAPS) {
       const on = code === 'KeyR' ? reverse
         : keyboard.isHeld(code) || (twin !== null && keyboard.isHeld(twin));
-      setAttribute(this.#caps.get(code), 'data-on', on);
+      setAttribute(this.#cap(code), 'data-on', on);
     }
+  }
+
+  /**
+   * @param {string} code of CAPS
+   * @returns {HTMLElement}
+   */
+  #cap(code) {
+    return /** @type {HTMLElement} */ (this.#caps.get(code));
   }
 
   /** Write what the keys read on this person's keyboard, where the browser knows it. */
   async #takeLayout() {
     const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => undefined);
     for (const [code, text] of CAPS) {
-      setText(this.#caps.get(code), layout?.get(code)?.toUpperCase() ?? text);
+      setText(this.#cap(code), layout?.get(code)?.toUpperCase() ?? text);
     }
   }
 }

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The name under which the others see this person; kept in this browser. */
 
-import { element } from './dom.js';
+import { element } from '../dom.js';
+
+/** @import { Connection } from '../connection.js' */
+/** @import { Store } from '../store.js' */
 
 const KEY = 'crgame.name';
 const LONGEST = 40;
@@ -15,8 +18,8 @@ export class NameField {
     autocomplete: 'nickname', placeholder: 'Your name' });
 
   /**
-   * @param {import('../store.js').Store} store
-   * @param {import('../connection.js').Connection} connection
+   * @param {Store} store
+   * @param {Connection} connection
    */
   constructor(store, connection) {
     this.#store = store;

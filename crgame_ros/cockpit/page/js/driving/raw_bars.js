@@ -2,13 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Live bars of everything that a device reports, before any mapping. */
 
-import { element, setAttribute, setText } from './dom.js';
+import { element, setAttribute, setText } from '../dom.js';
+
+/** @import { Kind, Place } from './calibration_run.js' */
+/** @import { Sample } from './gamepad_profile.js' */
+
+/** @typedef {{node: HTMLElement, fill: HTMLElement, value: HTMLElement|null}} Row */
 
 /** Bars for each axis (-1 to 1) and button (0 to 1). */
 export class RawBars {
+  /** @type {Record<Kind, Row[]>} */
   #rows = { axis: [], button: [] };
 
-  /** @param {import('./gamepad_profile.js').Sample} sample of the device, for how much it has */
+  /** @param {Sample} sample of the device, for how much it has */
   constructor(sample) {
     const axes = sample.axes.map((_, i) => this.#row('axis', `Axis ${i}`));
     const buttons = sample.buttons.map((_, i) => this.#row('button', `${i}`));
@@ -21,14 +27,19 @@ export class RawBars {
   /**
    * Show a sample.
    *
-   * @param {import('./gamepad_profile.js').Sample} sample
-   * @param {{kind: string, index: number}|null} found what the person moves, marked
+   * @param {Sample} sample
+   * @param {Place|null} found what the person moves, marked
    */
   show(sample, found) {
     this.#showAll('axis', sample.axes, found);
     this.#showAll('button', sample.buttons, found);
   }
 
+  /**
+   * @param {Kind} kind
+   * @param {number[]} values
+   * @param {Place|null} found
+   */
   #showAll(kind, values, found) {
     this.#rows[kind].forEach((row, index) => {
       const value = values[index] ?? 0;
@@ -41,6 +52,10 @@ export class RawBars {
     });
   }
 
+  /**
+   * @param {Kind} kind
+   * @param {string} text
+   */
   #row(kind, text) {
     const fill = element('div', { class: 'bar-fill' });
     const value = kind === 'axis' ? element('span', { class: 'bar-value' }) : null;

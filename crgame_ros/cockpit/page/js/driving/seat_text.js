@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Who drives a seat, in words. */
 
+/** @import { Seat } from '../messages.js' */
+
+/** @type {Record<string, (rest: string) => string>} */
 const GAME_DRIVERS = {
   auto: () => 'Driven by a device on the simulation machine, if one is there',
   evdev: (name) => (name ? `Driven by the device ${name}` : 'Driven by a device'),
@@ -14,8 +17,8 @@ const GAME_DRIVERS = {
 /**
  * Describe who drives a seat.
  *
- * @param {{source: string, driver?: string, holder: string|null, holder_name?: string}} seat
- * @param {string} role 'human' or 'autonomous'
+ * @param {Pick<Seat, 'source'|'driver'|'holder'|'holder_name'>} seat
+ * @param {string|undefined} role 'human' or 'autonomous'
  * @param {string|undefined} planner name of the AV's planner
  * @param {string} me id of this client
  * @returns {string}

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Sends what the hands do for the held seat: at once at each change, and again and again. */
 
+/** @import { Connection } from '../connection.js' */
+/** @import { Hands } from '../messages.js' */
+
 // The server lets go of the controls after 200 ms of silence.
 const REPEAT_MS = 50;
 
@@ -9,13 +12,13 @@ const REPEAT_MS = 50;
 export class InputSender {
   #connection;
   #hands;
+  /** @type {string|null} */
   #seat = null;
   #last = '';
 
   /**
-   * @param {import('../connection.js').Connection} connection
-   * @param {() => object} hands what the hands do now: {away: true}, {keys, reverse} or
-   *   {axes, reverse}
+   * @param {Connection} connection
+   * @param {() => Hands} hands what the hands do now
    */
   constructor(connection, hands) {
     this.#connection = connection;
@@ -46,7 +49,7 @@ export class InputSender {
     const text = JSON.stringify(input);
     if (text !== this.#last) {
       this.#last = text;
-      this.#send(input);
+      this.#send(this.#seat, input);
     }
   }
 
@@ -56,13 +59,17 @@ export class InputSender {
     }
     const input = this.#hands();
     // Hands off is said once: silence then means the same.
-    if (!input.away) {
+    if (!('away' in input)) {
       this.#last = JSON.stringify(input);
-      this.#send(input);
+      this.#send(this.#seat, input);
     }
   }
 
-  #send(input) {
-    this.#connection.send({ type: 'input', seat: this.#seat, ...input });
+  /**
+   * @param {string} seat
+   * @param {Hands} input
+   */
+  #send(seat, input) {
+    this.#connection.send({ type: 'input', seat, ...input });
   }
 }

@@ -2,16 +2,26 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The speed limit where a vehicle is, from the lanelets of the scene. */
 
+import { boxOf, outlineOf } from '../outline.js';
+
+/** @import { Box, Scene } from '../messages.js' */
+
+/**
+ * @typedef {{limit: number|null, center: number[], one_way: boolean, ring: number[],
+ *   box: Box}} Lane
+ */
+
 /** Finds the lanelet under a point. */
 export class SpeedLimits {
+  /** @type {Lane[]} */
   #lanes = [];
 
-  /** @param {object|null} scene the scene document */
+  /** @param {Scene|null} scene the scene document */
   constructor(scene) {
     for (const lanelet of scene?.lanelets ?? []) {
       this.#lanes.push({
         limit: lanelet.speed_limit ?? null, center: lanelet.center, one_way: lanelet.one_way,
-        ring: ringOf(lanelet), box: boxOf([...lanelet.left, ...lanelet.right]),
+        ring: outlineOf(lanelet), box: boxOf([...lanelet.left, ...lanelet.right]),
       });
     }
   }
@@ -42,25 +52,11 @@ export class SpeedLimits {
   }
 }
 
-function ringOf({ left, right }) {
-  const ring = [...left];
-  for (let i = right.length - 2; i >= 0; i -= 2) {
-    ring.push(right[i], right[i + 1]);
-  }
-  return ring;
-}
-
-function boxOf(flat) {
-  const box = [Infinity, Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < flat.length; i += 2) {
-    box[0] = Math.min(box[0], flat[i]);
-    box[1] = Math.min(box[1], flat[i + 1]);
-    box[2] = Math.max(box[2], flat[i]);
-    box[3] = Math.max(box[3], flat[i + 1]);
-  }
-  return box;
-}
-
+/**
+ * @param {number[]} ring
+ * @param {number} x
+ * @param {number} y
+ */
 function contains(ring, x, y) {
   let inside = false;
   for (let i = 0, j = ring.length - 2; i < ring.length; j = i, i += 2) {
@@ -72,6 +68,11 @@ function contains(ring, x, y) {
   return inside;
 }
 
+/**
+ * @param {number[]} center
+ * @param {number} x
+ * @param {number} y
+ */
 function headingNear(center, x, y) {
   let nearest = 0;
   let least = Infinity;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A drawn steering wheel that turns with the steering command. */
 
-import { setAttribute, svg } from './dom.js';
+import { setAttribute, svg } from '../dom.js';
 
 // Half a turn would look the same to both sides; with 150 degrees at full lock none is alike.
 const FULL_LOCK_DEG = 150;

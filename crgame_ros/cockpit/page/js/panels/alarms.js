@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Alarms: a frame around the world and a sign over it, an icon and a word in the header. */
 
-import { element, setText } from '../driving/dom.js';
+import { element, part, setText } from '../dom.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
 
+/** @import { Alarm, Scene } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+
 // kind: [word for the header, urgent]. Urgent ones frame the whole world, others mark its top.
+/** @type {Record<string, [word: string, urgent: boolean]|undefined>} */
 const KINDS = {
   collision: ['Collision', true],
   off_road: ['Off road', true],
@@ -22,18 +26,25 @@ const LINGERS_MS = 4000;
 const CONNECTS_WITHIN_MS = 3000;
 
 /**
+ * @typedef {{chip: HTMLElement, says: HTMLElement, whom: HTMLElement}} Chip and its two texts
+ * @typedef {Alarm & Chip & {timer: number, urgent: boolean, ended: boolean}} Shown
+ */
+
+/**
  * Show the alarms.
  *
  * @param {HTMLElement} root #alarms in the header
- * @param {import('../store.js').Store} store
- * @returns {{kinds: function(): string[]}} kinds: those on the page now
+ * @param {Store} store
+ * @returns {{kinds: () => string[]}} kinds: those on the page now
  */
 export function createAlarms(root, store) {
-  const frame = document.querySelector('#alarm-frame');
-  const signs = document.querySelector('#alarm-signs');
+  const frame = part(document.body, 'alarm-frame');
+  const signs = part(document.body, 'alarm-signs');
+  /** @type {Map<string, Shown>} */
   const alarms = new Map();
+  /** @param {string} id */
   const remove = (id) => {
-    alarms.get(id).chip.remove();
+    alarms.get(id)?.chip.remove();
     alarms.delete(id);
     paint(frame, signs, alarms);
     fitWords(root);
@@ -43,11 +54,12 @@ export function createAlarms(root, store) {
     wasConnected ||= store.connected;
     const active = [...store.alarms, ...(wasConnected ? ownAlarms(store) : [])];
     for (const alarm of active) {
+      const entry = alarms.get(alarm.id)
+        ?? { ...alarm, ...makeChip(alarm), timer: 0, urgent: false, ended: false };
       if (!alarms.has(alarm.id)) {
-        alarms.set(alarm.id, { ...alarm, chip: makeChip(alarm), timer: 0 });
-        root.append(alarms.get(alarm.id).chip);
+        alarms.set(alarm.id, entry);
+        root.append(entry.chip);
       }
-      const entry = alarms.get(alarm.id);
       clearTimeout(entry.timer);
       Object.assign(entry, alarm, { ended: false });
       describe(entry, store.scene);
@@ -75,7 +87,12 @@ export function createAlarms(root, store) {
   return { kinds: () => [...alarms.values()].map((alarm) => alarm.kind) };
 }
 
-/** What only the page can know: that it hears nothing from the server any more. */
+/**
+ * What only the page can know: that it hears nothing from the server any more.
+ *
+ * @param {Store} store
+ * @returns {Alarm[]}
+ */
 function ownAlarms(store) {
   // After the end of a run the program may well be ended, too.
   return store.connected || store.status?.run === 'ended' ? [] : [{
@@ -84,11 +101,20 @@ function ownAlarms(store) {
   }];
 }
 
+/**
+ * @param {Alarm} alarm
+ * @returns {Chip}
+ */
 function makeChip(alarm) {
-  return element('div', { class: 'alarm' }, icon(alarm.kind),
-    element('span', { class: 'alarm-word' }), element('span', { class: 'alarm-subject' }));
+  const says = element('span', { class: 'alarm-word' });
+  const whom = element('span', { class: 'alarm-subject' });
+  return { chip: element('div', { class: 'alarm' }, icon(alarm.kind), says, whom), says, whom };
 }
 
+/**
+ * @param {Shown} entry
+ * @param {Scene|null} scene
+ */
 function describe(entry, scene) {
   const [word, urgent] = KINDS[entry.kind] ?? [oneLine(entry.kind).replaceAll('_', ' '), true];
   entry.urgent = urgent;
@@ -96,13 +122,17 @@ function describe(entry, scene) {
   entry.chip.dataset.kind = entry.kind;
   const since = Number.isFinite(entry.since_t) ? ` (since ${clockTime(entry.since_t)})` : '';
   entry.chip.title = oneLine(entry.text) + since;
-  setText(entry.chip.querySelector('.alarm-word'), word);
+  setText(entry.says, word);
   // Which vehicle it is must be said; that the recorder records need not.
   const isVehicle = scene?.vehicles.some((vehicle) => vehicle.id === entry.subject);
-  setText(entry.chip.querySelector('.alarm-subject'), isVehicle ? entry.subject : '');
+  setText(entry.whom, isVehicle ? entry.subject : '');
 }
 
-/** Leave out words, those of minor and ended alarms first, until all alarms are to be seen. */
+/**
+ * Leave out words, those of minor and ended alarms first, until all alarms are to be seen.
+ *
+ * @param {HTMLElement} root
+ */
 function fitWords(root) {
   for (const words of ['all', 'urgent', 'none']) {
     root.dataset.words = words;
@@ -113,6 +143,11 @@ function fitWords(root) {
   }
 }
 
+/**
+ * @param {HTMLElement} frame
+ * @param {HTMLElement} signs
+ * @param {Map<string, Shown>} alarms
+ */
 function paint(frame, signs, alarms) {
   const all = [...alarms.values()];
   const active = all.filter((alarm) => !alarm.ended);

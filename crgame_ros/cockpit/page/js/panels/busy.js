@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A bar that moves while something takes long, with words and the seconds it has taken. */
 
-import { element, setText } from '../driving/dom.js';
+import { element, setText } from '../dom.js';
 
 const SHOWN_AFTER_MS = 300;
 const COUNTED_AFTER_S = 2;

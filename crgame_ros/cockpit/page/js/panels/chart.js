@@ -2,31 +2,46 @@
 // SPDX-License-Identifier: Apache-2.0
 /** One scrolling plot: a title with the newest values, and Plotly below. */
 
-import { element, setAttribute, setText } from '../driving/dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { fixed } from './format.js';
+
+/** @import { Plotly } from './plotly.js' */
+/** @import { Quantity, Trace } from './quantities.js' */
 
 const CONFIG = { displayModeBar: false, doubleClick: 'reset', showTips: false };
 // While it scrolls nothing can be pointed at, which saves setting up handlers at each redrawing.
 const SCROLLING = { ...CONFIG, staticPlot: true };
 const HOVER_DIGITS = 3;
 
+/**
+ * @typedef {object} ChartView
+ * @property {number} from [s]
+ * @property {number} to [s]
+ * @property {number} shown time of the newest value [s]
+ * @property {number|null} cursor [s]
+ * @property {{grid: string, text: string, surface: string}} colours
+ * @property {number} rem [px]
+ * @property {boolean} frozen
+ */
+
 /** A plot of one quantity over time. */
 export class Chart {
-  #Plotly;
-  #quantity;
+  #plotly;
   #plot = element('div', { class: 'chart-plot' });
   #values = element('span', { class: 'chart-values' });
+  /** @type {Map<string, HTMLElement>} */
   #shown = new Map();
+  /** @type {DOMRectReadOnly|null} */
   #box = null;
 
   /**
-   * @param {object} Plotly the library
-   * @param {object} quantity key, title, unit, digits and, where it has several lines, lines
+   * @param {Plotly} library
+   * @param {Quantity} quantity
    */
-  constructor(Plotly, quantity) {
-    this.#Plotly = Plotly;
-    this.#quantity = quantity;
-    const lines = quantity.lines?.length > 1 ? quantity.lines.map((line, i) => element('span', {
+  constructor(library, quantity) {
+    this.#plotly = library;
+    this.quantity = quantity;
+    const lines = quantity.lines.length > 1 ? quantity.lines.map((line, i) => element('span', {
       class: `line-name line-${i}`, text: line.name,
     })) : [];
     this.root = element('div', { class: 'chart', 'data-key': quantity.key },
@@ -41,8 +56,8 @@ export class Chart {
   /**
    * Draw.
    *
-   * @param {object[]} traces name, color, dash, x, y and now, the newest value
-   * @param {object} view from and to [s], cursor [s] or null, colours, rem [px], frozen
+   * @param {Trace[]} traces
+   * @param {ChartView} view
    */
   update(traces, view) {
     this.#showValues(traces);
@@ -50,13 +65,17 @@ export class Chart {
     if (box === null || box.width === 0) {
       return;
     }
-    this.#Plotly.react(this.#plot, traces.map((trace) => ({
+    this.#plotly.react(this.#plot, traces.map((trace) => ({
       type: 'scatter', mode: 'lines', x: trace.x, y: trace.y, name: trace.name,
       line: { color: trace.color, width: 1.5 + 0.03 * view.rem, dash: trace.dash },
       hovertemplate: `%{y:.${HOVER_DIGITS}f}`, connectgaps: false,
     })), this.#layout(view, box), view.frozen ? CONFIG : SCROLLING);
   }
 
+  /**
+   * @param {ChartView} view
+   * @param {DOMRectReadOnly} box
+   */
   #layout(view, box) {
     const { colours, rem } = view;
     const axis = {
@@ -72,8 +91,8 @@ export class Chart {
       hoverlabel: { bgcolor: colours.surface, bordercolor: colours.grid },
       xaxis: { ...axis, range: [view.from, view.to], nticks: 6, hoverformat: '.2f' },
       yaxis: {
-        ...axis, nticks: 5, zeroline: !this.#quantity.range, zerolinecolor: colours.grid,
-        ...(this.#quantity.range ? { range: this.#quantity.range } : { rangemode: 'normal' }),
+        ...axis, nticks: 5, zeroline: !this.quantity.range, zerolinecolor: colours.grid,
+        ...(this.quantity.range ? { range: this.quantity.range } : { rangemode: 'normal' }),
       },
       shapes: view.cursor === null ? [] : [{
         type: 'line', x0: view.cursor, x1: view.cursor, yref: 'paper', y0: 0, y1: 1,
@@ -82,6 +101,7 @@ export class Chart {
     };
   }
 
+  /** @param {Trace[]} traces */
   #showValues(traces) {
     if (this.#shown.size !== traces.length
         || traces.some((trace) => this.#shown.get(trace.name)?.dataset.color !== trace.color)) {
@@ -97,8 +117,10 @@ export class Chart {
     }
     for (const trace of traces) {
       const node = this.#shown.get(trace.name);
-      setText(node, fixed(trace.now, this.#quantity.digits));
-      setAttribute(node, 'hidden', !Number.isFinite(trace.now));
+      if (node !== undefined) {
+        setText(node, fixed(trace.now, this.quantity.digits));
+        setAttribute(node, 'hidden', !Number.isFinite(trace.now));
+      }
     }
   }
 }

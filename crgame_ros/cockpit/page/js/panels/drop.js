@@ -6,17 +6,22 @@
  * Take files that are dropped on the page; none of them replaces the page.
  *
  * @param {HTMLElement} zone shows by data-over that a drop will be taken
- * @param {function(File[]): void} taken gets the files
+ * @param {(files: File[]) => void} taken gets the files
  */
 export function acceptDrops(zone, taken) {
+  /** @param {DragEvent} event */
   const hasFiles = (event) => [...event.dataTransfer?.types ?? []].includes('Files');
+  /** @param {DragEvent} event */
   const over = (event) => {
     if (hasFiles(event)) {
       event.preventDefault();
-      event.dataTransfer.dropEffect = 'copy';
+      if (event.dataTransfer !== null) {
+        event.dataTransfer.dropEffect = 'copy';
+      }
       zone.dataset.over = 'yes';
     }
   };
+  /** @param {DragEvent} event */
   const leave = (event) => {
     // Each element tells of leaving it; only leaving the page has nowhere to go.
     if (event.relatedTarget === null) {
@@ -30,7 +35,7 @@ export function acceptDrops(zone, taken) {
     delete zone.dataset.over;
     if (hasFiles(event)) {
       event.preventDefault();
-      taken([...event.dataTransfer.files]);
+      taken([...event.dataTransfer?.files ?? []]);
     }
   });
 }

@@ -4,12 +4,19 @@
 
 import { fixed, NONE } from './format.js';
 
+/** @import { EventAction, EventCondition, GameEvent, ObstacleAction } from '../messages.js' */
+/** @import { TrafficAction } from '../messages.js' */
+
+/** @type {Record<string, string>} */
 const THINGS = {
   constructionZone: 'a construction zone', parkedVehicle: 'a parked vehicle',
   roadBoundary: 'a barrier', unknown: 'an obstacle',
 };
 const KMH = 3.6;
 
+/**
+ * @type {{[Kind in EventAction['kind']]: (event: Extract<EventAction, {kind: Kind}>) => string}}
+ */
 const ACTIONS = {
   release: (event) => `Lets obstacle ${event.object} go, which waits until then`,
   brake: (event) => `Obstacle ${event.object} brakes at ${fixed(event.deceleration, 1)} m/s² to `
@@ -26,6 +33,7 @@ const ACTIONS = {
     : `Stops the planner of ${event.av}: it is asked for no plan`),
 };
 
+/** @type {Record<EventAction['kind'], string>} */
 const TITLES = {
   release: 'Release', brake: 'Brake', obstacle: 'Obstacle', speed_limit: 'Speed limit',
   traffic: 'Traffic', plan_display: 'Plan display', planner: 'Planner',
@@ -33,7 +41,7 @@ const TITLES = {
 };
 
 /**
- * @param {object} event an entry of scene.events
+ * @param {GameEvent} event an entry of scene.events
  * @returns {string} its kind, for people
  */
 export function eventKind(event) {
@@ -42,12 +50,13 @@ export function eventKind(event) {
 }
 
 /**
- * @param {object} event an entry of scene.events
+ * @param {GameEvent} event an entry of scene.events
  * @returns {string} a sentence on what it does; for an unknown kind its parameters
  */
 export function eventWords(event) {
   if (Object.hasOwn(ACTIONS, event.kind)) {
-    return `${ACTIONS[event.kind](event)}.`;
+    const words = /** @type {(event: GameEvent) => string} */ (ACTIONS[event.kind]);
+    return `${words(event)}.`;
   }
   return Object.entries(event)
     .filter(([key, value]) => !['name', 'label', 'kind', 'when'].includes(key)
@@ -56,7 +65,7 @@ export function eventWords(event) {
 }
 
 /**
- * @param {object|null|undefined} when the condition of an event
+ * @param {EventCondition|null|undefined} when the condition of an event
  * @returns {string} under which it fires by itself; empty if only the button does
  */
 export function conditionWords(when) {
@@ -76,16 +85,25 @@ export function conditionWords(when) {
     + `(${fixed(when.x, 0)}, ${fixed(when.y, 0)})`;
 }
 
+/** @param {number} value */
 function speed(value) {
   const shown = fixed(value * KMH, 0);
   return shown === NONE ? 'another speed' : `${shown} km/h`;
 }
 
+/** @param {TrafficAction} event */
 function driving(event) {
+  /** @type {string[]} */
   const said = [];
+  /**
+   * @template {keyof TrafficAction} Name
+   * @param {Name} name
+   * @param {(value: NonNullable<TrafficAction[Name]>) => string} words
+   */
   const add = (name, words) => {
-    if (event[name] !== undefined && event[name] !== null) {
-      said.push(words(event[name]));
+    const value = event[name];
+    if (value !== undefined && value !== null) {
+      said.push(words(value));
     }
   };
   add('speed_factor', (value) => `${fixed(100 * value, 0)} % of the speed limit`);
@@ -102,10 +120,12 @@ function driving(event) {
   return said.join(', ');
 }
 
+/** @param {ObstacleAction} event */
 function place(event) {
   return `at (${fixed(event.x, 0)}, ${fixed(event.y, 0)})`;
 }
 
+/** @param {number[]|undefined} ids */
 function lanelets(ids) {
   if (!ids?.length) {
     return 'all roads';
@@ -114,7 +134,7 @@ function lanelets(ids) {
 }
 
 /**
- * @param {string} spec of a planner or a driver
+ * @param {string|null|undefined} spec of a planner or a driver
  * @returns {string} the same with the name instead of the path of a file in it
  */
 export function baseName(spec) {

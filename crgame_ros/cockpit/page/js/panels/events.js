@@ -2,20 +2,25 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The panel from which an experimenter triggers the events of the game. */
 
-import { element, setText } from '../driving/dom.js';
+import { element, setText } from '../dom.js';
 import { conditionWords, eventKind, eventWords } from './event_words.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
 
+/** @import { Connection } from '../connection.js' */
+/** @import { FiredEvent, GameEvent } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+
+/** @type {Record<string, string>} */
 const BY = { trigger: 'by button', condition: 'by its condition' };
 
 /**
  * Make the panel.
  *
  * @param {HTMLElement} root #panel-events
- * @param {import('../store.js').Store} store
- * @param {import('../connection.js').Connection} connection
- * @returns {{trigger: function(string): Promise<void>}} trigger an event by its name
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {{trigger: (name: string) => Promise<void>}} trigger an event by its name
  */
 export function createEvents(root, store, connection) {
   const list = element('ul', { class: 'event-list' });
@@ -23,7 +28,9 @@ export function createEvents(root, store, connection) {
   const logTitle = element('h2', { text: 'What has happened' });
   const empty = element('p', { class: 'hint' });
   root.append(element('h2', { text: 'Trigger an event' }), empty, list, logTitle, log);
+  /** @type {Map<string, ReturnType<typeof makeCard>>} */
   const cards = new Map();
+  /** @type {Set<string>} */
   const asked = new Set();
 
   const update = () => {
@@ -49,9 +56,10 @@ export function createEvents(root, store, connection) {
       : 'This game has no events. They are written under "events" in the game file.');
     update();
   };
+  /** @param {string} name */
   const trigger = async (name) => {
     asked.add(name);
-    cards.get(name).refused('');
+    cards.get(name)?.refused('');
     update();
     const reply = await connection.request({ type: 'trigger', event: name });
     if (!reply.ok) {
@@ -76,14 +84,23 @@ export function createEvents(root, store, connection) {
   return { trigger };
 }
 
+/** @param {Store} store */
 function steerable(store) {
   return store.mode === 'live' && store.connected && store.status?.run !== 'ended';
 }
 
+/**
+ * @param {FiredEvent} entry
+ * @param {Store} store
+ */
 function timeOf(entry, store) {
   return entry.n * (store.scene?.time.dt_s ?? NaN);
 }
 
+/**
+ * @param {GameEvent} event
+ * @param {() => void} press
+ */
 function makeCard(event, press) {
   const label = event.label || event.name;
   const button = element('button', { type: 'button', class: 'primary', on: { click: press } });
@@ -100,7 +117,14 @@ function makeCard(event, press) {
       element('p', { text: eventWords(event) }),
       by ? element('p', { class: 'dim event-when' }, icon('clock'), `Also ${by}.`) : null,
       state, error),
+    /** @param {string} text */
     refused: (text) => setText(error, text),
+    /**
+     * @param {FiredEvent|undefined} fired
+     * @param {boolean} asked
+     * @param {boolean} can
+     * @param {Store} store
+     */
     update(fired, asked, can, store) {
       button.disabled = fired !== undefined || asked || !can;
       button.setAttribute('aria-label', `Trigger ${label}`);

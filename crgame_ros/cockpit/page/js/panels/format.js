@@ -46,6 +46,14 @@ export function plural(number, one, many = `${one}s`) {
 }
 
 /**
+ * @param {unknown} error what was thrown
+ * @returns {string} what it says
+ */
+export function errorText(error) {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/**
  * Make one readable line of whatever a server or an exception said.
  *
  * @param {unknown} text

@@ -2,13 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The panel of scrolling plots (FastSim's history of the host vehicle). */
 
-import { element, setAttribute, setText } from '../driving/dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { onThemeChange, themeColor } from '../world/palette.js';
 import { Chart } from './chart.js';
+import { errorText } from './format.js';
 import { recall, remember } from './memory.js';
 import { loadPlotly } from './plotly.js';
 import { QUANTITIES, traces } from './quantities.js';
 import { HealthLog } from './series.js';
+
+/** @import { SceneVehicle } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+/** @import { ChartView } from './chart.js' */
+/** @import { Plotly } from './plotly.js' */
+/** @import { PlotData } from './quantities.js' */
 
 const WINDOWS_S = [10, 30, 120];
 const KEPT_S = 120;
@@ -18,6 +25,7 @@ const PERIOD_MS = 400;
 // The share of a replay's window that lies after the shown time.
 const AHEAD = 0.35;
 // Colours by role in the order of the vehicles; the first two are those of the map.
+/** @type {Record<SceneVehicle['role'], string[]>} */
 const COLOURS = {
   human: ['human', 'series-1', 'series-2'], autonomous: ['av', 'series-3', 'series-4'],
 };
@@ -33,16 +41,23 @@ class HistoryPanel {
   #root;
   #store;
   #health = new HealthLog(KEPT_S);
+  /** @type {Map<string, Chart>} */
   #charts = new Map();
+  /** @type {Set<Element>} */
   #inView = new Set();
+  /** @type {Chart[]} */
   #waiting = [];
+  /** @type {PlotData['vehicles']|null} */
   #pasts = null;
   #rem_px = 16;
+  /** @type {Set<string>} */
   #selected = new Set();
   #window_s = Number(recall('window')) || 30;
+  /** @type {number|null} */
   #frozen = null;
   #due_ms = 0;
   #loading = false;
+  /** @type {Record<string, string>} */
   #theme = {};
   #chosen = false;
   #chips = element('div', { class: 'chips', role: 'group', 'aria-label': 'Vehicles' });
@@ -55,6 +70,10 @@ class HistoryPanel {
   #hint = element('p', { class: 'hint', text: 'Loading the plots …' });
   #body = element('div', { class: 'charts' });
 
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   */
   constructor(root, store) {
     this.#root = root;
     this.#store = store;
@@ -76,6 +95,7 @@ class HistoryPanel {
     if (store.scene !== null) {
       this.#newScene();
     }
+    /** @param {number} now_ms */
     const frame = (now_ms) => {
       this.#frame(now_ms);
       requestAnimationFrame(frame);
@@ -95,7 +115,7 @@ class HistoryPanel {
   setWindow(seconds) {
     this.#window_s = seconds;
     remember('window', String(seconds));
-    for (const button of this.#windows.children) {
+    for (const button of childrenOf(this.#windows)) {
       button.setAttribute('aria-pressed', String(Number(button.dataset.seconds) === seconds));
     }
     this.#redrawAll();
@@ -116,7 +136,7 @@ class HistoryPanel {
   }
 
   #newScene() {
-    const ids = new Set(this.#store.scene.vehicles.map((vehicle) => vehicle.id));
+    const ids = new Set(this.#store.scene?.vehicles.map((vehicle) => vehicle.id));
     this.#selected = new Set([...this.#selected].filter((id) => ids.has(id)));
     this.#chosen = this.#chosen && this.#selected.size > 0;
     this.#selectOwn();
@@ -153,10 +173,10 @@ class HistoryPanel {
 
   #showChips() {
     const colours = this.#lineColours();
-    for (const chip of this.#chips.children) {
-      const { id } = chip.dataset;
+    for (const chip of childrenOf(this.#chips)) {
+      const { id = '' } = chip.dataset;
       setAttribute(chip, 'aria-pressed', String(this.#selected.has(id)));
-      chip.style.setProperty('--line', colours.get(id));
+      chip.style.setProperty('--line', colours.get(id) ?? null);
     }
   }
 
@@ -169,12 +189,14 @@ class HistoryPanel {
 
   #lineColours() {
     const seen = { human: 0, autonomous: 0 };
-    return new Map((this.#store.scene?.vehicles ?? []).map(({ id, role }) => {
+    /** @type {(vehicle: SceneVehicle) => [string, string]} */
+    const colourOf = ({ id, role }) => {
       const names = COLOURS[role] ?? COLOURS.human;
       const name = names[seen[role] % names.length];
       seen[role] += 1;
       return [id, this.#theme[name]];
-    }));
+    };
+    return new Map((this.#store.scene?.vehicles ?? []).map(colourOf));
   }
 
   #now() {
@@ -187,6 +209,7 @@ class HistoryPanel {
     this.#waiting = [...this.#charts.values()].filter((chart) => this.#inView.has(chart.root));
   }
 
+  /** @param {number} now_ms */
   #frame(now_ms) {
     if (this.#root.closest('[hidden]') || document.hidden) {
       return;
@@ -202,8 +225,11 @@ class HistoryPanel {
     const before_ms = performance.now();
     if (this.#waiting.length > 0 && this.#pasts === null) {
       this.#pasts = this.#gather();
-    } else if (this.#waiting.length > 0) {
-      this.#draw(this.#waiting.shift());
+      return;
+    }
+    const chart = this.#waiting.shift();
+    if (chart !== undefined) {
+      this.#draw(chart, this.#pasts ?? []);
       this.cost_ms = performance.now() - before_ms;
       this.redrawn += 1;
     }
@@ -215,12 +241,12 @@ class HistoryPanel {
     }
     this.#loading = true;
     try {
-      const Plotly = await loadPlotly();
+      const library = await loadPlotly();
       this.#hint.hidden = true;
-      this.#makeCharts(Plotly);
+      this.#makeCharts(library);
       this.#loading = false;
     } catch (error) {
-      setText(this.#hint, error.message);
+      setText(this.#hint, errorText(error));
       // The next opening of the panel tries again.
       const observer = new MutationObserver(() => {
         observer.disconnect();
@@ -230,7 +256,8 @@ class HistoryPanel {
     }
   }
 
-  #makeCharts(Plotly) {
+  /** @param {Plotly} library */
+  #makeCharts(library) {
     const observer = new IntersectionObserver((entries) => {
       for (const entry of entries) {
         if (entry.isIntersecting) {
@@ -243,8 +270,7 @@ class HistoryPanel {
       }
     }, { root: this.#root });
     for (const quantity of QUANTITIES) {
-      const chart = new Chart(Plotly, quantity);
-      chart.quantity = quantity;
+      const chart = new Chart(library, quantity);
       this.#charts.set(quantity.key, chart);
       this.#body.append(chart.root);
       observer.observe(chart.root);
@@ -255,10 +281,15 @@ class HistoryPanel {
     }).observe(this.#body);
   }
 
-  #draw(chart) {
+  /**
+   * @param {Chart} chart
+   * @param {PlotData['vehicles']} vehicles
+   */
+  #draw(chart, vehicles) {
     const shown = this.#frozen ?? this.#now();
     const replay = this.#store.mode === 'replay';
     const to = Math.max(replay ? shown + AHEAD * this.#window_s : shown, this.#window_s);
+    /** @type {ChartView} */
     const view = {
       shown, to, from: to - this.#window_s, cursor: replay ? shown : null,
       frozen: this.#frozen !== null,
@@ -268,25 +299,37 @@ class HistoryPanel {
       },
     };
     chart.update(traces(chart.quantity, {
-      vehicles: this.#pasts, health: this.#health, runColor: this.#theme.accent,
+      vehicles, health: this.#health, runColor: this.#theme.accent,
     }, view), view);
   }
 
-  /** What all plots of one round are made from. */
+  /**
+   * What all plots of one round are made from.
+   *
+   * @returns {PlotData['vehicles']}
+   */
   #gather() {
     const colours = this.#lineColours();
     const vehicles = this.#store.scene?.vehicles ?? [];
     return vehicles.flatMap(({ id, role }, index) => (this.#selected.has(id) ? [{
-      id, role, color: colours.get(id), past: this.#store.history(index, KEPT_S),
+      id, role, color: colours.get(id) ?? '', past: this.#store.history(index, KEPT_S),
     }] : []));
   }
+}
+
+/**
+ * @param {HTMLElement} root
+ * @returns {HTMLElement[]}
+ */
+function childrenOf(root) {
+  return /** @type {HTMLElement[]} */ ([...root.children]);
 }
 
 /**
  * Make the panel.
  *
  * @param {HTMLElement} root #panel-history
- * @param {import('../store.js').Store} store
+ * @param {Store} store
  * @returns {HistoryPanel}
  */
 export function createHistory(root, store) {

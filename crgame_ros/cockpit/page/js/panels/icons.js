@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Line icons on a 24 x 24 grid; they take the colour of the text around them. */
 
-import { svg } from '../driving/dom.js';
+import { svg } from '../dom.js';
 
 // Every alarm has its own silhouette, so that none is told by its colour alone.
+/** @type {Record<string, string>} */
 const PATHS = {
   collision: 'M12 1.5l2.6 5.4 5.7-2-2 5.7 4.2 2.9-5 2.1 1 5.9-5.6-2.2-3.6 4.2-1.9-5.6-5.9.6'
     + ' 3.3-4.9L2 9.6l5.9-.9zM9.5 9.5l5 5M14.5 9.5l-5 5',

@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Messages that come and go over the world. */
 
-import { element, setText } from '../driving/dom.js';
+import { element, setText } from '../dom.js';
 import { oneLine } from './format.js';
 import { icon } from './icons.js';
 
+/** @import { NoticeLevel } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+
 // How long a message stays [ms]; an error stays until it is closed or many came after it.
+/** @type {Record<NoticeLevel, number>} */
 const STAYS_MS = { info: 5000, warn: 9000, error: 0 };
 const MOST = 4;
 
@@ -14,11 +18,13 @@ const MOST = 4;
  * Show the notices of the server and of the page's own parts.
  *
  * @param {HTMLElement} root #notices
- * @param {import('../store.js').Store} store
- * @returns {{show: function(string, string): void}} show takes the level and the text
+ * @param {Store} store
+ * @returns {{show: (level: NoticeLevel, text: string) => void}}
  */
 export function createNotices(root, store) {
+  /** @type {Map<string, Toast>} */
   const shown = new Map();
+  /** @type {(level: NoticeLevel, text: string) => void} */
   const show = (level, text) => {
     const known = Object.hasOwn(STAYS_MS, level) ? level : 'info';
     const line = oneLine(text);
@@ -28,7 +34,7 @@ export function createNotices(root, store) {
       shown.set(key, toast);
       root.append(toast.root);
       while (shown.size > MOST) {
-        shown.values().next().value.close();
+        shown.values().next().value?.close();
       }
     }
     toast.again();
@@ -44,6 +50,11 @@ class Toast {
   #closed;
   #count = element('span', { class: 'toast-count' });
 
+  /**
+   * @param {NoticeLevel} level
+   * @param {string} text
+   * @param {() => void} closed
+   */
   constructor(level, text, closed) {
     this.#stays_ms = STAYS_MS[level];
     this.#closed = closed;

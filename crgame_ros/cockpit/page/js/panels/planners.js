@@ -2,12 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 /** How each AV's planner does, and the switch that stops it and lets it go on. */
 
-import { element, setAttribute, setText } from '../driving/dom.js';
-import { baseName } from './event_words.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { countText } from '../perception/unseen.js';
+import { baseName } from './event_words.js';
 import { count, fixed, oneLine } from './format.js';
 import { icon } from './icons.js';
 
+/** @import { Connection } from '../connection.js' */
+/** @import { PlannerStatus } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+
+/** @typedef {Partial<PlannerStatus>} Planner as far as anything is known of it */
+
+/**
+ * @type {[name: string, explanation: string, text: (planner: Planner) => string,
+ *   unit: string][]}
+ */
 const COLUMNS = [
   ['Latency', 'from the request to the plan', (p) => fixed(p.latency_ms, 0), 'ms'],
   ['Age', 'of the plan that is being followed', (p) => fixed(p.age_ms, 0), 'ms'],
@@ -19,17 +29,18 @@ const COLUMNS = [
 const TRACKING_TITLE = "Where the vehicle is: beside the middle of its route's lane, and against "
   + 'where its plan of a second ago wanted it to be now; in parentheses the worst of the run';
 // Of a tracked AV: name of the error, factor to the unit, unit, digits.
+/** @type {[name: string, factor: number, unit: string, digits: number][]} */
 const ERRORS = [
-  ['lane', 1, 'm', 2], ['lateral', 1, 'm', 2], ['along', 1, 'm', 2], ['heading', 180 / Math.PI, '°', 1],
-  ['speed', 1, 'm/s', 2],
+  ['lane', 1, 'm', 2], ['lateral', 1, 'm', 2], ['along', 1, 'm', 2],
+  ['heading', 180 / Math.PI, '°', 1], ['speed', 1, 'm/s', 2],
 ];
 
 /**
  * Make the table.
  *
  * @param {HTMLElement} root #planners
- * @param {import('../store.js').Store} store
- * @param {import('../connection.js').Connection} connection
+ * @param {Store} store
+ * @param {Connection} connection
  */
 export function createPlanners(root, store, connection) {
   const empty = element('p', { class: 'hint', text: 'No autonomous vehicle takes part.' });
@@ -40,6 +51,7 @@ export function createPlanners(root, store, connection) {
         scope: 'col', title: explanation, text: name,
       }, unit ? element('span', { class: 'unit', text: unit }) : null)))));
   root.append(element('h2', { text: 'Planners' }), empty, table);
+  /** @type {Map<string, ReturnType<typeof makeRow>>} */
   const rows = new Map();
 
   const update = () => {
@@ -68,10 +80,15 @@ export function createPlanners(root, store, connection) {
   store.on('scene', rebuild);
   store.on('status', update);
   store.on('connection', update);
-  new MutationObserver(update).observe(root.parentElement, { attributeFilter: ['hidden'] });
+  new MutationObserver(update).observe(
+    /** @type {HTMLElement} */ (root.parentElement), { attributeFilter: ['hidden'] });
   rebuild();
 }
 
+/**
+ * @param {string} av
+ * @param {Connection} connection
+ */
 function makeRow(av, connection) {
   const name = element('span', { class: 'dim planner-name' });
   const state = element('span', { class: 'tag' });
@@ -98,6 +115,10 @@ function makeRow(av, connection) {
         element('div', {}, element('strong', { class: 'av', text: av }), name, state, button),
         refusal, seen, tracking, error)),
       element('tr', {}, element('td', {}), ...cells)),
+    /**
+     * @param {Planner} planner
+     * @param {Store} store
+     */
     update(planner, store) {
       const stopped = planner.running === false;
       wanted.run = stopped;
@@ -118,7 +139,7 @@ function makeRow(av, connection) {
       setAttribute(cells[1], 'data-late', Boolean(planner.stale) && !stopped);
       const why = oneLine(planner.last_refusal);
       setText(refusal, [
-        planner.plan_time_ms > 0 ? `plans in ${fixed(planner.plan_time_ms, 1)} ms` : '',
+        (planner.plan_time_ms ?? 0) > 0 ? `plans in ${fixed(planner.plan_time_ms, 1)} ms` : '',
         why ? `last refused: ${why}` : '',
       ].filter(Boolean).join(', '));
       setText(tracking, trackingText(planner.tracking));
@@ -129,7 +150,11 @@ function makeRow(av, connection) {
   };
 }
 
-/** How far a tracked AV is from its lane and its plan: now, and at worst so far. */
+/**
+ * How far a tracked AV is from its lane and its plan: now, and at worst so far.
+ *
+ * @param {PlannerStatus['tracking']|undefined} tracking
+ */
 function trackingText(tracking) {
   if (!tracking) {
     return '';

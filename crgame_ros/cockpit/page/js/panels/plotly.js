@@ -2,14 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The Plotly library, which the server has: loaded when a plot is first wanted. */
 
+/**
+ * What is used of it; traces and layouts are described at plotly.com/javascript/reference.
+ *
+ * @typedef {{react: (node: HTMLElement, traces: object[], layout: object, config: object) =>
+ *   unknown}} Plotly
+ */
+
 const ADDRESS = '/plotly.js';
 
+/** @type {Promise<Plotly>|null} */
 let loading = null;
 
 /**
  * Load the library once; after a failure the next call tries again.
  *
- * @returns {Promise<object>} Plotly
+ * @returns {Promise<Plotly>}
  * @throws {Error} if it cannot be loaded
  */
 export function loadPlotly() {

@@ -4,13 +4,55 @@
 
 import { thin, unwrap } from './series.js';
 
+/** @import { VEHICLE } from '../frames.js' */
+/** @import { History } from '../history.js' */
+/** @import { SceneVehicle } from '../messages.js' */
+/** @import { ChartView } from './chart.js' */
+/** @import { HealthLog } from './series.js' */
+
 const DEGREES = 180 / Math.PI;
 const DASHES = ['solid', 'dot'];
 
 /**
- * key, title, unit, digits of the newest value, range of the axis or none, and the lines: columns
- * of a vehicle's state (with factor and angle), or figures of the run's health.
+ * A line: a column of vehicles' states, a figure of the run's health, or the latency of planners.
+ *
+ * @typedef {object} ColumnLine
+ * @property {keyof typeof VEHICLE} column
+ * @property {string} [name]
+ * @property {number} [factor] to the unit
+ * @property {boolean} [angle] whether whole turns are removed
+ * @typedef {{name: string, health: 'lag'|'step_error'}} HealthLine
+ * @typedef {{latency: true, name?: string}} LatencyLine
+ * @typedef {ColumnLine|HealthLine|LatencyLine} Line
  */
+
+/**
+ * @typedef {object} Quantity
+ * @property {string} key
+ * @property {string} title
+ * @property {string} unit
+ * @property {number} digits of the newest value
+ * @property {[number, number]} [range] of the axis
+ * @property {Line[]} lines
+ */
+
+/**
+ * @typedef {{id: string, role: SceneVehicle['role'], color: string, past: History}} PlottedVehicle
+ * @typedef {{vehicles: PlottedVehicle[], health: HealthLog, runColor: string}} PlotData
+ * @typedef {Pick<ChartView, 'from'|'to'|'shown'>} PlotWindow
+ */
+
+/**
+ * @typedef {object} Trace
+ * @property {string} name
+ * @property {string} color
+ * @property {string} dash
+ * @property {number[]} x [s]
+ * @property {(number|null)[]} y
+ * @property {number} now the newest value
+ */
+
+/** @type {Quantity[]} */
 export const QUANTITIES = [
   { key: 'speed', title: 'Speed', unit: 'm/s', digits: 2, lines: [{ column: 'speed' }] },
   {
@@ -40,33 +82,47 @@ export const QUANTITIES = [
 /**
  * Make the lines of a quantity.
  *
- * @param {object} quantity one of QUANTITIES
- * @param {object} data vehicles [{id, role, color, past}] that are selected, health, runColor
- * @param {object} view from, to and shown: the time of the newest value [s]
- * @returns {object[]} traces for a Chart
+ * @param {Quantity} quantity
+ * @param {PlotData} data of the vehicles that are selected
+ * @param {PlotWindow} view
+ * @returns {Trace[]}
  */
 export function traces(quantity, data, view) {
   return quantity.lines.flatMap((line, i) => {
-    if (line.health) {
+    if ('health' in line) {
       return [trace(line.name, data.runColor, DASHES[i], data.health.t,
         data.health.column(line.health), view)];
     }
-    const vehicles = line.latency
+    const vehicles = 'latency' in line
       ? data.vehicles.filter((vehicle) => vehicle.role === 'autonomous') : data.vehicles;
     return vehicles.map((vehicle) => {
       const name = line.name ? `${vehicle.id} ${line.name}` : vehicle.id;
-      const t = line.latency ? data.health.t : vehicle.past.t;
-      const values = line.latency ? data.health.latency(vehicle.id) : column(vehicle.past, line);
+      const [t, values] = 'latency' in line
+        ? [data.health.t, data.health.latency(vehicle.id)]
+        : [vehicle.past.t, column(vehicle.past, line)];
       return trace(name, vehicle.color, DASHES[i], t, values, view);
     });
   });
 }
 
+/**
+ * @param {History} past
+ * @param {ColumnLine} line
+ */
 function column(past, { column: name, factor = 1, angle = false }) {
   const values = angle ? unwrap(past[name]) : past[name];
   return factor === 1 ? values : values.map((value) => value * factor);
 }
 
+/**
+ * @param {string} name
+ * @param {string} color
+ * @param {string} dash
+ * @param {number[]} t
+ * @param {number[]} values
+ * @param {PlotWindow} view
+ * @returns {Trace}
+ */
 function trace(name, color, dash, t, values, view) {
   let newest = t.length - 1;
   while (newest > 0 && t[newest] > view.shown) {

@@ -2,15 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The panel that chooses, previews and loads a scenario (FastSim's scenario loading area). */
 
-import { element, setAttribute, setText } from '../driving/dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { Busy } from './busy.js';
 import { acceptDrops } from './drop.js';
-import { oneLine, plural } from './format.js';
+import { errorText, oneLine, plural } from './format.js';
 import { icon } from './icons.js';
 import { fetchPreview, fetchScenarios, load, upload } from './scenario_api.js';
 import { ScenarioForm } from './scenario_form.js';
 import { ScenarioList } from './scenario_list.js';
 import { ScenarioPreview } from './scenario_preview.js';
+
+/** @import { Connection } from '../connection.js' */
+/** @import { Offer, Preview } from '../messages.js' */
+/** @import { Store } from '../store.js' */
 
 // What the server refuses anyway is not even sent [bytes].
 const LARGEST_FILE = 64 * 1024 * 1024;
@@ -21,8 +25,10 @@ const BEGINS_WITHIN_MS = 60000;
 class ScenarioPanel {
   #store;
   #connection;
+  /** @type {Offer} */
   #offered = { folders: [], planners: [], drivers: [] };
   #chosen = '';
+  /** @type {AbortController|null} */
   #abort = null;
   #list = new ScenarioList((entry) => this.choose(entry.id));
   #form = new ScenarioForm();
@@ -45,6 +51,11 @@ class ScenarioPanel {
   #card;
   #dropZone;
 
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   * @param {Connection} connection
+   */
   constructor(root, store, connection) {
     this.#store = store;
     this.#connection = connection;
@@ -52,7 +63,7 @@ class ScenarioPanel {
       type: 'file', accept: '.xml,text/xml,application/xml', class: 'unseen', tabindex: '-1',
       'aria-label': 'CommonRoad file', on: {
         change: () => {
-          this.take([...file.files]);
+          this.take([...file.files ?? []]);
           file.value = '';
         },
       },
@@ -73,7 +84,9 @@ class ScenarioPanel {
       if (store.mode !== 'live') {
         return;
       }
-      document.querySelector('#tab-scenario')?.click();
+      /** @type {HTMLElement|null} */
+      const tab = document.querySelector('#tab-scenario');
+      tab?.click();
       this.take(files);
     });
   }
@@ -84,12 +97,16 @@ class ScenarioPanel {
       this.#offered = await fetchScenarios();
       setText(this.#errors.list, '');
     } catch (error) {
-      setText(this.#errors.list, error.message);
+      setText(this.#errors.list, errorText(error));
     }
     this.#list.show(this.#offered.folders, this.#chosen);
   }
 
-  /** Preview an entry, so that it can be started. */
+  /**
+   * Preview an entry, so that it can be started.
+   *
+   * @param {string} id
+   */
   async choose(id) {
     this.#abort?.abort();
     const abort = new AbortController();
@@ -107,12 +124,16 @@ class ScenarioPanel {
         return;
       }
       this.#card.hidden = true;
-      setText(this.#errors.preview, error.message);
+      setText(this.#errors.preview, errorText(error));
     }
     this.#busy.end();
   }
 
-  /** Upload a file that somebody chose or dropped. */
+  /**
+   * Upload a file that somebody chose or dropped.
+   *
+   * @param {File[]} files
+   */
   async take(files) {
     this.#clearErrors();
     const [file] = files;
@@ -127,7 +148,7 @@ class ScenarioPanel {
       await this.refresh();
       await this.choose(id);
     } catch (error) {
-      setText(this.#errors.upload, error.message);
+      setText(this.#errors.upload, errorText(error));
     }
     this.#busy.end();
   }
@@ -147,8 +168,8 @@ class ScenarioPanel {
       }
     } catch (error) {
       begun.cancel();
-      if (!this.#form.blame(error.message)) {
-        setText(this.#errors.start, error.message);
+      if (!this.#form.blame(errorText(error))) {
+        setText(this.#errors.start, errorText(error));
       }
     }
     this.#busy.end();
@@ -157,15 +178,18 @@ class ScenarioPanel {
 
   /** Before it happens, say whose run it ends. */
   #warn() {
-    const goesOn = ['running', 'paused'].includes(this.#store.status?.run);
+    const run = this.#store.status?.run;
+    const goesOn = run === 'running' || run === 'paused';
     setAttribute(this.#warning, 'hidden', this.#start.disabled || !goesOn);
   }
 
   /** Resolves when a run of a new epoch is no longer waiting for its planners. */
   #nextRun() {
     const before = this.#store.scene?.time?.epoch ?? this.#store.epoch;
+    /** @type {(() => void)[]} */
     const ends = [];
     const cancel = () => ends.splice(0).forEach((end) => end());
+    /** @type {Promise<void>} */
     const promise = new Promise((resolve, reject) => {
       const timer = setTimeout(() => {
         cancel();
@@ -191,6 +215,7 @@ class ScenarioPanel {
     return { promise, cancel };
   }
 
+  /** @param {Preview} preview */
   #show(preview) {
     this.#card.hidden = false;
     const { scene } = preview;
@@ -219,6 +244,7 @@ function fieldError() {
   return element('p', { class: 'field-error', role: 'alert' });
 }
 
+/** @param {File[]} files */
 function refusal(files) {
   if (files.length !== 1) {
     return files.length === 0 ? 'That is no file.' : 'Drop one file at a time.';
@@ -234,9 +260,9 @@ function refusal(files) {
  * Make the panel. What there is to choose is asked for when the panel is first seen.
  *
  * @param {HTMLElement} root #panel-scenario
- * @param {import('../store.js').Store} store
- * @param {import('../connection.js').Connection} connection
- * @returns {{refresh: function(): Promise<void>, choose: function(string): Promise<void>}}
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {ScenarioPanel}
  */
 export function createScenario(root, store, connection) {
   const replay = element('p', {

@@ -4,10 +4,12 @@
 
 import { oneLine } from './format.js';
 
+/** @import { Choice, Offer, Preview } from '../messages.js' */
+
 // Sent with all that changes something: no page of another site can add it unasked.
 const OWN = { 'X-Crgame': '1' };
 
-/** @returns {Promise<object>} folders with their entries, planners, drivers */
+/** @returns {Promise<Offer>} */
 export function fetchScenarios() {
   return ask('/api/scenarios');
 }
@@ -15,7 +17,7 @@ export function fetchScenarios() {
 /**
  * @param {string} id of an entry
  * @param {AbortSignal} signal ends it
- * @returns {Promise<object>} scene, states, humans, avs, notices
+ * @returns {Promise<Preview>}
  */
 export function fetchPreview(id, signal) {
   return ask(`/api/preview?id=${encodeURIComponent(id)}`, { signal });
@@ -33,7 +35,7 @@ export async function upload(file) {
 }
 
 /**
- * @param {object} choice id, humans [{id, driver}], avs [{id, planner}]
+ * @param {Choice} choice id, humans [{id, driver}], avs [{id, planner}]
  * @returns {Promise<string>} what was done
  */
 export async function load(choice) {
@@ -44,18 +46,23 @@ export async function load(choice) {
   return oneLine(reply.text);
 }
 
+/**
+ * @param {string} path
+ * @param {RequestInit} [options]
+ * @returns {Promise<any>} what the server sent, of the type that this path gives
+ */
 async function ask(path, options = {}) {
   let response;
   try {
     response = await fetch(path, { credentials: 'same-origin', ...options });
   } catch (error) {
-    if (error.name === 'AbortError') {
+    if (error instanceof DOMException && error.name === 'AbortError') {
       throw error;
     }
     throw new Error('The server does not answer.', { cause: error });
   }
   const text = await response.text();
-  let content = {};
+  let content;
   try {
     content = JSON.parse(text);
   } catch {

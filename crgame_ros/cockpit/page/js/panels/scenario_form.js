@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Who drives what in the chosen scenario. */
 
-import { element, setText } from '../driving/dom.js';
+import { element, setText } from '../dom.js';
 import { baseName } from './event_words.js';
 
+/** @import { Preview } from '../messages.js' */
+
+/** @type {Record<string, string>} */
 const DRIVERS = {
   auto: "this machine's wheel, gamepad or keyboard", idle: 'nobody', cockpit: 'a cockpit page',
   evdev: 'a wheel or gamepad at this machine', joy: 'messages on the joy topic',
@@ -12,8 +15,11 @@ const DRIVERS = {
 
 /** One choice for each human-driven and each autonomous vehicle. */
 export class ScenarioForm {
+  /** @type {Map<string, {select: HTMLSelectElement, error: HTMLElement}>} */
   #rows = new Map();
+  /** @type {string[]} */
   #humans = [];
+  /** @type {string[]} */
   #avs = [];
 
   constructor() {
@@ -21,7 +27,7 @@ export class ScenarioForm {
   }
 
   /**
-   * @param {object} preview as /api/preview gives it
+   * @param {Preview} preview as /api/preview gives it
    * @param {string[]} drivers that can be chosen
    * @param {string[]} planners that can be chosen
    */
@@ -29,6 +35,7 @@ export class ScenarioForm {
     this.#rows.clear();
     this.#humans = preview.humans.map((human) => human.id);
     this.#avs = preview.avs.map((av) => av.id);
+    /** @type {HTMLElement[]} */
     const nodes = [];
     for (const { id, driver } of preview.humans) {
       nodes.push(this.#row(id, 'human', 'driven by', driver, drivers, driverWords));
@@ -51,7 +58,8 @@ export class ScenarioForm {
 
   /** The choices: humans [{id, driver}], avs [{id, planner}]. */
   get choices() {
-    const value = (id) => this.#rows.get(id).select.value;
+    /** @param {string} id */
+    const value = (id) => this.#rows.get(id)?.select.value ?? '';
     return {
       humans: this.#humans.map((id) => ({ id, driver: value(id) })),
       avs: this.#avs.map((id) => ({ id, planner: value(id) })),
@@ -76,6 +84,14 @@ export class ScenarioForm {
     return found;
   }
 
+  /**
+   * @param {string} id
+   * @param {string} role
+   * @param {string} label
+   * @param {string} present
+   * @param {string[]} known
+   * @param {(value: string) => string} words
+   */
   #row(id, role, label, present, known, words) {
     const all = [...new Set([present, ...known].filter(Boolean))];
     const select = element('select', { 'aria-label': `${id} is ${label}` },
@@ -90,6 +106,7 @@ export class ScenarioForm {
   }
 }
 
+/** @param {string} driver */
 function driverWords(driver) {
   const words = Object.hasOwn(DRIVERS, driver) ? ` – ${DRIVERS[driver]}` : '';
   return baseName(driver) + words;

@@ -2,13 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The scenarios to choose from, by folder, with a filter. */
 
-import { element } from '../driving/dom.js';
+import { element } from '../dom.js';
 import { icon } from './icons.js';
+
+/** @import { Entry, Offer } from '../messages.js' */
 
 const KINDS = { game: 'game', scenario: 'CommonRoad', upload: 'uploaded' };
 
-/** Games are made to be driven; a bare scenario comes after them. */
+/**
+ * Games are made to be driven; a bare scenario comes after them.
+ *
+ * @param {Entry[]} entries
+ */
 function gamesFirst(entries) {
+  /** @param {Entry} entry */
   const isGame = (entry) => entry.kind === 'game';
   return [...entries.filter(isGame), ...entries.filter((entry) => !isGame(entry))];
 }
@@ -19,9 +26,10 @@ export class ScenarioList {
   #list = element('div', { class: 'scenario-list', role: 'radiogroup', 'aria-label': 'Scenario' });
   #nothing = element('p', { class: 'hint', hidden: true });
   #filter;
+  /** @type {Map<string, {entry: Entry, button: HTMLButtonElement, words: string}>} */
   #entries = new Map();
 
-  /** @param {function(object): void} chosen gets the entry that somebody chose */
+  /** @param {(entry: Entry) => void} chosen gets the entry that somebody chose */
   constructor(chosen) {
     this.#chosen = chosen;
     this.#filter = element('input', {
@@ -33,7 +41,7 @@ export class ScenarioList {
   }
 
   /**
-   * @param {object[]} folders as /api/scenarios gives them
+   * @param {Offer['folders']} folders as /api/scenarios gives them
    * @param {string} chosen id of the entry that is marked, empty for none
    */
   show(folders, chosen) {
@@ -56,12 +64,13 @@ export class ScenarioList {
 
   /**
    * @param {string} id
-   * @returns {object|undefined} the entry with it
+   * @returns {Entry|undefined} the entry with it
    */
   entry(id) {
     return this.#entries.get(id)?.entry;
   }
 
+  /** @param {Entry} entry */
   #item(entry) {
     const title = entry.title || entry.name;
     const button = element('button', {
@@ -82,7 +91,7 @@ export class ScenarioList {
       button.hidden = !wanted.every((word) => words.includes(word));
       found += button.hidden ? 0 : 1;
     }
-    for (const folder of this.#list.children) {
+    for (const folder of /** @type {Iterable<HTMLElement>} */ (this.#list.children)) {
       folder.hidden = !folder.querySelector('button:not([hidden])');
     }
     this.#nothing.hidden = found > 0;

@@ -2,8 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A small drawing of a scenario at its beginning. */
 
-import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
+import { outlineOf } from '../outline.js';
 import { onThemeChange, themeColor } from '../world/palette.js';
+
+/** @import { Box, Preview, Scene, SceneObject, Shape } from '../messages.js' */
+/** @import { ColorName } from '../world/palette.js' */
 
 const MARGIN_PX = 8;
 // What would be smaller is drawn this large, so that it is seen on a long road [px].
@@ -18,9 +21,22 @@ const AROUND_M = 30;
 const OVERVIEW = 0.25;
 const VULNERABLE = new Set(['pedestrian', 'bicycle', 'motorcycle']);
 
+/** @typedef {{x: number, y: number, width: number, height: number}} Area of the canvas [px] */
+
+/**
+ * @typedef {object} Body
+ * @property {Shape} shape
+ * @property {number[]} pose x, y [m], yaw [rad]
+ * @property {number} ahead from there to the centre [m]
+ * @property {string} fill
+ * @property {number} scale [px/m]
+ * @property {string|null} [edge]
+ */
+
 /** Draws on a canvas whatever its size and the theme. */
 export class ScenarioPreview {
   #canvas;
+  /** @type {Preview|null} */
   #preview = null;
 
   /** @param {HTMLCanvasElement} canvas its size is that of its box */
@@ -30,7 +46,7 @@ export class ScenarioPreview {
     onThemeChange(() => this.#draw());
   }
 
-  /** @param {object|null} preview as /api/preview gives it */
+  /** @param {Preview|null} preview as /api/preview gives it */
   show(preview) {
     this.#preview = preview;
     this.#draw();
@@ -47,7 +63,7 @@ export class ScenarioPreview {
     if (this.#preview === null) {
       return;
     }
-    const context = canvas.getContext('2d');
+    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
     const whole = this.#preview.scene.bounds;
     const all = { x: 0, y: 0, width: canvas.width, height: canvas.height };
     if (scaleOf(all, whole) * CAR_M >= CAR_PX * window.devicePixelRatio) {
@@ -61,10 +77,16 @@ export class ScenarioPreview {
     const around = surroundings(this.#preview, detail);
     drawScene(context, this.#preview, detail, around);
     drawScene(context, this.#preview, overview, whole);
-    drawMarks(context, detail, overview, whole, around);
+    drawMarks(context, overview, whole, around);
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Preview} preview
+ * @param {Area} area
+ * @param {Box} bounds
+ */
 function drawScene(context, { scene, states }, area, bounds) {
   context.save();
   context.beginPath();
@@ -73,20 +95,26 @@ function drawScene(context, { scene, states }, area, bounds) {
   const scale = fit(context, area, bounds);
   drawRoads(context, scene, scale);
   scene.objects.forEach((object, i) => drawBody(context, {
-    shape: object.shape, pose: pose(states.objects, i, OBJECT_WIDTH), ahead: 0,
+    shape: object.shape, pose: pose(states.objects, i), ahead: 0,
     fill: themeColor(objectColour(object)), scale,
   }));
   scene.vehicles.forEach((vehicle, i) => drawBody(context, {
-    shape: vehicle.shape, pose: pose(states.vehicles, i, VEHICLE_WIDTH),
+    shape: vehicle.shape, pose: pose(states.vehicles, i),
     ahead: vehicle.rear_to_center, scale, edge: themeColor('map-outline'),
     fill: themeColor(vehicle.role === 'human' ? 'human' : 'av'),
   }));
   context.restore();
 }
 
-/** A box around all driven vehicles, of the shape of its area. */
+/**
+ * A box around all driven vehicles, of the shape of its area.
+ *
+ * @param {Preview} preview
+ * @param {Area} area
+ * @returns {Box}
+ */
 function surroundings({ scene, states }, area) {
-  const poses = scene.vehicles.map((_, i) => pose(states.vehicles, i, VEHICLE_WIDTH));
+  const poses = scene.vehicles.map((_, i) => pose(states.vehicles, i));
   if (poses.length === 0) {
     return scene.bounds;
   }
@@ -101,8 +129,15 @@ function surroundings({ scene, states }, area) {
   return [x - half, y - tall, x + half, y + tall];
 }
 
-/** A line between the two drawings, and in the overview a frame around what the other shows. */
-function drawMarks(context, detail, overview, whole, around) {
+/**
+ * A line between the two drawings, and in the overview a frame around what the other shows.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Area} overview
+ * @param {Box} whole
+ * @param {Box} around
+ */
+function drawMarks(context, overview, whole, around) {
   context.save();
   context.strokeStyle = themeColor('border');
   context.lineWidth = window.devicePixelRatio;
@@ -116,19 +151,30 @@ function drawMarks(context, detail, overview, whole, around) {
   context.restore();
 }
 
-/** Rows may come as lists or as one flat list. */
-function pose(rows, index, width) {
-  const row = Array.isArray(rows[index]) ? rows[index]
-    : rows.slice(index * width, index * width + 3);
-  return row.slice(0, 3).map((value) => (value === null ? NaN : Number(value)));
+/**
+ * @param {(number|null)[][]} rows of vehicles or objects
+ * @param {number} index of one of them
+ * @returns {number[]} x, y [m], yaw [rad]; NaN where there is none
+ */
+function pose(rows, index) {
+  return (rows[index] ?? []).slice(0, 3).map((value) => value ?? NaN);
 }
 
+/**
+ * @param {Area} area
+ * @param {Box} bounds
+ */
 function scaleOf(area, [left, bottom, right, top]) {
   const margin = MARGIN_PX * window.devicePixelRatio;
   return Math.min((area.width - 2 * margin) / Math.max(right - left, 1),
     (area.height - 2 * margin) / Math.max(top - bottom, 1));
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Area} area
+ * @param {Box} bounds
+ */
 function fit(context, area, bounds) {
   const [left, bottom, right, top] = bounds;
   const scale = scaleOf(area, bounds);
@@ -138,6 +184,11 @@ function fit(context, area, bounds) {
   return scale;
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {number[]} flat
+ * @param {boolean} [close]
+ */
 function trace(context, flat, close = false) {
   for (let i = 0; i + 1 < flat.length; i += 2) {
     if (i === 0) {
@@ -151,6 +202,11 @@ function trace(context, flat, close = false) {
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Scene} scene
+ * @param {number} scale
+ */
 function drawRoads(context, scene, scale) {
   const pixel = window.devicePixelRatio / scale;
   context.lineWidth = pixel;
@@ -160,7 +216,7 @@ function drawRoads(context, scene, scale) {
   context.strokeStyle = themeColor(isThin ? 'map-road' : 'map-mark');
   for (const lanelet of scene.lanelets) {
     context.beginPath();
-    trace(context, [...lanelet.left, ...pairsReversed(lanelet.right)], true);
+    trace(context, outlineOf(lanelet), true);
     context.fill();
   }
   for (const lanelet of scene.lanelets) {
@@ -179,21 +235,22 @@ function drawRoads(context, scene, scale) {
   context.globalAlpha = 1;
 }
 
-function pairsReversed(flat) {
-  const result = [];
-  for (let i = flat.length - 2; i >= 0; i -= 2) {
-    result.push(flat[i], flat[i + 1]);
-  }
-  return result;
-}
-
+/**
+ * @param {SceneObject} object
+ * @returns {ColorName}
+ */
 function objectColour(object) {
   if (VULNERABLE.has(object.type)) {
     return 'vulnerable';
   }
-  return ['static', 'traffic', 'scripted'].includes(object.role) ? object.role : 'recorded';
+  const { role } = object;
+  return role === 'static' || role === 'traffic' || role === 'scripted' ? role : 'recorded';
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Body} body
+ */
 function drawBody(context, { shape, pose: [x, y, yaw], ahead, fill, scale, edge = null }) {
   if (!Number.isFinite(x + y + yaw)) {
     return;
@@ -207,7 +264,7 @@ function drawBody(context, { shape, pose: [x, y, yaw], ahead, fill, scale, edge 
   context.scale(grow, grow);
   context.beginPath();
   if (shape.kind === 'polygon' && shape.vertices.length > 0) {
-    trace(context, shape.vertices.flat(), true);
+    trace(context, shape.vertices, true);
   } else if (shape.kind === 'circle') {
     context.arc(0, 0, 0.5 * shape.length, 0, 2 * Math.PI);
   } else {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Series of measurements for plots: few points that keep the peaks. */
 
+/** @import { Status } from '../messages.js' */
+
 /** At most so many points are drawn of a series. */
 export const MOST_POINTS = 400;
 
@@ -17,7 +19,9 @@ export const MOST_POINTS = 400;
  * @returns {{x: number[], y: Array<number|null>}} at most MOST_POINTS points
  */
 export function thin(t, values, from, to) {
+  /** @type {number[]} */
   const x = [];
+  /** @type {(number|null)[]} */
   const y = [];
   const first = t.findIndex((time) => time >= from);
   let end = t.length;
@@ -76,8 +80,22 @@ export function unwrap(angles) {
   });
 }
 
+/**
+ * @typedef {{t: number, latency: Record<string, number>, step_error: number, lag: number}} Row
+ */
+
+/**
+ * @param {Status['timing']} timing
+ * @param {string} key
+ */
+function figure(timing, key) {
+  const value = timing?.[key];
+  return typeof value === 'number' ? value : NaN;
+}
+
 /** Figures of the run that come with its status, over the last two minutes. */
 export class HealthLog {
+  /** @type {Row[]} */
   #rows = [];
   #keeps_s;
 
@@ -91,26 +109,27 @@ export class HealthLog {
     this.#rows = [];
   }
 
-  /** @param {object} status as the server sends it */
+  /** @param {Status} status as the server sends it */
   take(status) {
     const { t } = status;
     if (!Number.isFinite(t)) {
       return;
     }
     // A replay may go back; what came after is then told once more.
-    while (this.#rows.length > 0 && this.#rows.at(-1).t >= t) {
+    while ((this.#rows.at(-1)?.t ?? -Infinity) >= t) {
       this.#rows.pop();
     }
     while (this.#rows.length > 0 && this.#rows[0].t < t - this.#keeps_s) {
       this.#rows.shift();
     }
+    /** @type {Record<string, number>} */
     const latency = {};
     for (const [av, planner] of Object.entries(status.planners ?? {})) {
       latency[av] = planner.latency_ms ?? NaN;
     }
     this.#rows.push({
-      t, latency, step_error: status.timing?.mean_step_error_ms ?? NaN,
-      lag: status.timing?.final_error_ms ?? NaN,
+      t, latency, step_error: figure(status.timing, 'mean_step_error_ms'),
+      lag: figure(status.timing, 'final_error_ms'),
     });
   }
 
@@ -120,7 +139,7 @@ export class HealthLog {
   }
 
   /**
-   * @param {string} name 'step_error' or 'lag'
+   * @param {'step_error'|'lag'} name 'step_error' or 'lag'
    * @returns {number[]} [ms]
    */
   column(name) {

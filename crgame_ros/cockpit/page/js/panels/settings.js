@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The switch between the system's theme, dark and light. */
 
-import { element } from '../driving/dom.js';
+import { element } from '../dom.js';
 import { icon } from './icons.js';
 import { recall, remember } from './memory.js';
 
@@ -16,13 +16,14 @@ const THEMES = [
  * by `onThemeChange` of the world's palette.
  *
  * @param {HTMLElement} root of the button
- * @returns {{theme: string, setTheme: function(string): void}} theme: 'dark', 'light' or '' for
+ * @returns {{theme: string, setTheme: (theme: string) => void}} theme: 'dark', 'light' or '' for
  *   the system's
  */
 export function createSettings(root) {
   const button = element('button', { type: 'button', id: 'theme', class: 'icon-button' });
   const settings = {
     theme: '',
+    /** @param {string} theme */
     setTheme(theme) {
       const [name, picture, label] = THEMES.find(([known]) => known === theme) ?? THEMES[0];
       settings.theme = name;

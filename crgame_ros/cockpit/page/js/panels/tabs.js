@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The panels at the right: their tabs, their width, and putting them away. */
 
-import { element } from '../driving/dom.js';
+import { element, part } from '../dom.js';
 import { icon } from './icons.js';
 import { recall, remember } from './memory.js';
 
@@ -17,18 +17,20 @@ const WIDEST_SHARE = 0.6;
  * Make the tabs.
  *
  * @param {HTMLElement} root aside#panels
- * @returns {{show: function(string): void, current: string}} show opens a panel by its name
+ * @returns {{show: (name: string) => void, current: string}} show opens a panel by its name
  */
 export function createTabs(root) {
+  /** @type {Map<string, HTMLElement>} */
   const tabs = new Map();
-  const list = root.querySelector('#tabs');
+  const list = part(root, 'tabs');
   const panels = {
     current: '',
+    /** @param {string} name */
     show(name) {
       panels.current = name;
       for (const [other, tab] of tabs) {
         tab.setAttribute('aria-selected', String(other === name));
-        root.querySelector(`#panel-${other}`).hidden = other !== name;
+        part(root, `panel-${other}`).hidden = other !== name;
       }
       remember('panel', name);
     },
@@ -43,7 +45,7 @@ export function createTabs(root) {
       type: 'button', role: 'tab', id: `tab-${name}`, text: label,
       'aria-controls': `panel-${name}`, on: { click: open },
     });
-    root.querySelector(`#panel-${name}`).setAttribute('aria-labelledby', tab.id);
+    part(root, `panel-${name}`).setAttribute('aria-labelledby', tab.id);
     tabs.set(name, tab);
     list.append(tab);
   }
@@ -55,24 +57,31 @@ export function createTabs(root) {
   return panels;
 }
 
+/** @param {HTMLElement} root */
 function addCollapse(root) {
   const button = element('button', {
     type: 'button', id: 'collapse', class: 'icon-button', 'aria-controls': 'panels',
     'aria-label': 'Panels', title: 'Show or hide the panels',
     on: { click: () => collapse(root, !root.hidden) },
   }, icon('panel'));
-  document.querySelector('#bar-end').append(button);
+  part(document.body, 'bar-end').append(button);
   collapse(root, recall('collapsed') === 'yes');
 }
 
+/**
+ * @param {HTMLElement} root
+ * @param {boolean} away
+ */
 function collapse(root, away) {
   root.hidden = away;
   document.querySelector('#collapse')?.setAttribute('aria-expanded', String(!away));
   remember('collapsed', away ? 'yes' : 'no');
 }
 
+/** @param {HTMLElement} root */
 function addHandle(root) {
   const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize);
+  /** @param {number} width_rem */
   const setWidth = (width_rem) => {
     const most = WIDEST_SHARE * window.innerWidth / rem();
     const width = Math.max(NARROWEST_REM, Math.min(width_rem, most));
@@ -107,10 +116,14 @@ function addHandle(root) {
 /**
  * Give the keys back to the car after a click: the space bar brakes, and would press a button
  * that kept the focus; arrows would move a choice. Whoever walks by keyboard keeps the focus.
+ *
+ * @param {Document} scope
  */
 function releaseFocus(scope) {
   let byPointer = false;
+  /** @param {EventTarget|null} target */
   const blur = (target) => {
+    /** @type {HTMLElement|null} */
     const focused = target instanceof Element ? target.closest('button, select, input') : null;
     focused?.blur();
   };

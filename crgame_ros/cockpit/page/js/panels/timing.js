@@ -2,17 +2,31 @@
 // SPDX-License-Identifier: Apache-2.0
 /** How true the run is to the wall clock: the live figures of the time-sync supervisor. */
 
-import { element, setAttribute, setText } from '../driving/dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { count, fixed, plural } from './format.js';
+
+/** @import { Status, Timing } from '../messages.js' */
+/** @import { Store } from '../store.js' */
 
 // timesync_node calls a run late from a lag of so many steps on.
 const LATE_STEPS = 10;
 
+/** @typedef {(value: number) => string} Format */
+/** @type {(digits: number) => Format} */
 const ms = (digits) => (value) => `${fixed(value, digits)} ms`;
+/** @type {(digits: number) => Format} */
 const percent = (digits) => (value) => `${fixed(100 * value, digits)} %`;
+/** @type {Format} */
 const ratio = (value) => fixed(value, 3);
 
-/** Key of the figure: [name, explanation, format, when it is late (value, step [ms])]. */
+/**
+ * @typedef {[key: string, name: string, explanation: string]} Named
+ * @typedef {[...Named, format: Format, isLate?: (value: number, step_ms: number) => boolean]
+ *   } Figure
+ * @typedef {Map<string, {show: (text: string, late: boolean) => void}>} Rows
+ */
+
+/** @type {Figure[]} */
 export const TABLE_I = [
   ['final_error_ms', 'Lag now', 'E_f: simulated behind wall-clock time, resets added back',
     ms(2), (value, step) => value > LATE_STEPS * step],
@@ -33,6 +47,7 @@ export const TABLE_I = [
     (value) => (Number.isFinite(value) ? value.toExponential(1).replace('-', '−') : '–')],
 ];
 
+/** @type {Figure[]} */
 const MORE = [
   ['rate_hz', 'Rate', 'steps per second', (value) => `${fixed(value, 1)} Hz`],
   ['worst_lag_ms', 'Worst lag', 'behind the schedule in force when a cycle began', ms(1),
@@ -56,11 +71,13 @@ const MORE = [
  * Make the figures.
  *
  * @param {HTMLElement} root #timekeeping
- * @param {import('../store.js').Store} store
+ * @param {Store} store
  */
 export function createTiming(root, store) {
   const hint = element('p', { class: 'hint', text: 'Measured from the second step on.' });
+  /** @type {Rows} */
   const run = new Map();
+  /** @type {Rows} */
   const rows = new Map();
   const tables = element('div', {},
     element('h2', { text: 'Timekeeping' }), table(TABLE_I, rows, 'Table I'),
@@ -81,39 +98,54 @@ export function createTiming(root, store) {
     const step_ms = 1e3 * (store.scene?.time.dt_s ?? NaN);
     setAttribute(hint, 'hidden', Boolean(status.timing));
     setAttribute(tables, 'hidden', !status.timing);
-    for (const [key, , , format, isLate] of status.timing ? [...TABLE_I, ...MORE] : []) {
-      const value = valueOf(status.timing, key);
-      rows.get(key).show(format(value), Boolean(isLate?.(value, step_ms)));
+    const { timing } = status;
+    if (timing) {
+      for (const [key, , , format, isLate] of [...TABLE_I, ...MORE]) {
+        const value = valueOf(timing, key);
+        rows.get(key)?.show(format(value), Boolean(isLate?.(value, step_ms)));
+      }
     }
   };
   store.on('status', update);
-  new MutationObserver(update).observe(root.parentElement, { attributeFilter: ['hidden'] });
+  new MutationObserver(update).observe(
+    /** @type {HTMLElement} */ (root.parentElement), { attributeFilter: ['hidden'] });
   update();
 }
 
 /**
- * @param {object} timing figures by key, live or as `timing.json` has them
+ * @param {Timing} timing figures by key, live or as `timing.json` has them
  * @param {string} key of the figure
  * @returns {number} NaN where there is none
  */
 export function valueOf(timing, key) {
   const nested = key.match(/^(real_time_ratio)_(\w+)$/);
-  const value = nested && !(key in timing) ? timing[nested[1]]?.[nested[2]] : timing[key];
-  return value ?? NaN;
+  const group = nested && !(key in timing) ? timing[nested[1]] : undefined;
+  const value = nested && group && typeof group === 'object' ? group[nested[2]] : timing[key];
+  return typeof value === 'number' ? value : NaN;
 }
 
+/**
+ * @param {Rows} run
+ * @param {Status} status
+ * @param {Store} store
+ */
 function showRun(run, status, store) {
   const asked = status.real_time_factor;
   const measured = status.measured_factor;
-  const slow = status.run === 'running' && measured < 0.95 * asked;
-  run.get('factor').show(Number.isFinite(measured)
+  const slow = status.run === 'running' && measured !== null && measured < 0.95 * asked;
+  run.get('factor')?.show(Number.isFinite(measured)
     ? `${fixed(measured, 2)} × of ${fixed(asked, 2)} ×` : `${fixed(asked, 2)} ×`, slow);
   const skipping = Boolean(status.frames_skipped);
-  run.get('skipping').show(skipping ? 'skipped to catch up' : 'all shown', skipping);
-  run.get('clients').show(plural(status.clients ?? 0, 'page'), false);
-  run.get('delay').show(`${fixed(store.round_trip_ms, 0)} ms`, store.round_trip_ms > 200);
+  run.get('skipping')?.show(skipping ? 'skipped to catch up' : 'all shown', skipping);
+  run.get('clients')?.show(plural(status.clients ?? 0, 'page'), false);
+  run.get('delay')?.show(`${fixed(store.round_trip_ms, 0)} ms`, store.round_trip_ms > 200);
 }
 
+/**
+ * @param {[...Named, ...unknown[]][]} entries
+ * @param {Rows} rows
+ * @param {string} caption
+ */
 function table(entries, rows, caption) {
   return element('table', { class: 'figures' },
     element('caption', { class: 'unseen', text: caption }),

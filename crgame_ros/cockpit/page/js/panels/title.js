@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What is being shown, in the header and in the browser's tab. */
 
-import { setText } from '../driving/dom.js';
+import { setText } from '../dom.js';
+
+/** @import { Store } from '../store.js' */
 
 const PROGRAM = 'crgame';
 
@@ -10,7 +12,7 @@ const PROGRAM = 'crgame';
  * Keep the title up to date.
  *
  * @param {HTMLElement} root #title
- * @param {import('../store.js').Store} store
+ * @param {Store} store
  */
 export function createTitle(root, store) {
   const update = () => {

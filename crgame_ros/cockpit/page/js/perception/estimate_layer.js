@@ -2,23 +2,37 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Where an AV takes itself to be: an outline, and the ellipse of two standard deviations. */
 
+/** @import { ShownEstimate } from '../perceived.js' */
+/** @import { LiveView } from '../world/painter.js' */
+/** @import { DrawnVehicle } from '../world/vehicle_layer.js' */
+
 const SIGMAS = 2;
 const LINE_PX = 1.8;
 const DASH_PX = [6, 3];
 const FILL_ALPHA = 0.25;
 const CROSS_PX = 4;
 
+/**
+ * Half axes [m], direction of the major one in the map [rad].
+ *
+ * @typedef {{major: number, minor: number, angle: number}} Ellipse
+ */
+
 /** Draws the estimate of one AV. */
 export class EstimateLayer {
-  /** What was drawn last: {n, x, y, yaw, xx, xy, yy, major, minor}, null for nothing. */
+  /**
+   * What was drawn last, null for nothing.
+   *
+   * @type {(ShownEstimate & Partial<Ellipse>)|null}
+   */
   drawn = null;
 
   /**
    * Draw it.
    *
    * @param {CanvasRenderingContext2D} context of the world
-   * @param {object} view as layers get it
-   * @param {object|undefined} vehicle of the vehicle layer, that of the AV
+   * @param {LiveView} view as layers get it
+   * @param {DrawnVehicle|undefined} vehicle of the vehicle layer, that of the AV
    * @param {number} av its index; -1 draws nothing
    */
   draw(context, { camera, palette, ratio, store, shown }, vehicle, av) {
@@ -59,8 +73,7 @@ export class EstimateLayer {
  * Give the ellipse of two standard deviations of a covariance.
  *
  * @param {{xx: number, xy: number, yy: number}} covariance [m^2]
- * @returns {{major: number, minor: number, angle: number}} half axes [m], direction of the major
- *   one in the map [rad]
+ * @returns {Ellipse}
  */
 export function ellipse({ xx, xy, yy }) {
   const mean = (xx + yy) / 2;

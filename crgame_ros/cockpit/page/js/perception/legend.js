@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What the marks of perception stand for, beside the map while they are on it. */
 
-import { element, setAttribute, setText, svg } from '../driving/dom.js';
+import { element, setAttribute, setText, svg } from '../dom.js';
 
 // name: [strokes in a box of 28 x 16, words]; $ is the AV. The styles are in world.css.
+/** @type {Record<string, [strokes: string, words: string]>} */
 const ENTRIES = {
   unseen: ['M14 2a6 6 0 1 0 .01 0z', 'not seen by $'],
   rays: ['M2 14L26 2V14z', 'what the sensors of $ reach'],
@@ -18,6 +19,7 @@ const UNKNOWN = 'whom $ sees is not known now';
 /** A small table over the map. */
 export class Legend {
   #root;
+  /** @type {Map<string, {row: HTMLElement, text: HTMLElement}>} */
   #rows = new Map();
 
   /** @param {HTMLElement} stage that holds the canvas */

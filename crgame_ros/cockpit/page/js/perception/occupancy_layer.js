@@ -2,23 +2,37 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Permanent obstacles: the occupied cells of the map, so that thin walls are seen from afar. */
 
+/** @import { OccupancyFrame } from '../frames.js' */
+/** @import { View } from '../world/painter.js' */
+
 // Below this size on the screen cells are drawn by fours, and so on [px].
 const LEAST_PX = 0.75;
 const COARSEST = 6;
+
+/**
+ * @typedef {object} Level of detail
+ * @property {number} coarseness its cells are 2 to the power of this as long as the map's
+ * @property {number} rows
+ * @property {number} columns
+ * @property {Uint8Array} cells
+ * @property {HTMLCanvasElement|null} picture
+ */
 
 /** Draws the store's map as a picture in the theme's colour. */
 export class OccupancyLayer {
   /** How many cells are occupied in the map that was drawn last. */
   drawn = 0;
+  /** @type {OccupancyFrame|null} */
   #map = null;
   #color = '';
+  /** @type {Level[]} */
   #levels = [];
 
   /**
    * Draw it.
    *
    * @param {CanvasRenderingContext2D} context of the world
-   * @param {object} view as layers get it
+   * @param {View} view as layers get it
    */
   draw(context, { camera, palette, ratio, store }) {
     const map = store.perceived.occupancy;
@@ -28,8 +42,9 @@ export class OccupancyLayer {
     }
     if (map !== this.#map) {
       this.#map = map;
-      this.#levels = [firstLevel(map)];
-      this.drawn = this.#levels[0].cells.reduce((sum, cell) => sum + cell, 0);
+      const first = firstLevel(map);
+      this.#levels = [first];
+      this.drawn = first.cells.reduce((sum, cell) => sum + cell, 0);
     }
     if (palette.occupied !== this.#color) {
       this.#color = palette.occupied;
@@ -46,19 +61,28 @@ export class OccupancyLayer {
     context.drawImage(level.picture, 0, 0, level.columns * edge, level.rows * edge);
   }
 
-  /** Give the finest level whose cells are large enough on the screen. */
+  /**
+   * Give the finest level whose cells are large enough on the screen.
+   *
+   * @param {number} cell_px
+   * @returns {Level}
+   */
   #level(cell_px) {
     let wanted = 0;
     while (wanted < COARSEST && cell_px * 2 ** wanted < LEAST_PX) {
       wanted += 1;
     }
     while (this.#levels.length <= wanted) {
-      this.#levels.push(coarser(this.#levels.at(-1)));
+      this.#levels.push(coarser(this.#levels[this.#levels.length - 1]));
     }
     return this.#levels[wanted];
   }
 }
 
+/**
+ * @param {OccupancyFrame} map
+ * @returns {Level}
+ */
 function firstLevel({ rows, columns, bits }) {
   const cells = new Uint8Array(rows * columns);
   for (let i = 0; i < cells.length; i += 1) {
@@ -67,7 +91,12 @@ function firstLevel({ rows, columns, bits }) {
   return { coarseness: 0, rows, columns, cells, picture: null };
 }
 
-/** Four cells become one, occupied if any of them is: no wall gets lost. */
+/**
+ * Four cells become one, occupied if any of them is: no wall gets lost.
+ *
+ * @param {Level} level
+ * @returns {Level}
+ */
 function coarser({ coarseness, rows, columns, cells }) {
   const height = Math.ceil(rows / 2);
   const width = Math.ceil(columns / 2);
@@ -83,11 +112,15 @@ function coarser({ coarseness, rows, columns, cells }) {
   };
 }
 
+/**
+ * @param {Level} level
+ * @param {string} color
+ */
 function paint({ rows, columns, cells }, color) {
   const canvas = document.createElement('canvas');
   canvas.width = columns;
   canvas.height = rows;
-  const context = canvas.getContext('2d');
+  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
   const image = context.createImageData(columns, rows);
   for (let i = 0; i < cells.length; i += 1) {
     image.data[4 * i + 3] = 255 * cells[i];

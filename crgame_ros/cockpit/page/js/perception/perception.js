@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What the followed AV perceives, over the true world: layers, their buttons and a legend. */
 
-import { setAttribute, setText } from '../driving/dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
 import { recall, remember } from '../panels/memory.js';
 import { press, toolButton } from '../world/toolbar.js';
@@ -12,7 +12,18 @@ import { OccupancyLayer } from './occupancy_layer.js';
 import { RayLayer } from './ray_layer.js';
 import { countText, Unseen } from './unseen.js';
 
+/** @import { Connection } from '../connection.js' */
+/** @import { Store } from '../store.js' */
+/** @import { LiveView } from '../world/painter.js' */
+/** @import { World } from '../world/world.js' */
+
+/** @typedef {'unseen'|'rays'|'estimate'|'occupancy'} LayerName */
+
 // name: [strokes of its button, what it shows, whether it is on at first, needs a perceiving AV]
+/**
+ * @type {Record<LayerName,
+ *   [strokes: string, title: string, first: boolean, needsAv: boolean]>}
+ */
 const LAYERS = {
   unseen: ['M3 3l18 18M10 6a9 9 0 0 1 11 6a12 12 0 0 1-3 4M6 8a12 12 0 0 0-3 4'
     + 'a9 9 0 0 0 12 5', 'Whom the followed AV does not see, as outlines', true, true],
@@ -24,15 +35,20 @@ const LAYERS = {
 // Of the names of the world's layers: anybody may have one called rays.
 const PREFIX = 'perception_';
 const COUNT_EVERY_MS = 200;
+const NAMES = /** @type {LayerName[]} */ (Object.keys(LAYERS));
 
 /** The layers of perception of one world. */
 class Perception {
   #store;
   #connection;
   #world;
+  /** @type {Unseen|null} */
   #unseen = null;
+  /** @type {Uint8Array|null} */
   #flags = null;
+  /** @type {Partial<Record<LayerName, boolean>>} */
   #on = {};
+  /** @type {Map<LayerName, HTMLButtonElement>} */
   #buttons = new Map();
   #group;
   #rays = new RayLayer();
@@ -42,13 +58,21 @@ class Perception {
   #told = '';
   #legended = '';
 
+  /**
+   * @param {HTMLElement} stage
+   * @param {Store} store
+   * @param {Connection} connection
+   * @param {World} world
+   */
   constructor(stage, store, connection, world) {
     this.#store = store;
     this.#connection = connection;
     this.#world = world;
     this.#legend = new Legend(stage);
     this.#addLayers(world);
-    this.#addButtons(stage.querySelector('.world-toolbar'));
+    this.#group = element('div', { class: 'world-group' });
+    stage.querySelector('.world-toolbar')?.append(this.#group);
+    this.#addButtons();
     store.on('scene', () => this.#load());
     store.on('hello', () => {
       this.#told = '';
@@ -62,8 +86,9 @@ class Perception {
   get hollow() {
     const { shown } = this.#world;
     const { vehicles, objects } = this.#store.scene ?? { vehicles: [], objects: [] };
-    return shown === null || this.#flags === null ? [] : [...vehicles, ...objects]
-      .filter((_, column) => this.#flags[column] === 1 && Number.isFinite(
+    const flags = this.#flags;
+    return shown === null || flags === null ? [] : [...vehicles, ...objects]
+      .filter((_, column) => flags[column] === 1 && Number.isFinite(
         column < vehicles.length ? shown.vehicles[column * VEHICLE_WIDTH]
           : shown.objects[(column - vehicles.length) * OBJECT_WIDTH]))
       .map(({ id }) => id);
@@ -94,13 +119,14 @@ class Perception {
     const av = this.#av();
     const columns = shown === null || av < 0 ? null
       : this.#store.perceived.seenBy(av, shown.t);
-    return columns === null ? null : this.#unseen.count(av, columns, shown);
+    return columns === null || shown === null ? null
+      : this.#unseen?.count(av, columns, shown) ?? null;
   }
 
   /**
    * Show or hide a layer, and remember it.
    *
-   * @param {string} name unseen, rays, estimate or occupancy
+   * @param {LayerName} name unseen, rays, estimate or occupancy
    * @param {boolean} on whether it is shown
    */
   set(name, on) {
@@ -109,11 +135,15 @@ class Perception {
     if (name !== 'unseen') {
       this.#world.setLayer(PREFIX + name, on);
     }
-    press(this.#buttons.get(name), on);
+    const button = this.#buttons.get(name);
+    if (button !== undefined) {
+      press(button, on);
+    }
     this.#tell();
     this.#world.redraw();
   }
 
+  /** @param {World} world */
   #addLayers(world) {
     world.drawHollow((view) => this.#choose(view));
     world.addLayer(PREFIX + 'occupancy', (context, view) => this.#occupancy.draw(context, view));
@@ -122,11 +152,9 @@ class Perception {
       context, view, world.vehicle(this.#av()), this.#av()), 'above');
   }
 
-  #addButtons(bar) {
-    this.#group = document.createElement('div');
-    this.#group.className = 'world-group';
-    bar.append(this.#group);
-    for (const [name, [strokes, title, first]] of Object.entries(LAYERS)) {
+  #addButtons() {
+    for (const name of NAMES) {
+      const [strokes, title, first] = LAYERS[name];
       const button = toolButton(this.#group, strokes, title,
         () => this.set(name, !this.#on[name]));
       button.dataset.layer = name;
@@ -154,7 +182,7 @@ class Perception {
 
   /** Tell the server what is wanted, if that has changed. */
   #tell() {
-    const perception = this.#av() < 0 ? '' : this.#world.followed;
+    const perception = this.#av() < 0 ? '' : this.#world.followed ?? '';
     const scans = Boolean(this.#on.rays);
     const told = `${perception} ${scans}`;
     if (told !== this.#told
@@ -165,7 +193,7 @@ class Perception {
 
   #showLegend() {
     const av = this.#av();
-    const names = Object.keys(LAYERS).filter((name) => this.#on[name]
+    const names = NAMES.filter((name) => this.#on[name]
       && (name === 'occupancy' ? this.#store.scene?.occupancy : av >= 0));
     const followed = this.#world.followed ?? '';
     const known = this.#flags !== null;
@@ -176,17 +204,25 @@ class Perception {
     }
   }
 
-  /** In each frame: whom to draw as an outline. */
+  /**
+   * In each frame: whom to draw as an outline.
+   *
+   * @param {LiveView} view
+   */
   #choose({ store, shown }) {
     this.#tell();
     const av = this.#on.unseen ? this.#av() : -1;
     const columns = av < 0 ? null : store.perceived.seenBy(av, shown.t);
-    this.#flags = columns === null ? null : this.#unseen.flags(av, columns);
+    this.#flags = columns === null ? null : this.#unseen?.flags(av, columns) ?? null;
     this.#showLegend();
     return this.#flags;
   }
 
-  /** In the instruments: how much of what is near is seen. */
+  /**
+   * In the instruments: how much of what is near is seen.
+   *
+   * @param {HTMLElement} stage
+   */
   #showCount(stage) {
     const line = stage.querySelector('.hud-seen');
     if (line !== null) {
@@ -201,8 +237,8 @@ class Perception {
  * Put the layers of perception on the world.
  *
  * @param {HTMLElement} stage that holds the canvas
- * @param {import('../store.js').Store} store
- * @param {import('../connection.js').Connection} connection
+ * @param {Store} store
+ * @param {Connection} connection
  * @returns {Perception}
  */
 export function createPerception(stage, store, connection) {

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The rays of an AV's sensors: a fan up to what they hit, and the line of the hits. */
 
+/** @import { Scan, ScanFrame } from '../frames.js' */
+/** @import { LiveView } from '../world/painter.js' */
+
 const FAN_ALPHA = 0.13;
 const HIT_ALPHA = 0.95;
 const HIT_PX = 2;
@@ -14,17 +17,20 @@ const STEPS = 4;
 // What a single hit is drawn as [m].
 const DOT_M = 0.15;
 
+/** @typedef {{fan: Path2D, hits: Path2D}} Paths */
+
 /** Builds the paths of each scan once; draws those of one AV. */
 export class RayLayer {
   /** How many fans were drawn in the last frame. */
   drawn = 0;
+  /** @type {WeakMap<ScanFrame, Paths>} */
   #paths = new WeakMap();
 
   /**
    * Draw the scans of an AV where their sensors were when they looked.
    *
    * @param {CanvasRenderingContext2D} context of the world
-   * @param {object} view as layers get it
+   * @param {LiveView} view as layers get it
    * @param {number} av index of the AV; -1 draws nothing
    */
   draw(context, { camera, palette, ratio, store, shown }, av) {
@@ -43,6 +49,10 @@ export class RayLayer {
     }
   }
 
+  /**
+   * @param {ScanFrame} scan
+   * @returns {Paths}
+   */
   #pathsOf(scan) {
     let paths = this.#paths.get(scan);
     if (paths === undefined) {
@@ -53,7 +63,12 @@ export class RayLayer {
   }
 }
 
-/** In metres around the sensor, along the axes of the map. */
+/**
+ * In metres around the sensor, along the axes of the map.
+ *
+ * @param {Scan} scan
+ * @returns {Paths}
+ */
 function build({ yaw, first, increment, longest, ranges }) {
   const fan = new Path2D();
   const hits = new Path2D();

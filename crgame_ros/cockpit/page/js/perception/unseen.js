@@ -4,12 +4,14 @@
 
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
 
+/** @import { Scene } from '../messages.js' */
+
 /** What one AV sees of what is there, for one scene; its arrays are refilled. */
 export class Unseen {
   #scene;
   #flags;
 
-  /** @param {object} scene the scene document */
+  /** @param {Scene} scene the scene document */
   constructor(scene) {
     this.#scene = scene;
     this.#flags = new Uint8Array(scene.vehicles.length + scene.objects.length);
@@ -27,7 +29,7 @@ export class Unseen {
    * Mark whoever is not seen, whether present or not.
    *
    * @param {number} av index of the AV
-   * @param {ArrayLike<number>} columns of those who are seen
+   * @param {Float64Array} columns of those who are seen
    * @returns {Uint8Array} 1 for each vehicle, then object, that is not
    */
   flags(av, columns) {
@@ -43,16 +45,17 @@ export class Unseen {
    * Count who is within the reach of an AV's sensors, and who of them is seen.
    *
    * @param {number} av index of the AV
-   * @param {ArrayLike<number>} columns of those who are seen
+   * @param {Float64Array} columns of those who are seen
    * @param {{vehicles: Float64Array, objects: Float64Array}} shown as Store.displayed gives it
    * @returns {{seen: number, near: number, range: number|null}} range [m], null for no limit
    */
   count(av, columns, { vehicles, objects }) {
-    const { range } = this.#scene.vehicles[av].perception;
+    const range = this.#scene.vehicles[av].perception?.range ?? null;
     const flags = this.flags(av, columns);
     const x = vehicles[av * VEHICLE_WIDTH];
     const y = vehicles[av * VEHICLE_WIDTH + 1];
     const total = { seen: 0, near: 0, range };
+    /** @type {(otherX: number, otherY: number, column: number) => void} */
     const add = (otherX, otherY, column) => {
       // Not for NaN: who is absent is not near.
       if (column !== av && Math.hypot(otherX - x, otherY - y) <= (range ?? Infinity)) {

@@ -4,6 +4,8 @@
 
 import { KIND } from '../frames.js';
 
+/** @import { ReplayInfo } from '../messages.js' */
+
 // A little over what two seeks and the way between them need; 5 s each.
 const KEPT = 12;
 const LENGTH_BYTES = 4;
@@ -13,17 +15,22 @@ const RETRY_MS = 1000;
  * Read an answer of the server.
  *
  * @param {string} path below /api/replay/
- * @param {object} query values by name
+ * @param {Record<string, number>} query values by name
  * @returns {Promise<Response>}
  * @throws {Error} with a text for people
  */
 export async function ask(path, query) {
-  const answer = await fetch(`/api/replay/${path}?${new URLSearchParams(query)}`);
+  const answer = await fetch(`/api/replay/${path}?${queryOf(query)}`);
   if (!answer.ok) {
     const { error } = await answer.json().catch(() => ({}));
     throw new Error(error ?? `The server answered ${answer.status}.`);
   }
   return answer;
+}
+
+/** @param {Record<string, number>} query */
+function queryOf(query) {
+  return new URLSearchParams(Object.entries(query).map(([name, value]) => [name, `${value}`]));
 }
 
 /**
@@ -54,16 +61,19 @@ export function unpack(packed) {
 /** The chunks of one run that are in memory. */
 export class Chunks {
   #info;
+  /** @type {Map<number, Entry[]>} */
   #chunks = new Map();
+  /** @type {Set<number>} */
   #asked = new Set();
+  /** @type {Map<number, number>} */
   #failed = new Map();
   #loaded;
   #refused;
 
   /**
-   * @param {object} info of the run
-   * @param {function(): void} loaded called after a chunk has come
-   * @param {function(Error): void} refused called when one cannot be had
+   * @param {ReplayInfo} info of the run
+   * @param {() => void} loaded called after a chunk has come
+   * @param {(error: Error) => void} refused called when one cannot be had
    */
   constructor(info, loaded, refused) {
     this.#info = info;
@@ -106,12 +116,13 @@ export class Chunks {
         // The map keeps the order of use: the first is the next to go.
         this.#chunks.delete(i);
         this.#chunks.set(i, known);
-      } else if (!this.#asked.has(i) && !(performance.now() < this.#failed.get(i))) {
+      } else if (!this.#asked.has(i) && !(performance.now() < (this.#failed.get(i) ?? NaN))) {
         this.#fetch(i);
       }
     }
   }
 
+  /** @param {number} number */
   async #fetch(number) {
     this.#asked.add(number);
     try {
@@ -119,12 +130,12 @@ export class Chunks {
       const entries = this.#entries(unpack(await answer.arrayBuffer()), number);
       this.#chunks.set(number, entries);
       this.#failed.delete(number);
-      while (this.#chunks.size > KEPT) {
-        this.#chunks.delete(this.#chunks.keys().next().value);
+      for (const oldest of [...this.#chunks.keys()].slice(0, -KEPT)) {
+        this.#chunks.delete(oldest);
       }
     } catch (error) {
       this.#failed.set(number, performance.now() + RETRY_MS);
-      this.#refused(error);
+      this.#refused(/** @type {Error} */ (error));
       return;
     } finally {
       this.#asked.delete(number);
@@ -132,7 +143,13 @@ export class Chunks {
     this.#loaded();
   }
 
-  /** Find from when on each frame is to be seen: a plan, from the state after which it came. */
+  /**
+   * Find from when on each frame is to be seen: a plan, from the state after which it came.
+   *
+   * @param {ArrayBuffer[]} frames
+   * @param {number} number
+   * @returns {Entry[]}
+   */
   #entries(frames, number) {
     let at = this.#info.start_s + number * this.#info.chunk_s - 1e-9;
     return frames.map((buffer) => {
@@ -145,7 +162,13 @@ export class Chunks {
   }
 }
 
-/** What a later frame takes the place of: of vehicles and sensors each has its own. */
+/**
+ * What a later frame takes the place of: of vehicles and sensors each has its own.
+ *
+ * @param {number} kind
+ * @param {number} index
+ * @param {number} sensor
+ */
 function slotOf(kind, index, sensor) {
   switch (kind) {
     case KIND.STATE: case KIND.OBJECTS: case KIND.OCCUPANCY: return `${kind}`;

@@ -2,12 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The documents of a recorded run at the time that is shown: signals, events, alarms, status. */
 
+import { countWhile } from '../search.js';
+
+/** @import { ReplayInfo, ReplayTracks, RunState, SeatsMessage, Status } from '../messages.js' */
+/** @import { StoreMessage } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+
 const STATUS_MS = 200;
+const KINDS = /** @type {const} */ (['signals', 'events', 'seats', 'alarms']);
+/** @type {{[Kind in typeof KINDS[number]]: Omit<StoreMessage & {type: Kind}, 'type'>}} */
 const EMPTY = {
   signals: { k: 0, states: {} }, events: { fired: [] }, seats: { seats: {} },
   alarms: { active: [] },
 };
-const STATUS_PARTS = ['timing', 'planners', 'drivability', 'seats_lost', 'frames_skipped'];
+const STATUS_PARTS = /** @type {const} */ (
+  ['timing', 'planners', 'drivability', 'seats_lost', 'frames_skipped']);
+/** @type {StatusParts} */
 const NO_STATUS = {
   timing: null, planners: {}, drivability: {}, seats_lost: {}, frames_skipped: false,
 };
@@ -15,17 +25,24 @@ const NO_STATUS = {
 const PAST_STATUS_S = 120;
 const PAST_SPACING_S = 0.9;
 
+/**
+ * @typedef {Pick<Status, typeof STATUS_PARTS[number]>} StatusParts
+ * @typedef {{t: number, n: number, k: number, run: RunState, speed: number}} Now the time that is
+ *   shown, and how it moves
+ */
+
 /** Sets the store's documents as the time moves, forward and back. */
 export class ReplayDocuments {
   #store;
   #info;
+  /** @type {Partial<Record<typeof KINDS[number], number>>} */
   #shown = {};
   #run = '';
   #told_ms = -Infinity;
 
   /**
-   * @param {import('../store.js').Store} store
-   * @param {object} info of the run
+   * @param {Store} store
+   * @param {ReplayInfo} info of the run
    */
   constructor(store, info) {
     this.#store = store;
@@ -35,18 +52,18 @@ export class ReplayDocuments {
   /**
    * Set what holds at a time.
    *
-   * @param {object} now t [s], n, k, run ('running', 'paused', 'ended'), speed
+   * @param {Now} now
    * @param {number} now_ms wall time
    * @param {boolean} jumped whether the time did not just go on
    */
   show(now, now_ms, jumped) {
-    for (const [kind, empty] of Object.entries(EMPTY)) {
+    for (const kind of KINDS) {
       const place = this.#place(kind, now.t);
       if (this.#shown[kind] !== place) {
         this.#shown[kind] = place;
-        const content = place < 0 ? empty : this.#info.documents[kind][place][1];
-        this.#store.receive({ type: kind, ...(kind === 'seats' ? withoutHolders(content)
-          : content) });
+        const content = this.#info.documents[kind]?.[place]?.[1] ?? EMPTY[kind];
+        this.#store.receive(/** @type {StoreMessage} */ (
+          { type: kind, ...('seats' in content ? withoutHolders(content) : content) }));
       }
     }
     if (jumped || now.run !== this.#run || now_ms - this.#told_ms >= STATUS_MS) {
@@ -59,13 +76,15 @@ export class ReplayDocuments {
   /**
    * Tell the past status once more, after a jump to a time.
    *
-   * @param {object} now as in `show`
+   * @param {Now} now
    */
   tellPast(now) {
     const { planners, timing } = this.#info.documents;
+    /** @type {number[]} */
     const times = [];
     for (const [t] of planners ?? timing ?? []) {
-      if (t > now.t - PAST_STATUS_S && t < now.t && !(t < times.at(-1) + PAST_SPACING_S)) {
+      const since = t - (times.at(-1) ?? -Infinity);
+      if (t > now.t - PAST_STATUS_S && t < now.t && since >= PAST_SPACING_S) {
         times.push(t);
       }
     }
@@ -78,37 +97,40 @@ export class ReplayDocuments {
     this.#store.receive({ type: 'status', ...this.#status(now) });
   }
 
+  /**
+   * @param {Now} now
+   * @returns {Status}
+   */
   #status({ t, n, k, run, speed }) {
     const parts = STATUS_PARTS.map((part) => {
-      const place = this.#place(part, t);
-      return [part, place < 0 ? NO_STATUS[part] : this.#info.documents[part][place][1]];
+      const held = this.#info.documents[part]?.[this.#place(part, t)];
+      return [part, held === undefined ? NO_STATUS[part] : held[1]];
     });
     return {
       run, t, n, k, epoch: this.#info.epoch, real_time_factor: speed,
       measured_factor: run === 'running' ? speed : null, clients: 1,
       recording: { state: 'none', messages: 0, megabytes: 0, text: 'A recording is shown' },
-      ...Object.fromEntries(parts),
+      .../** @type {StatusParts} */ (Object.fromEntries(parts)),
     };
   }
 
-  /** Find the entry of a document that holds at a time; -1 before the first. */
+  /**
+   * Find the entry of a document that holds at a time; -1 before the first.
+   *
+   * @param {keyof ReplayTracks} kind
+   * @param {number} t
+   */
   #place(kind, t) {
     const track = this.#info.documents[kind] ?? [];
-    let low = 0;
-    let high = track.length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (track[middle][0] <= t + 1e-9) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    return low - 1;
+    return countWhile(track.length, (index) => track[index][0] <= t + 1e-9) - 1;
   }
 }
 
-/** Nobody on this page held a seat of a recorded run. */
+/**
+ * Nobody on this page held a seat of a recorded run.
+ *
+ * @param {Omit<SeatsMessage, 'type'>} document
+ */
 function withoutHolders({ seats }) {
   return { seats: Object.fromEntries(Object.entries(seats).map(([id, seat]) => [
     id, { ...seat, holder: null, holder_name: '', requests: [], lost: false }])) };

@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Marks of events on the time line: each kind has a shape and a colour of its own. */
 
-import { element, svg } from '../driving/dom.js';
+import { element, svg } from '../dom.js';
+
+/** @import { ReplayMark } from '../messages.js' */
 
 // Shapes on a 12 x 12 grid and the name of each kind; the colours are in replay.css.
+/** @type {Record<string, [shape: string, word: string]|undefined>} */
 const KINDS = {
   collision: ['M6 0L7.6 4.4 12 6 7.6 7.6 6 12 4.4 7.6 0 6 4.4 4.4Z', 'Collision'],
   off_road: ['M6 1L12 11H0Z', 'Off the road'],
@@ -20,12 +23,13 @@ const KINDS = {
   recording: ['M6 0A6 6 0 1 1 5.9 0Z', 'Recording failed'],
   gap: ['M1 0H4.5V12H1ZM7.5 0H11V12H7.5Z', 'Not recorded'],
 };
+/** @type {[shape: string, word: string]} */
 const OTHER = ['M4 0H8V12H4Z', ''];
 
 /**
  * Put an event into words.
  *
- * @param {object} event of the replay's info
+ * @param {ReplayMark} event of the replay's info
  * @returns {string} kind, whom it concerns, what was said of it, how often and when
  */
 export function eventText({ kind, subject, text, count, t }) {
@@ -38,9 +42,9 @@ export function eventText({ kind, subject, text, count, t }) {
 /**
  * Draw the mark of an event.
  *
- * @param {object} event of the replay's info
+ * @param {ReplayMark} event of the replay's info
  * @param {number} share where on the time line, 0 to 1
- * @param {function(): void} chosen called when it is clicked
+ * @param {() => void} chosen called when it is clicked
  * @returns {HTMLElement}
  */
 export function mark(event, share, chosen) {
@@ -51,6 +55,6 @@ export function mark(event, share, chosen) {
     title: eventText(event), 'aria-label': eventText(event), on: { click: chosen },
   }, svg('svg', { viewBox: '-1 -1 14 14', 'aria-hidden': 'true' },
     svg('path', { d: shape, 'fill-rule': 'evenodd' })));
-  node.style.setProperty('--share', share);
+  node.style.setProperty('--share', String(share));
   return node;
 }

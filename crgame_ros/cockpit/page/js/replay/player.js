@@ -7,6 +7,10 @@ import { ReplayDocuments } from './documents.js';
 import { ReplayFeed } from './replay_feed.js';
 import { Timeline } from './timeline.js';
 
+/** @import { ReplayInfo, ReplayMark, RunState } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+/** @import { Now } from './documents.js' */
+
 const SLOWEST = 0.1;
 const FASTEST = 8;
 // A frame that comes later than this was a stall: what was not seen is not skipped [s].
@@ -15,10 +19,12 @@ const TINY_S = 1e-6;
 const SETTLED_MS = 300;
 
 /** The player; it does nothing until the server says that this is a replay. */
-class Player {
+export class Player {
   #store;
   #timeline;
+  /** @type {ReplayFeed|null} */
   #feed = null;
+  /** @type {ReplayDocuments|null} */
   #documents = null;
   #t = 0;
   // What the world shows: the last time whose data was there.
@@ -28,10 +34,15 @@ class Player {
   #jumped = false;
   #jumped_ms = NaN;
   #frame_ms = NaN;
+  /** @type {(() => void)[]} */
   #waiting = [];
   #opening = false;
   #told = '';
 
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   */
   constructor(root, store) {
     this.#store = store;
     this.#timeline = new Timeline(root, this);
@@ -44,10 +55,11 @@ class Player {
     store.on('connection', open);
     // After a lost connection the server sends the scene of the run that it shows first.
     store.on('scene', (scene) => {
-      if (this.#feed !== null && scene.time.epoch !== this.info.epoch) {
+      if (this.info !== null && scene.time.epoch !== this.info.epoch) {
         store.receive({ type: 'scene', ...this.info.scene });
       }
     });
+    /** @param {number} now_ms */
     const frame = (now_ms) => {
       this.#advance(now_ms);
       requestAnimationFrame(frame);
@@ -68,12 +80,12 @@ class Player {
 
   /** Simulation step that is shown: the last at or before the time. */
   get n() {
-    return Math.floor(this.#t / this.info.dt_s + TINY_S);
+    return Math.floor(this.#t / this.#run.dt_s + TINY_S);
   }
 
   /** Scenario step that is shown. */
   get k() {
-    return this.info.k0 + Math.floor(this.n / this.info.steps_per_tick);
+    return this.#run.k0 + Math.floor(this.n / this.#run.steps_per_tick);
   }
 
   /** Whether the time moves. */
@@ -184,7 +196,7 @@ class Player {
    * Go to the next or the previous event.
    *
    * @param {number} direction 1 or -1
-   * @returns {object|null} the event
+   * @returns {ReplayMark|null} the event
    */
   jump(direction) {
     const events = this.info?.events ?? [];
@@ -197,16 +209,23 @@ class Player {
     return found ?? null;
   }
 
+  /** What is asked for only while a run is shown. */
+  get #run() {
+    return /** @type {ReplayInfo} */ (this.info);
+  }
+
+  /** @param {ReplayInfo} info */
   #show(info) {
     const store = this.#store;
     this.pause();
     store.restart(info.epoch);
-    this.#feed = new ReplayFeed(store, info, {
+    const feed = new ReplayFeed(store, info, {
       loaded: () => this.#update(performance.now()), refused: (error) => this.#refuse(error),
     });
+    this.#feed = feed;
     this.#documents = new ReplayDocuments(store, info);
     store.useTimeSource(() => this.#shown_t);
-    store.useHistorySource((index, seconds) => this.#feed.history(index, seconds));
+    store.useHistorySource((index, seconds) => feed.history(index, seconds));
     store.receive({ type: 'scene', ...info.scene });
     this.#timeline.show(info);
     for (const text of info.notices) {
@@ -215,6 +234,7 @@ class Player {
     this.seek(info.start_s);
   }
 
+  /** @param {number} now_ms */
   #advance(now_ms) {
     const passed_s = Math.min((now_ms - this.#frame_ms) / 1000 || 0, LONGEST_FRAME_S);
     this.#frame_ms = now_ms;
@@ -223,28 +243,32 @@ class Player {
     }
     if (this.#playing && !this.#jumped) {
       const before = this.#t;
-      this.#t = Math.min(this.#t + passed_s * this.#speed, this.info.end_s);
+      this.#t = Math.min(this.#t + passed_s * this.#speed, this.#run.end_s);
       if (!this.#update(now_ms)) {
         // What comes next has not been fetched yet: time waits for it.
         this.#t = before;
       }
-      this.#playing = this.#t < this.info.end_s;
+      this.#playing = this.#t < this.#run.end_s;
     } else {
       this.#update(now_ms);
     }
     if (now_ms - this.#jumped_ms > SETTLED_MS) {
       this.#jumped_ms = NaN;
-      this.#documents.tellPast(this.#now());
+      this.#documents?.tellPast(this.#now());
     }
   }
 
-  /** Bring everything to the time; tell whether its data was there. */
+  /**
+   * Bring everything to the time; tell whether its data was there.
+   *
+   * @param {number} now_ms
+   */
   #update(now_ms) {
-    const shown = this.#feed.show(this.#t);
+    const shown = this.#feed?.show(this.#t) ?? NaN;
     const there = !Number.isNaN(shown);
     if (there) {
       this.#t = this.#shown_t = shown;
-      this.#documents.show(this.#now(), now_ms, this.#jumped);
+      this.#documents?.show(this.#now(), now_ms, this.#jumped);
       if (this.#jumped) {
         this.#jumped = false;
         this.#jumped_ms = now_ms;
@@ -255,17 +279,24 @@ class Player {
     return there;
   }
 
+  /** @returns {Now} */
   #now() {
-    const ended = this.#t >= this.info.end_s - TINY_S;
+    const ended = this.#t >= this.#run.end_s - TINY_S;
+    /** @type {RunState} */
     const run = this.#playing ? 'running' : ended ? 'ended' : 'paused';
     return { t: this.#t, n: this.n, k: this.k, run, speed: this.#speed };
   }
 
-  /** Say once what is wrong. */
+  /**
+   * Say once what is wrong.
+   *
+   * @param {unknown} error
+   */
   #refuse(error) {
-    if (this.#told !== error.message) {
-      this.#told = error.message;
-      this.#store.receive({ type: 'notice', level: 'error', text: error.message });
+    const text = error instanceof Error ? error.message : String(error);
+    if (this.#told !== text) {
+      this.#told = text;
+      this.#store.receive({ type: 'notice', level: 'error', text });
     }
   }
 }
@@ -274,7 +305,7 @@ class Player {
  * Make the player; it shows itself when the page shows a recording.
  *
  * @param {HTMLElement} root footer#timeline
- * @param {import('../store.js').Store} store
+ * @param {Store} store
  * @returns {Player}
  */
 export function createReplay(root, store) {

@@ -2,8 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Feeds the store with a recorded run, as the connection does with a live one. */
 
-import { decodeFrame, KIND, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { decodeFrame, KIND } from '../frames.js';
+import { addToHistory, emptyHistory } from '../history.js';
+import { countWhile } from '../search.js';
 import { ask, Chunks, unpack } from './chunks.js';
+
+/** @import { StateFrame } from '../frames.js' */
+/** @import { History } from '../history.js' */
+/** @import { ReplayInfo } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+/** @import { Entry } from './chunks.js' */
 
 const AHEAD = 2;
 // After a jump the states of so long before it are given to the store [s].
@@ -18,25 +26,30 @@ const FUTURE_S = 60;
 export class ReplayFeed {
   #store;
   #chunks;
-  #next = null;
+  // The chunk and the place in it of what is to be given next.
+  #next = { number: 0, place: 0 };
+  /** @type {Entry|null} */
   #early = null;
   #shown = NaN;
+  /** @type {StateFrame[]} */
   #outline = [];
 
   /** What the server says of the run. */
   info;
 
   /**
-   * @param {import('../store.js').Store} store
-   * @param {object} info of the run
-   * @param {object} told loaded() after new data has come, refused(error) when it cannot be had
+   * @param {Store} store
+   * @param {ReplayInfo} info of the run
+   * @param {{loaded: () => void, refused: (error: Error) => void}} told `loaded` after new data
+   *   has come, `refused` when it cannot be had
    */
   constructor(store, info, { loaded, refused }) {
     this.#store = store;
     this.info = info;
     this.#chunks = new Chunks(info, loaded, refused);
     ask('outline', { epoch: info.epoch }).then(async (answer) => {
-      this.#outline = unpack(await answer.arrayBuffer()).map(decodeFrame);
+      this.#outline = unpack(await answer.arrayBuffer()).map(decodeFrame)
+        .filter((frame) => frame?.kind === KIND.STATE);
     }).catch(refused);
   }
 
@@ -55,12 +68,13 @@ export class ReplayFeed {
   show(t) {
     const number = this.#chunks.numberAt(t);
     this.#chunks.want(number, AHEAD);
-    if (this.#chunks.get(number) === undefined) {
+    const entries = this.#chunks.get(number);
+    if (entries === undefined) {
       return NaN;
     }
     if (!(t >= this.#shown - SAME_TIME_S && t - this.#shown < LONGEST_WAY_S)
         || this.#store.epoch !== this.info.epoch) {
-      this.#jump(number, t);
+      this.#jump(entries, number, t);
     }
     this.#proceed(t);
     const state = this.#store.samples.at(this.#store.samples.indexAt(t + SAME_TIME_S));
@@ -73,47 +87,38 @@ export class ReplayFeed {
    *
    * @param {number} index of the vehicle
    * @param {number} seconds how far back
-   * @returns {object} t and each column of VEHICLE, arrays of the same length
+   * @returns {History}
    */
   history(index, seconds) {
-    const past = { t: [] };
-    for (const name of Object.keys(VEHICLE)) {
-      past[name] = [];
-    }
-    const columns = Object.entries(VEHICLE);
+    const past = emptyHistory();
     const end = this.#shown + FUTURE_S;
     for (let i = this.#outlineFrom(this.#shown - seconds); i < this.#outline.length; i += 1) {
-      const { t, vehicles } = this.#outline[i];
-      if (t > end) {
+      if (this.#outline[i].t > end) {
         break;
       }
-      past.t.push(t);
-      for (const [name, column] of columns) {
-        past[name].push(vehicles[index * VEHICLE_WIDTH + column]);
-      }
+      addToHistory(past, this.#outline[i], index);
     }
     return past;
   }
 
-  /** Find the first sample for plots that is not before a time. */
+  /**
+   * Find the first sample for plots that is not before a time.
+   *
+   * @param {number} t
+   */
   #outlineFrom(t) {
-    let low = 0;
-    let high = this.#outline.length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.#outline[middle].t < t) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    return low;
+    return countWhile(this.#outline.length, (index) => this.#outline[index].t < t);
   }
 
-  /** Begin anew shortly before a time: of each kind of frame only what still counts then. */
-  #jump(number, t) {
+  /**
+   * Begin anew shortly before a time: of each kind of frame only what still counts then.
+   *
+   * @param {Entry[]} entries
+   * @param {number} number
+   * @param {number} t
+   */
+  #jump(entries, number, t) {
     this.#store.restart(this.info.epoch);
-    const entries = this.#chunks.get(number);
     const end = entries.findIndex((entry) => entry.at > t + SAME_TIME_S);
     const past = end < 0 ? entries : entries.slice(0, end);
     const newest = new Map(past.map((entry) => [entry.slot, entry]));
@@ -127,30 +132,35 @@ export class ReplayFeed {
     this.#early = null;
   }
 
-  /** Go on to a time, and one state beyond it: between the two is interpolated. */
+  /**
+   * Go on to a time, and one state beyond it: between the two is interpolated.
+   *
+   * @param {number} t
+   */
   #proceed(t) {
     for (;;) {
-      const entries = this.#chunks.get(this.#next.number);
+      const next = this.#next;
+      const entries = this.#chunks.get(next.number);
       if (entries === undefined) {
         return;
       }
-      while (this.#next.place < entries.length
-             && entries[this.#next.place].at <= t + SAME_TIME_S) {
-        this.#give(entries[this.#next.place]);
-        this.#next.place += 1;
+      while (next.place < entries.length && entries[next.place].at <= t + SAME_TIME_S) {
+        this.#give(entries[next.place]);
+        next.place += 1;
       }
-      const following = entries.slice(this.#next.place).find(({ kind }) => kind === KIND.STATE);
-      if (following !== undefined || this.#next.number + 1 >= this.info.chunks) {
+      const following = entries.slice(next.place).find(({ kind }) => kind === KIND.STATE);
+      if (following !== undefined || next.number + 1 >= this.info.chunks) {
         if (following !== undefined && following !== this.#early) {
           this.#give(following);
           this.#early = following;
         }
         return;
       }
-      this.#next = { number: this.#next.number + 1, place: 0 };
+      this.#next = { number: next.number + 1, place: 0 };
     }
   }
 
+  /** @param {Entry} entry */
   #give(entry) {
     if (entry !== this.#early) {
       this.#store.receiveFrame(entry.buffer, performance.now());

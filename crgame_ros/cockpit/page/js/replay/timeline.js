@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The time line at the foot of the page: slider, events, buttons and keys of a replay. */
 
-import { element, setAttribute, setText, svg } from '../driving/dom.js';
+import { element, setAttribute, setText, svg } from '../dom.js';
 import { eventText, mark } from './marks.js';
+
+/** @import { ReplayInfo, ReplayMark } from '../messages.js' */
+/** @import { Player } from './player.js' */
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const PAGE_S = 5;
+/** @type {Record<string, string>} */
 const ICONS = {
   play: 'M6 4L20 12 6 20Z', pause: 'M6 4H10V20H6ZM14 4H18V20H14Z',
   back: 'M17 4V20L7 12ZM4 4H7V20H4Z', on: 'M7 4V20L17 12ZM17 4H20V20H17Z',
@@ -31,7 +35,7 @@ export class Timeline {
 
   /**
    * @param {HTMLElement} root footer#timeline; hidden until there is a recording
-   * @param {object} player what is steered
+   * @param {Player} player what is steered
    */
   constructor(root, player) {
     this.#root = root;
@@ -61,7 +65,7 @@ export class Timeline {
       this.#epochs.blur();
     });
     this.#slider.addEventListener('input', () => {
-      player.seek(Number(this.#slider.value) * player.info.dt_s);
+      player.seek(Number(this.#slider.value) * this.#info.dt_s);
     });
     this.#slider.addEventListener('keydown', (event) => this.#slide(event));
     window.addEventListener('keydown', (event) => this.#key(event));
@@ -70,7 +74,7 @@ export class Timeline {
   /**
    * Take a run on.
    *
-   * @param {object} info of the run
+   * @param {ReplayInfo} info of the run
    */
   show(info) {
     this.#root.hidden = false;
@@ -91,7 +95,8 @@ export class Timeline {
 
   /** Show the player's time and what it does. */
   update() {
-    const { info, t, n, k, playing, loading } = this.#player;
+    const { t, n, k, playing, loading } = this.#player;
+    const info = this.#info;
     const place = String(n);
     if (this.#slider.value !== place) {
       this.#slider.value = place;
@@ -112,20 +117,30 @@ export class Timeline {
   /**
    * Say which event has been jumped to.
    *
-   * @param {object} event of the run's info
+   * @param {ReplayMark} event of the run's info
    */
   tell(event) {
     setText(this.#told, eventText(event));
   }
 
-  /** On the slider the arrows move by scenario steps, not by its own. */
+  /** What is asked for only while a run is shown: everything is hidden before. */
+  get #info() {
+    return /** @type {ReplayInfo} */ (this.#player.info);
+  }
+
+  /**
+   * On the slider the arrows move by scenario steps, not by its own.
+   *
+   * @param {KeyboardEvent} event
+   */
   #slide(event) {
     const player = this.#player;
+    /** @type {Record<string, () => void>} */
     const moves = {
       ArrowLeft: () => player.step(-1), ArrowDown: () => player.step(-1),
       ArrowRight: () => player.step(1), ArrowUp: () => player.step(1),
       PageDown: () => player.seek(player.t - PAGE_S), PageUp: () => player.seek(player.t + PAGE_S),
-      Home: () => player.seek(player.info.start_s), End: () => player.seek(player.info.end_s),
+      Home: () => player.seek(this.#info.start_s), End: () => player.seek(this.#info.end_s),
     };
     if (Object.hasOwn(moves, event.key)) {
       event.preventDefault();
@@ -134,6 +149,7 @@ export class Timeline {
     }
   }
 
+  /** @param {KeyboardEvent} event */
   #key(event) {
     const { target } = event;
     if (this.#root.hidden || event.ctrlKey || event.metaKey || event.altKey
@@ -143,6 +159,7 @@ export class Timeline {
       return;
     }
     const player = this.#player;
+    /** @type {Record<string, () => void>} */
     const keys = {
       ',': () => player.step(-1), '.': () => player.step(1),
       ArrowLeft: () => player.step(-1), ArrowRight: () => player.step(1),
@@ -159,11 +176,18 @@ export class Timeline {
   }
 }
 
+/**
+ * @param {string} name
+ * @param {string} label
+ * @param {string} key
+ * @param {() => void} pressed
+ */
 function button(name, label, key, pressed) {
   return element('button', { type: 'button', 'data-action': name, 'aria-label': label,
     'aria-keyshortcuts': key, title: `${label} (${key})`, on: { click: pressed } }, picture(name));
 }
 
+/** @param {string} name */
 function picture(name) {
   return svg('svg', { viewBox: '0 0 24 24', 'aria-hidden': 'true' },
     svg('path', { d: ICONS[name] }));

@@ -4,6 +4,8 @@
 
 import { turn } from '../interpolation.js';
 
+/** @import { Box, Pose } from '../messages.js' */
+
 const NORTH = Math.PI / 2;
 const MIN_SCALE = 0.02;
 const MAX_SCALE = 120;
@@ -16,6 +18,8 @@ const MIDDLE = 0.5;
 // The free height shows a followed vehicle so much road [m], and more the faster it is [s].
 const FOLLOW_HEIGHT = 70;
 const FOLLOW_TIME = 2.8;
+
+/** @typedef {{x: number, y: number, scale: number, up: number, down: number}} Aim */
 
 /** Map frame (m, y up) <-> canvas (CSS pixels, y down). */
 export class Camera {
@@ -41,6 +45,7 @@ export class Camera {
   right = 0;
   top = 0;
 
+  /** @type {Aim} */
   #aim = { x: 0, y: 0, scale: 4, up: NORTH, down: MIDDLE };
   #slack = { x: 0, y: 0, scale: 0, up: 0, down: 0 };
   #updated_ms = NaN;
@@ -64,6 +69,10 @@ export class Camera {
   /**
    * Take over the canvas's size, and how much of it is covered from below [CSS px]. The map stays
    * where it is on the canvas; a vehicle that is followed moves to what is its place now.
+   *
+   * @param {number} width
+   * @param {number} height
+   * @param {number} [covered]
    */
   resize(width, height, covered = 0) {
     const [x, y] = this.toMap(this.width / 2, 0);
@@ -94,7 +103,12 @@ export class Camera {
     this.#apply();
   }
 
-  /** Show a box [xmin, ymin, xmax, ymax] of the map entirely; north up. */
+  /**
+   * Show a box [xmin, ymin, xmax, ymax] of the map entirely; north up.
+   *
+   * @param {Box} bounds
+   * @param {boolean} [animated]
+   */
   fit(bounds, animated = true) {
     const [xmin, ymin, xmax, ymax] = bounds;
     this.headingUp = false;
@@ -105,7 +119,13 @@ export class Camera {
     }, animated);
   }
 
-  /** Look at a point of the map from a driver's distance. */
+  /**
+   * Look at a point of the map from a driver's distance.
+   *
+   * @param {number} x
+   * @param {number} y
+   * @param {boolean} [animated]
+   */
   lookAt(x, y, animated = true) {
     this.#send({ x, y, down: MIDDLE, scale: this.#driverScale() }, animated);
   }
@@ -113,7 +133,7 @@ export class Camera {
   /**
    * Begin to follow a vehicle; call `track` in each frame from then on.
    *
-   * @param {{x: number, y: number, yaw: number, speed: number}} pose where it is
+   * @param {Pose} pose where it is
    * @param {boolean} headingUp whether the map turns with it
    * @param {boolean} zoomed choose the scale anew
    * @param {boolean} animated glide there
@@ -126,7 +146,13 @@ export class Camera {
     }, animated);
   }
 
-  /** Keep a followed vehicle at the anchor. */
+  /**
+   * Keep a followed vehicle at the anchor.
+   *
+   * @param {number} x
+   * @param {number} y
+   * @param {number} yaw
+   */
   track(x, y, yaw) {
     this.#aim.x = x;
     this.#aim.y = y;
@@ -135,7 +161,14 @@ export class Camera {
     }
   }
 
-  /** Zoom by a factor about a point of the canvas [px], the anchor by default. */
+  /**
+   * Zoom by a factor about a point of the canvas [px], the anchor by default.
+   *
+   * @param {number} factor
+   * @param {number} [px]
+   * @param {number} [py]
+   * @param {boolean} [animated]
+   */
   zoom(factor, px = this.anchorX, py = this.anchorY, animated = false) {
     const scale = clamp(this.#aim.scale * factor, MIN_SCALE, MAX_SCALE);
     const [x, y] = this.toMap(px, py);
@@ -145,7 +178,12 @@ export class Camera {
     }, animated);
   }
 
-  /** Move the map with the hand [px]. */
+  /**
+   * Move the map with the hand [px].
+   *
+   * @param {number} dx
+   * @param {number} dy
+   */
   pan(dx, dy) {
     const sin = Math.sin(this.up);
     const cos = Math.cos(this.up);
@@ -154,7 +192,14 @@ export class Camera {
     this.#apply();
   }
 
-  /** Turn the map about a point of the canvas, counter-clockwise on the screen [rad]. */
+  /**
+   * Turn the map about a point of the canvas, counter-clockwise on the screen [rad].
+   *
+   * @param {number} angle
+   * @param {number} [px]
+   * @param {number} [py]
+   * @param {boolean} [animated]
+   */
   rotate(angle, px = this.anchorX, py = this.anchorY, animated = false) {
     this.headingUp = false;
     const [x, y] = this.toMap(px, py);
@@ -173,17 +218,32 @@ export class Camera {
     this.#send({ up: NORTH, down: MIDDLE }, true);
   }
 
-  /** Canvas x of a point of the map [px]. */
+  /**
+   * Canvas x of a point of the map [px].
+   *
+   * @param {number} x
+   * @param {number} y
+   */
   toX(x, y) {
     return this.anchorX + this.a * (x - this.x) + this.c * (y - this.y);
   }
 
-  /** Canvas y of a point of the map [px]. */
+  /**
+   * Canvas y of a point of the map [px].
+   *
+   * @param {number} x
+   * @param {number} y
+   */
   toY(x, y) {
     return this.anchorY + this.b * (x - this.x) + this.d * (y - this.y);
   }
 
-  /** Point of the map [m] under a point of the canvas [px], in a new array. */
+  /**
+   * Point of the map [m] under a point of the canvas [px], in a new array.
+   *
+   * @param {number} px
+   * @param {number} py
+   */
   toMap(px, py) {
     const dx = (px - this.anchorX) / this.scale;
     const dy = (py - this.anchorY) / this.scale;
@@ -192,25 +252,52 @@ export class Camera {
     return [this.x + dx * sin - dy * cos, this.y - dx * cos - dy * sin];
   }
 
-  /** Whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be seen. */
+  /**
+   * Whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be seen.
+   *
+   * @param {Box} box
+   */
   seesBox(box) {
     return box[2] >= this.left && box[0] <= this.right
       && box[3] >= this.bottom && box[1] <= this.top;
   }
 
-  /** Whether something within a radius [m] of a point may be seen; false for NaN. */
+  /**
+   * Whether something within a radius [m] of a point may be seen; false for NaN.
+   *
+   * @param {number} x
+   * @param {number} y
+   * @param {number} radius
+   */
   sees(x, y, radius) {
     return x >= this.left - radius && x <= this.right + radius
       && y >= this.bottom - radius && y <= this.top + radius;
   }
 
-  /** Let a context draw in metres around a point of the map, exact wherever that is. */
+  /**
+   * Let a context draw in metres around a point of the map, exact wherever that is.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} ratio
+   * @param {number} [x]
+   * @param {number} [y]
+   */
   enterMap(context, ratio, x = this.x, y = this.y) {
     context.setTransform(ratio * this.a, ratio * this.b, ratio * this.c, ratio * this.d,
       ratio * this.toX(x, y), ratio * this.toY(x, y));
   }
 
-  /** Let a context draw in metres at a pose, x forward; enlarged, and shifted down [px]. */
+  /**
+   * Let a context draw in metres at a pose, x forward; enlarged, and shifted down [px].
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} ratio
+   * @param {number} x
+   * @param {number} y
+   * @param {number} yaw
+   * @param {number} [factor]
+   * @param {number} [down]
+   */
   enterPose(context, ratio, x, y, yaw, factor = 1, down = 0) {
     const cos = ratio * factor * Math.cos(yaw);
     const sin = ratio * factor * Math.sin(yaw);
@@ -219,6 +306,8 @@ export class Camera {
       ratio * this.toX(x, y), ratio * (this.toY(x, y) + down));
   }
 
+  /**
+   */
   #driverScale(speed = 0) {
     return Math.max(this.#free / (FOLLOW_HEIGHT + FOLLOW_TIME * speed), 2);
   }
@@ -227,6 +316,10 @@ export class Camera {
     return this.height - this.covered;
   }
 
+  /**
+   * @param {Partial<Aim>} aim
+   * @param {boolean} animated
+   */
   #send(aim, animated) {
     const before = { x: this.x, y: this.y, scale: this.scale, up: this.up, down: this.#down() };
     Object.assign(this.#aim, aim);
@@ -265,10 +358,19 @@ export class Camera {
   }
 }
 
+/**
+ * @param {number} value
+ * @param {number} low
+ * @param {number} high
+ */
 function clamp(value, low, high) {
   return Math.min(Math.max(value, low), high);
 }
 
+/**
+ * @param {number} value
+ * @param {number} negligible
+ */
 function shrink(value, negligible) {
   return Math.abs(value) < negligible ? 0 : value;
 }

@@ -8,16 +8,30 @@ const LINE_PX = 30;
 const CLICK_PX = 4;
 
 /**
+ * All in CSS pixels and rad, counter-clockwise on the screen.
+ *
+ * @typedef {object} Actions
+ * @property {(dx: number, dy: number) => void} pan
+ * @property {(factor: number, x: number, y: number) => void} zoom
+ * @property {(angle: number, x?: number, y?: number) => void} rotate
+ * @property {(x: number, y: number) => void} pick a double click
+ */
+
+/** @typedef {{x: number, y: number}} Place on the canvas [px] */
+/** @typedef {Place & {moved: number}} Hand */
+
+/**
  * Let pointers move a camera.
  *
  * @param {HTMLCanvasElement} canvas receives the pointers
- * @param {object} actions pan(dx, dy), zoom(factor, x, y), rotate(angle, x, y), pick(x, y)
- *   (a double click); all in CSS pixels and rad, counter-clockwise on the screen
+ * @param {Actions} actions
  */
 export function attachGestures(canvas, actions) {
+  /** @type {Map<number, Hand>} */
   const hands = new Map();
   let turning = false;
 
+  /** @param {MouseEvent} event */
   const place = (event) => {
     const box = canvas.getBoundingClientRect();
     return { x: event.clientX - box.left, y: event.clientY - box.top };
@@ -47,12 +61,14 @@ export function attachGestures(canvas, actions) {
         actions.pan(now.x - hand.x, now.y - hand.y);
       }
     } else if (hands.size === 2) {
-      pinch(hands, event.pointerId, now, actions);
+      const [other] = [...hands.values()].filter((item) => item !== hand);
+      pinch(hand, other, now, actions);
     }
     hand.x = now.x;
     hand.y = now.y;
   });
 
+  /** @param {PointerEvent} event */
   const leave = (event) => {
     hands.delete(event.pointerId);
     if (hands.size === 0) {
@@ -76,10 +92,13 @@ export function attachGestures(canvas, actions) {
   }, { passive: false });
 }
 
-function pinch(hands, movedId, now, actions) {
-  const [otherId] = [...hands.keys()].filter((id) => id !== movedId);
-  const other = hands.get(otherId);
-  const before = hands.get(movedId);
+/**
+ * @param {Place} before of the hand that moves
+ * @param {Place} other of the one that rests
+ * @param {Place} now
+ * @param {Actions} actions
+ */
+function pinch(before, other, now, actions) {
   const x = (now.x + other.x) / 2;
   const y = (now.y + other.y) / 2;
   actions.pan((now.x - before.x) / 2, (now.y - before.y) / 2);
@@ -91,7 +110,14 @@ function pinch(hands, movedId, now, actions) {
   }
 }
 
-/** Counter-clockwise on the screen, whose y points down. */
+/**
+ * Counter-clockwise on the screen, whose y points down.
+ *
+ * @param {number} x
+ * @param {number} y
+ * @param {Place} from
+ * @param {Place} to
+ */
 function angleAt(x, y, from, to) {
   const angle = Math.atan2(from.y - y, from.x - x) - Math.atan2(to.y - y, to.x - x);
   return Math.atan2(Math.sin(angle), Math.cos(angle));

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Things that somebody does not see: dashed outlines, and a ring around people. */
 
+/** @import { View } from './painter.js' */
+/** @import { Thing } from './vehicle_layer.js' */
+
 const FILL_ALPHA = 0.1;
 const LINE_PX = 1.8;
 const DASH_PX = [4, 3];
@@ -13,8 +16,8 @@ const RING_DASH_PX = [5, 4];
  * Draw the outline of a thing.
  *
  * @param {CanvasRenderingContext2D} context of the world
- * @param {object} view camera, palette and ratio
- * @param {object} thing with its look and color
+ * @param {Pick<View, 'camera'|'palette'|'ratio'>} view camera, palette and ratio
+ * @param {Thing} thing with its look and color
  * @param {number} x of its centre [m]
  * @param {number} y [m]
  * @param {number} yaw [rad]

@@ -4,17 +4,19 @@
 
 import { isTyping } from '../driving/focus.js';
 
+/** @import { WorldActions } from './toolbar.js' */
+
 const ZOOM_STEP = 1.25;
 const TURN_STEP = Math.PI / 12;
 
 /**
  * Let keys move the camera.
  *
- * @param {object} actions zoomBy(factor), fit(), followNext(), toggleHeading(), turnBy(angle),
- *   toggleLabels()
- * @returns {function(): void} ends it
+ * @param {WorldActions} actions
+ * @returns {() => void} ends it
  */
 export function attachKeys(actions) {
+  /** @type {Record<string, (() => void)|undefined>} */
   const bindings = {
     '+': () => actions.zoomBy(ZOOM_STEP),
     '=': () => actions.zoomBy(ZOOM_STEP),
@@ -26,6 +28,7 @@ export function attachKeys(actions) {
     e: () => actions.turnBy(-TURN_STEP),
     l: () => actions.toggleLabels(),
   };
+  /** @param {KeyboardEvent} event */
   const pressed = (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
       return;

@@ -4,27 +4,43 @@
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 
+/** @import { LiveView, View } from './painter.js' */
+/** @import { Thing, VehicleLayer } from './vehicle_layer.js' */
+
 // Objects' ids are not drawn where they would cover each other [px/m].
 const OBJECTS_FROM = 1.5;
 const FONT_REM = 0.85;
 // Labels that make room for each other: more than this are a crowd anyway.
 const MOST_PLACED = 24;
+const NEXT = /** @type {const} */ ({ vehicles: 'all', all: 'none', none: 'vehicles' });
 
 /** Ids of driven vehicles, and of objects on request. */
 export class LabelLayer {
-  /** Which ids are shown: 'none', 'vehicles' or 'all'. */
+  /**
+   * Which ids are shown.
+   *
+   * @type {'none'|'vehicles'|'all'}
+   */
   shown = 'vehicles';
+  /** @type {Map<string, number>} */
   #widths = new Map();
   #font = '';
+  /** @type {{x: number, y: number, width: number}[]} */
   #places = [];
   #placed = 0;
 
   /** Show the next of the three. */
   next() {
-    this.shown = { vehicles: 'all', all: 'none', none: 'vehicles' }[this.shown];
+    this.shown = NEXT[this.shown];
   }
 
-  /** Draw the ids over everything. */
+  /**
+   * Draw the ids over everything.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {LiveView} view
+   * @param {VehicleLayer} layer
+   */
   draw(context, view, layer) {
     if (this.shown === 'none') {
       return;
@@ -57,7 +73,14 @@ export class LabelLayer {
     }
   }
 
-  /** Move a label down until it covers no other; gives its y [px]. */
+  /**
+   * Move a label down until it covers no other; gives its y [px].
+   *
+   * @param {number} px
+   * @param {number} py
+   * @param {number} width
+   * @param {number} height
+   */
   #free(px, py, width, height) {
     let y = py;
     for (let i = 0; i < this.#placed; i += 1) {
@@ -75,6 +98,14 @@ export class LabelLayer {
     return y;
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   * @param {string} text
+   * @param {Thing} thing
+   * @param {number} x
+   * @param {number} y
+   */
   #draw(context, { camera, palette }, text, thing, x, y) {
     if (!camera.sees(x, y, thing.look.radius)) {
       return;

@@ -2,8 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The map as few large paths: lanelets near each other share them, and are culled together. */
 
+import { boxOf, outlineOf } from '../outline.js';
 import { collectBoundaries } from './boundaries.js';
 import { addDashes, addLine, addPolygon, lengthOf, poseAlong, shifted } from './polyline.js';
+
+/** @import { Box, Lanelet, Scene } from '../messages.js' */
+/** @import { Boundary } from './boundaries.js' */
 
 const CELL_M = 120;
 const ARROW_EVERY_M = 32;
@@ -12,31 +16,38 @@ const DOUBLE_LINE_M = 0.13;
 const ZEBRA_M = 0.5;
 
 /** Surfaces from the lowest to the highest, by what they are called in the palette. */
-export const SURFACES = ['walk', 'parking', 'cycle', 'road', 'junction'];
+export const SURFACES = /** @type {const} */ (['walk', 'parking', 'cycle', 'road', 'junction']);
 
+/** @type {Record<string, Surface|undefined>} */
 const SURFACE_OF_TYPE = {
   sidewalk: 'walk', crosswalk: 'junction', bicycleLane: 'cycle', parking: 'parking',
   shoulder: 'parking', border: 'parking', restricted: 'parking',
 };
 
 /**
+ * @typedef {typeof SURFACES[number]} Surface
+ * @typedef {Record<'casing'|'seams'|'lines'|'broad'|'curbs'|'arrows'|'zebras', Path2D>} Paths in
+ *   metres around (x, y)
+ * @typedef {{x: number, y: number, box: Box, surfaces: Map<Surface, Path2D>} & Paths} Chunk
+ */
+
+/**
  * Build the paths of a scene, each chunk around its own point, so that float32 suffices.
  *
- * @param {object} scene the scene document
- * @returns {object[]} chunks {x, y, box, casing, surfaces, seams, lines, broad, curbs, arrows,
- *   zebras}, paths in metres around (x, y)
+ * @param {Pick<Scene, 'lanelets'>} scene the scene document
+ * @returns {Chunk[]}
  */
 export function buildChunks(scene) {
+  /** @type {Map<string, Chunk>} */
   const chunks = new Map();
   const homes = scene.lanelets.map((lanelet) => {
     const outline = outlineOf(lanelet);
     const box = boxOf(outline);
     const key = `${Math.floor((box[0] + box[2]) / 2 / CELL_M)} `
       + `${Math.floor((box[1] + box[3]) / 2 / CELL_M)}`;
-    if (!chunks.has(key)) {
-      chunks.set(key, emptyChunk((box[0] + box[2]) / 2, (box[1] + box[3]) / 2));
-    }
-    const chunk = chunks.get(key);
+    const chunk = chunks.get(key)
+      ?? emptyChunk((box[0] + box[2]) / 2, (box[1] + box[3]) / 2);
+    chunks.set(key, chunk);
     addSurface(chunk, lanelet, outline);
     chunk.box = union(chunk.box, box);
     return chunk;
@@ -48,32 +59,19 @@ export function buildChunks(scene) {
 }
 
 /**
- * @param {number[]} points flat
- * @returns {number[]} xmin, ymin, xmax, ymax
+ * @param {Box} a
+ * @param {Box} b
+ * @returns {Box}
  */
-export function boxOf(points) {
-  const box = [Infinity, Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < points.length; i += 2) {
-    box[0] = Math.min(box[0], points[i]);
-    box[1] = Math.min(box[1], points[i + 1]);
-    box[2] = Math.max(box[2], points[i]);
-    box[3] = Math.max(box[3], points[i + 1]);
-  }
-  return box;
-}
-
-function outlineOf(lanelet) {
-  const outline = [...lanelet.left];
-  for (let i = lanelet.right.length - 2; i >= 0; i -= 2) {
-    outline.push(lanelet.right[i], lanelet.right[i + 1]);
-  }
-  return outline;
-}
-
 function union(a, b) {
   return [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])];
 }
 
+/**
+ * @param {number} x
+ * @param {number} y
+ * @returns {Chunk}
+ */
 function emptyChunk(x, y) {
   return {
     x, y, box: [Infinity, Infinity, -Infinity, -Infinity], casing: new Path2D(),
@@ -82,9 +80,14 @@ function emptyChunk(x, y) {
   };
 }
 
+/**
+ * @param {Chunk} chunk
+ * @param {Lanelet} lanelet
+ * @param {number[]} outline
+ */
 function addSurface(chunk, lanelet, outline) {
   const special = lanelet.types.find((type) => type in SURFACE_OF_TYPE);
-  const surface = SURFACE_OF_TYPE[special] ?? (lanelet.intersection ? 'junction' : 'road');
+  const surface = SURFACE_OF_TYPE[special ?? ''] ?? (lanelet.intersection ? 'junction' : 'road');
   const path = chunk.surfaces.get(surface) ?? new Path2D();
   chunk.surfaces.set(surface, path);
   addPolygon(path, outline, chunk.x, chunk.y);
@@ -96,10 +99,16 @@ function addSurface(chunk, lanelet, outline) {
   }
 }
 
-/** Stripes along the traffic that crosses, which is across the way of those who walk. */
+/**
+ * Stripes along the traffic that crosses, which is across the way of those who walk.
+ *
+ * @param {Chunk} chunk
+ * @param {Lanelet} lanelet
+ */
 function addZebra(chunk, lanelet) {
   const length = Math.min(lengthOf(lanelet.left), lengthOf(lanelet.right));
   for (let s = ZEBRA_M / 2; s + ZEBRA_M < length; s += 2 * ZEBRA_M) {
+    /** @type {[line: number[], at: number][]} */
     const corners = [[lanelet.left, s], [lanelet.left, s + ZEBRA_M],
       [lanelet.right, s + ZEBRA_M], [lanelet.right, s]];
     addPolygon(chunk.zebras, corners.flatMap(([line, at]) => {
@@ -109,6 +118,10 @@ function addZebra(chunk, lanelet) {
   }
 }
 
+/**
+ * @param {Chunk} chunk
+ * @param {number[]} center
+ */
 function addArrows(chunk, center) {
   const length = lengthOf(center);
   if (length < SHORTEST_FOR_ARROW_M) {
@@ -120,7 +133,12 @@ function addArrows(chunk, center) {
   }
 }
 
-/** A slender arrow on the lane, 3.6 m long. */
+/**
+ * A slender arrow on the lane, 3.6 m long.
+ *
+ * @param {Chunk} chunk
+ * @param {{x: number, y: number, yaw: number}} pose
+ */
 function addArrow(chunk, { x, y, yaw }) {
   const shape = [-1.8, 0.07, 0.5, 0.07, 0.5, 0.42, 1.8, 0, 0.5, -0.42, 0.5, -0.07, -1.8, -0.07];
   const cos = Math.cos(yaw);
@@ -132,6 +150,11 @@ function addArrow(chunk, { x, y, yaw }) {
   addPolygon(chunk.arrows, placed, chunk.x, chunk.y);
 }
 
+/**
+ * @param {Chunk} chunk
+ * @param {Boundary} boundary
+ * @param {Lanelet} lanelet
+ */
 function addBoundary(chunk, { line, marking, inner }, lanelet) {
   const { x, y } = chunk;
   const [left, right] = marking.split('_');
@@ -157,6 +180,11 @@ function addBoundary(chunk, { line, marking, inner }, lanelet) {
   }
 }
 
+/**
+ * @param {Chunk} chunk
+ * @param {number[]} line
+ * @param {string} style
+ */
 function addSingle(chunk, line, style) {
   if (style === 'solid') {
     addLine(chunk.lines, line, chunk.x, chunk.y);

@@ -2,8 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Ground, roads and their markings, stop lines, and the AVs' goals. */
 
-import { boxOf, buildChunks, SURFACES } from './map_geometry.js';
+import { boxOf } from '../outline.js';
+import { buildChunks, SURFACES } from './map_geometry.js';
 import { addLine, addPolygon } from './polyline.js';
+
+/** @import { Box, Scene } from '../messages.js' */
+/** @import { Chunk } from './map_geometry.js' */
+/** @import { View } from './painter.js' */
 
 // Line widths [m], and the least that they are drawn with [CSS px].
 const WIDTH = {
@@ -19,12 +24,19 @@ const ROAD_PX = 1.5;
 const GRID_PX = 90;
 const GOAL_DASH = [1.2, 0.8];
 
+/** @typedef {{x: number, y: number, box: Box, path: Path2D}} Local a path around (x, y) */
+
 /** The part of the world that stays as it is during a run. */
 export class MapLayer {
+  /** @type {Chunk[]} */
   #chunks = [];
+  /** @type {Chunk[]} */
   #visible = [];
+  /** @type {Local[]} */
   #gaps = [];
+  /** @type {Local[]} */
   #stops = [];
+  /** @type {Local[]} */
   #goals = [];
 
   /** Whether the lanes' direction arrows are shown. */
@@ -32,7 +44,7 @@ export class MapLayer {
   /** Whether the AVs' goals are shown. */
   goals = true;
 
-  /** @param {object} scene the scene document */
+  /** @param {Scene} scene the scene document */
   load(scene) {
     this.#chunks = buildChunks(scene);
     this.#stops = scene.stop_lines.map(({ points }) => local(points, addLine));
@@ -41,7 +53,12 @@ export class MapLayer {
       polygons.map((polygon) => local(polygon, addPolygon)));
   }
 
-  /** Draw everything that lies under vehicles and plans. */
+  /**
+   * Draw everything that lies under vehicles and plans.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   */
   draw(context, view) {
     this.#drawGround(context, view);
     this.#visible.length = 0;
@@ -57,7 +74,12 @@ export class MapLayer {
     this.#drawMarks(context, view);
   }
 
-  /** A faint grid, by which one sees motion where there is no road. */
+  /**
+   * A faint grid, by which one sees motion where there is no road.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   */
   #drawGround(context, { camera, palette, ratio }) {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = palette.ground;
@@ -82,7 +104,12 @@ export class MapLayer {
     context.stroke();
   }
 
-  /** Edges first and all surfaces over them: what remains is the outer edge of the road. */
+  /**
+   * Edges first and all surfaces over them: what remains is the outer edge of the road.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   */
   #drawSurfaces(context, { camera, palette, ratio }) {
     context.lineJoin = 'round';
     const kerbs = faded(camera.scale, KERBS);
@@ -121,6 +148,10 @@ export class MapLayer {
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   */
   #drawMarks(context, view) {
     const { camera, palette } = view;
     const marks = faded(camera.scale, MARKS);
@@ -147,6 +178,13 @@ export class MapLayer {
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   * @param {'seams'|'curbs'|'lines'|'broad'} name
+   * @param {string} color
+   * @param {number} alpha
+   */
   #strokeAll(context, { camera, ratio }, name, color, alpha) {
     context.globalAlpha = alpha;
     context.strokeStyle = color;
@@ -157,6 +195,13 @@ export class MapLayer {
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   * @param {'zebras'|'arrows'} name
+   * @param {string} color
+   * @param {number} alpha
+   */
   #fillAll(context, { camera, ratio }, name, color, alpha) {
     context.globalAlpha = alpha;
     context.fillStyle = color;
@@ -166,6 +211,10 @@ export class MapLayer {
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   */
   #drawGoals(context, { camera, palette, ratio }) {
     context.fillStyle = palette.av;
     context.strokeStyle = palette.av;
@@ -185,9 +234,16 @@ export class MapLayer {
   }
 }
 
+/** @type {number[]} */
 const NO_DASH = [];
 
-/** A path around the middle of its points. */
+/**
+ * A path around the middle of its points.
+ *
+ * @param {number[]} points
+ * @param {typeof addLine} add
+ * @returns {Local}
+ */
 function local(points, add) {
   const box = boxOf(points);
   const x = (box[0] + box[2]) / 2;
@@ -197,6 +253,10 @@ function local(points, add) {
   return { x, y, box, path };
 }
 
+/**
+ * @param {number} scale
+ * @param {number[]} range
+ */
 function faded(scale, [from, to]) {
   return Math.min(Math.max((scale - from) / (to - from), 0), 1);
 }

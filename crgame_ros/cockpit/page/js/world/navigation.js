@@ -2,22 +2,33 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Whom the camera follows, and what hands and keys do to it. */
 
+/** @import { Box, Pose, Scene } from '../messages.js' */
+/** @import { Camera } from './camera.js' */
+/** @import { Actions } from './gestures.js' */
+
 /** Moves the camera of a world. */
 export class Navigation {
-  /** Id of the followed vehicle or object, null while the camera is free. */
+  /**
+   * Id of the followed vehicle or object, null while the camera is free.
+   *
+   * @type {string|null}
+   */
   followed = null;
   #camera;
   #headingUp = true;
   #begun = false;
   #zoomed = true;
+  /** @type {string[]} */
   #ids = [];
+  /** @type {Box|null} */
   #bounds = null;
+  /** @type {string|null} */
   #sceneId = null;
   #changed;
 
   /**
-   * @param {import('./camera.js').Camera} camera is moved
-   * @param {function(): void} changed called after each move that was asked for
+   * @param {Camera} camera is moved
+   * @param {() => void} changed called after each move that was asked for
    */
   constructor(camera, changed) {
     this.#camera = camera;
@@ -32,7 +43,7 @@ export class Navigation {
   /**
    * Take a scene over; the view stays as it is where the map is the same as before.
    *
-   * @param {object} scene the scene document
+   * @param {Scene} scene the scene document
    * @param {boolean} follow begin with the first vehicle instead of the whole map
    */
   load(scene, follow) {
@@ -49,7 +60,12 @@ export class Navigation {
     this.#changed();
   }
 
-  /** See World.follow; a vehicle that is followed already keeps the scale. */
+  /**
+   * See World.follow; a vehicle that is followed already keeps the scale.
+   *
+   * @param {string|null} id
+   * @param {boolean} [headingUp]
+   */
   follow(id, headingUp = this.#headingUp) {
     this.#zoomed = id !== this.followed;
     this.followed = id;
@@ -61,7 +77,7 @@ export class Navigation {
   /** Follow the next of the driven vehicles. */
   followNext() {
     if (this.#ids.length > 0) {
-      this.follow(this.#ids[(this.#ids.indexOf(this.followed) + 1) % this.#ids.length]);
+      this.follow(this.#ids[(this.#ids.indexOf(this.followed ?? '') + 1) % this.#ids.length]);
     }
   }
 
@@ -71,14 +87,22 @@ export class Navigation {
     this.#zoomed = true;
   }
 
-  /** Look at a pose from near, without following. */
+  /**
+   * Look at a pose from near, without following.
+   *
+   * @param {{x: number, y: number}} pose
+   */
   lookAt({ x, y }) {
     this.followed = null;
     this.#camera.lookAt(x, y);
     this.#changed();
   }
 
-  /** Show the whole map, north up. */
+  /**
+   * Show the whole map, north up.
+   *
+   * @param {boolean} [animated]
+   */
   fit(animated = true) {
     if (this.#bounds !== null) {
       this.followed = null;
@@ -97,19 +121,31 @@ export class Navigation {
     }
   }
 
-  /** Zoom about the followed vehicle or the middle, gliding. */
+  /**
+   * Zoom about the followed vehicle or the middle, gliding.
+   *
+   * @param {number} factor
+   */
   zoomBy(factor) {
     this.#camera.zoom(factor, undefined, undefined, true);
     this.#changed();
   }
 
-  /** Turn about the followed vehicle or the middle, gliding [rad]. */
+  /**
+   * Turn about the followed vehicle or the middle, gliding [rad].
+   *
+   * @param {number} angle
+   */
   turnBy(angle) {
     this.#camera.rotate(angle, undefined, undefined, true);
     this.#changed();
   }
 
-  /** What hands do, for attachGestures. */
+  /**
+   * What hands do, for attachGestures.
+   *
+   * @returns {Omit<Actions, 'pick'>}
+   */
   get hands() {
     const camera = this.#camera;
     return {
@@ -139,7 +175,7 @@ export class Navigation {
   /**
    * Keep up with the followed vehicle.
    *
-   * @param {object|null} pose {x, y, yaw, speed} as shown, null while absent
+   * @param {Pose|null} pose {x, y, yaw, speed} as shown, null while absent
    * @param {boolean} animated glide to it at first
    */
   steer(pose, animated) {

@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** North arrow and scale bar in the upper right corner of the canvas. */
 
+/** @import { Camera } from './camera.js' */
+/** @import { View } from './painter.js' */
+/** @import { Colors } from './palette.js' */
+
 const LONGEST_BAR_REM = 6.5;
 const lengths = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000];
 const texts = lengths.map((length) => (length < 1000 ? `${length} m` : `${length / 1000} km`));
@@ -10,7 +14,7 @@ const texts = lengths.map((length) => (length < 1000 ? `${length} m` : `${length
  * Draw both.
  *
  * @param {CanvasRenderingContext2D} context of the world
- * @param {object} view camera, palette and ratio
+ * @param {Pick<View, 'camera'|'palette'|'ratio'>} view camera, palette and ratio
  */
 export function drawOverlay(context, { camera, palette, ratio }) {
   const rem = palette.rem_px;
@@ -30,6 +34,14 @@ export function drawOverlay(context, { camera, palette, ratio }) {
   drawNorth(context, camera, palette, ratio, camera.width - 2.2 * rem, 2.3 * rem);
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Colors} palette
+ * @param {number} right
+ * @param {number} y
+ * @param {number} length
+ * @param {string} text
+ */
 function drawBar(context, palette, right, y, length, text) {
   const rem = palette.rem_px;
   context.strokeStyle = palette.overlay;
@@ -47,6 +59,14 @@ function drawBar(context, palette, right, y, length, text) {
   context.fillText(text, right, y - 0.7 * rem);
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Camera} camera
+ * @param {Colors} palette
+ * @param {number} ratio
+ * @param {number} x
+ * @param {number} y
+ */
 function drawNorth(context, camera, palette, ratio, x, y) {
   const rem = palette.rem_px;
   // On the canvas, north is the direction of the matrix's second column.

@@ -10,6 +10,31 @@ import { PredictionLayer } from './prediction_layer.js';
 import { SignalLayer } from './signal_layer.js';
 import { VehicleLayer } from './vehicle_layer.js';
 
+/** @import { Scene } from '../messages.js' */
+/** @import { Shown, Store } from '../store.js' */
+/** @import { Camera } from './camera.js' */
+/** @import { Colors } from './palette.js' */
+
+/**
+ * What layers draw from.
+ *
+ * @typedef {object} View
+ * @property {Camera} camera enterMap and enterPose set a context up for metres
+ * @property {Colors} palette
+ * @property {number} ratio of device pixels to CSS pixels
+ * @property {Store} store
+ * @property {Scene|null} scene
+ * @property {Shown|null} shown
+ * @property {number} now_ms
+ */
+
+/**
+ * @typedef {View & {scene: Scene, shown: Shown}} LiveView once there is something to be seen
+ * @typedef {(context: CanvasRenderingContext2D, view: LiveView) => void} DrawLayer
+ * @typedef {'below'|'above'} Place below or above the vehicles
+ * @typedef {Map<string, {draw: DrawLayer, on: boolean}>} Layers by name
+ */
+
 /** All layers of one world. */
 export class Painter {
   map = new MapLayer();
@@ -18,16 +43,23 @@ export class Painter {
   plans = new PlanLayer();
   predictions = new PredictionLayer();
   labels = new LabelLayer();
+  /** @type {Record<Place, Layers>} */
   #extra = { below: new Map(), above: new Map() };
 
-  /** @param {object} scene the scene document */
+  /** @param {Scene} scene the scene document */
   load(scene) {
     for (const layer of [this.map, this.signals, this.vehicles]) {
       layer.load(scene);
     }
   }
 
-  /** Add a layer of somebody else's, in place of one of the same name; see World.addLayer. */
+  /**
+   * Add a layer of somebody else's, in place of one of the same name; see World.addLayer.
+   *
+   * @param {string} name
+   * @param {DrawLayer} draw
+   * @param {Place} where
+   */
   add(name, draw, where) {
     this.#extra.below.delete(name);
     this.#extra.above.delete(name);
@@ -63,24 +95,29 @@ export class Painter {
    * Paint one frame.
    *
    * @param {CanvasRenderingContext2D} context of the canvas
-   * @param {object} view camera, palette, ratio, store, scene, shown, now_ms
+   * @param {View} view camera, palette, ratio, store, scene, shown, now_ms
    */
   paint(context, view) {
     context.globalAlpha = 1;
     this.map.draw(context, view);
     if (view.scene !== null) {
+      const live = view.shown === null ? null : /** @type {LiveView} */ (view);
       this.signals.drawBars(context, view);
-      if (view.shown !== null) {
-        this.#paintMoving(context, view);
+      if (live !== null) {
+        this.#paintMoving(context, live);
       }
       this.signals.drawLamps(context, view);
-      if (view.shown !== null) {
-        this.labels.draw(context, view, this.vehicles);
+      if (live !== null) {
+        this.labels.draw(context, live, this.vehicles);
       }
     }
     drawOverlay(context, view);
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {LiveView} view
+   */
   #paintMoving(context, view) {
     paintExtra(this.#extra.below, context, view);
     this.plans.draw(context, view, this.vehicles.vehicles);
@@ -90,6 +127,11 @@ export class Painter {
   }
 }
 
+/**
+ * @param {Layers} layers
+ * @param {CanvasRenderingContext2D} context
+ * @param {LiveView} view
+ */
 function paintExtra(layers, context, view) {
   for (const { draw, on } of layers.values()) {
     if (on) {

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The colours of the theme in force, read from the style sheets' custom properties. */
 
-const NAMES = [
+const NAMES = /** @type {const} */ ([
   'human', 'av', 'recorded', 'vulnerable', 'static', 'traffic', 'scripted', 'alarm', 'accent',
   'map-ground', 'map-grid', 'map-road', 'map-junction', 'map-walk', 'map-cycle', 'map-parking',
   'map-kerb', 'map-mark', 'map-seam', 'map-arrow', 'map-stop', 'map-outline', 'map-glass',
   'map-lamp', 'map-brake', 'map-shadow', 'map-label', 'map-label-ground', 'map-overlay',
   'map-ray', 'map-estimate', 'map-occupied',
-];
+]);
 
 /**
  * Resolve a custom property to a colour that canvas and plots understand.
@@ -28,8 +28,8 @@ export function themeColor(name) {
 /**
  * Call a function whenever the theme changes: the system's, or data-theme on <html>.
  *
- * @param {function(): void} changed called after the new colours are in force
- * @returns {function(): void} ends it
+ * @param {() => void} changed called after the new colours are in force
+ * @returns {() => void} ends it
  */
 export function onThemeChange(changed) {
   const observer = new MutationObserver(changed);
@@ -42,6 +42,20 @@ export function onThemeChange(changed) {
   };
 }
 
+/**
+ * `map-label-ground` -> `labelGround`
+ *
+ * @template {string} Name
+ * @typedef {Name extends `map-${infer Rest}` ? Camel<Rest>
+ *   : Name extends `${infer Word}-${infer More}` ? `${Word}${Capitalize<Camel<More>>}`
+ *   : Name} Camel
+ */
+
+/**
+ * @typedef {Camel<typeof NAMES[number]>} ColorName
+ * @typedef {Palette & Record<ColorName, string>} Colors
+ */
+
 /** Colours by name, 'map-' left out: palette.human, palette.road, palette.labelGround, … */
 export class Palette {
   constructor() {
@@ -49,11 +63,20 @@ export class Palette {
     this.read();
   }
 
+  /**
+   * Make a palette whose colours have been read.
+   *
+   * @returns {Colors}
+   */
+  static ofTheme() {
+    return /** @type {Colors} */ (new Palette());
+  }
+
   /** Read all colours, and the root's font size. */
   read() {
     for (const name of NAMES) {
       const key = name.replace('map-', '').replace(/-(\w)/g, (_, letter) => letter.toUpperCase());
-      this[key] = themeColor(name);
+      Object.assign(this, { [key]: themeColor(name) });
     }
     this.rem_px = parseFloat(getComputedStyle(document.documentElement).fontSize);
   }

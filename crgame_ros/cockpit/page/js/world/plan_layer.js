@@ -4,6 +4,11 @@
 
 import { PLAN_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 
+/** @import { PlanFrame } from '../frames.js' */
+/** @import { FiredEvent, Scene } from '../messages.js' */
+/** @import { LiveView } from './painter.js' */
+/** @import { DrawnVehicle } from './vehicle_layer.js' */
+
 // Dots stand at whole multiples of this simulation time, so they stay where they are when a new
 // plan says the same as the one before [s].
 const DOT_EVERY_S = 0.5;
@@ -14,6 +19,7 @@ const FADED = 0.2;
 
 /** Plans of all AVs that are not hidden. */
 export class PlanLayer {
+  /** @type {Set<string>} */
   #hidden = new Set();
 
   /** Whether plans are shown at all. */
@@ -22,8 +28,8 @@ export class PlanLayer {
   /**
    * Learn from the events that have fired which AVs' plans are hidden.
    *
-   * @param {object|null} scene whose events say what each does
-   * @param {object[]} fired the events that have taken effect, in their order
+   * @param {Scene|null} scene whose events say what each does
+   * @param {FiredEvent[]} fired the events that have taken effect, in their order
    */
   takeEvents(scene, fired) {
     this.#hidden.clear();
@@ -47,7 +53,13 @@ export class PlanLayer {
     return this.on && !this.#hidden.has(id);
   }
 
-  /** Draw what of each plan is still to come. */
+  /**
+   * Draw what of each plan is still to come.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {LiveView} view
+   * @param {DrawnVehicle[]} vehicles
+   */
   draw(context, view, vehicles) {
     if (!this.on) {
       return;
@@ -60,6 +72,12 @@ export class PlanLayer {
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {LiveView} view
+   * @param {PlanFrame} plan
+   * @param {DrawnVehicle} vehicle
+   */
   #drawPlan(context, view, plan, vehicle) {
     const { shown, palette, camera, ratio } = view;
     const { points } = plan;
@@ -90,7 +108,12 @@ export class PlanLayer {
   }
 }
 
-/** Index of the first value of the first point after a time [s]. */
+/**
+ * Index of the first value of the first point after a time [s].
+ *
+ * @param {PlanFrame} plan
+ * @param {number} now_t
+ */
 function firstAfter({ t, points }, now_t) {
   let i = 0;
   while (i < points.length && t + points[i + 4] <= now_t) {
@@ -99,7 +122,17 @@ function firstAfter({ t, points }, now_t) {
   return i;
 }
 
-/** From the vehicle's rear axle as it is, along the plan, to where its front will be. */
+/**
+ * From the vehicle's rear axle as it is, along the plan, to where its front will be.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Float64Array} points
+ * @param {number} first
+ * @param {number} x
+ * @param {number} y
+ * @param {number} yaw
+ * @param {DrawnVehicle} vehicle
+ */
 function addBand(context, points, first, x, y, yaw, { shape, rear_to_center: ahead }) {
   const half = shape.width / 2;
   const last = points.length - PLAN_WIDTH;
@@ -124,6 +157,14 @@ function addBand(context, points, first, x, y, yaw, { shape, rear_to_center: ahe
   context.closePath();
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {LiveView} view
+ * @param {PlanFrame} plan
+ * @param {number} first
+ * @param {number} x
+ * @param {number} y
+ */
 function drawDots(context, { camera, shown }, { t, points }, first, x, y) {
   const radius = Math.min(Math.max(DOT_M, DOT_PX[0] / camera.scale), DOT_PX[1] / camera.scale);
   const horizon = t + points[points.length - 1] - shown.t;

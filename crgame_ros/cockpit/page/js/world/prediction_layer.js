@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What the planners are told about the future of others: lines that end in an outline. */
 
+/** @import { LiveView, View } from './painter.js' */
+/** @import { Thing, VehicleLayer } from './vehicle_layer.js' */
+
 const STRIDE = 3;
 const LINE_ALPHA = 0.65;
 const END_ALPHA = 0.8;
@@ -11,7 +14,13 @@ export class PredictionLayer {
   /** Whether predictions are shown. */
   on = false;
 
-  /** Draw what of each prediction is still to come. */
+  /**
+   * Draw what of each prediction is still to come.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {LiveView} view
+   * @param {VehicleLayer} layer
+   */
   draw(context, view, layer) {
     if (!this.on) {
       return;
@@ -33,6 +42,13 @@ export class PredictionLayer {
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {View} view
+ * @param {Thing} thing
+ * @param {Float64Array} points
+ * @param {number} first
+ */
 function drawEntry(context, { camera, ratio, palette }, thing, points, first) {
   const last = points.length - STRIDE;
   const x = points[first];

@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What is drawn, kept: the store refills its own arrays for whoever asks next. */
 
+/** @import { Shown } from '../store.js' */
+
 /**
  * Copy what is to be seen into what was seen before.
  *
- * @param {object|null} kept of the frame before, refilled; null makes a new one
- * @param {object|null} shown as Store.displayed gives it
- * @returns {object|null} {t, n, k, epoch, vehicles, objects}
+ * @param {Shown|null} kept of the frame before, refilled; null makes a new one
+ * @param {Shown|null} shown as Store.displayed gives it
+ * @returns {Shown|null} {t, n, k, epoch, vehicles, objects}
  */
 export function keepShown(kept, shown) {
   if (shown === null) {
@@ -21,6 +23,10 @@ export function keepShown(kept, shown) {
   });
 }
 
+/**
+ * @param {Float64Array} target
+ * @param {Float64Array} values
+ */
 function copied(target, values) {
   const result = target.length === values.length ? target : new Float64Array(values.length);
   result.set(values);

@@ -2,11 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Traffic lights: the lamps in their housing, and the state across the end of each lane. */
 
+/** @import { Light, Scene } from '../messages.js' */
+/** @import { View } from './painter.js' */
+
+/** @type {Record<string, string[]|undefined>} */
 const LIT = { red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'] };
 // Lamps tell by their place too, for those who don't tell red from green.
 const LAMPS = [['red', '#ff4b3e'], ['yellow', '#ffc933'], ['green', '#19c37d']];
 const OFF = '#3a3f47';
 const HOUSING = '#14171b';
+/** @type {Record<string, string|undefined>} */
 const BAR_COLOR = { red: '#ff4b3e', redYellow: '#ff8f2e', yellow: '#ffc933', green: '#19c37d' };
 const BAR_M = 0.35;
 const LONGEST_BAR_M = 15;
@@ -16,18 +21,25 @@ const HIDDEN_BELOW = 1.2;
 
 /** The lights of the scene and their states. */
 export class SignalLayer {
+  /** @type {(Light & {ends: number[][]})[]} */
   #lights = [];
 
-  /** @param {object} scene the scene document */
+  /** @param {Scene} scene the scene document */
   load(scene) {
     const lanelets = new Map(scene.lanelets.map((lanelet) => [lanelet.id, lanelet]));
     this.#lights = scene.lights.map((light) => ({
-      ...light, ends: light.lanelets.map((id) => lanelets.get(id)).filter(Boolean).map(
-        ({ left, right }) => [...left.slice(-2), ...right.slice(-2)]),
+      ...light, ends: light.lanelets.map((id) => lanelets.get(id))
+        .filter((lanelet) => lanelet !== undefined)
+        .map(({ left, right }) => [...left.slice(-2), ...right.slice(-2)]),
     }));
   }
 
-  /** Draw the bars on the road, which vehicles cover. */
+  /**
+   * Draw the bars on the road, which vehicles cover.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   */
   drawBars(context, { camera, ratio, store }) {
     context.lineWidth = Math.max(BAR_M, 2 / camera.scale);
     for (const light of this.#lights) {
@@ -48,7 +60,12 @@ export class SignalLayer {
     }
   }
 
-  /** Draw the housings, over everything on the road. */
+  /**
+   * Draw the housings, over everything on the road.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {View} view
+   */
   drawLamps(context, { camera, palette, ratio, store }) {
     if (camera.scale < HIDDEN_BELOW) {
       return;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The world's buttons: zoom, fit, follow, heading up, layers. */
 
-const SVG = 'http://www.w3.org/2000/svg';
+import { element, svg } from '../dom.js';
 
 // Strokes in a square of 24.
 const ICONS = {
@@ -17,24 +17,38 @@ const ICONS = {
 };
 
 /**
+ * What keys and buttons do.
+ *
+ * @typedef {object} WorldActions
+ * @property {(factor: number) => void} zoomBy
+ * @property {(angle: number) => void} turnBy [rad]
+ * @property {() => void} fit
+ * @property {() => void} followNext
+ * @property {() => void} recenter
+ * @property {() => void} toggleHeading
+ * @property {() => void} togglePlans
+ * @property {() => void} togglePredictions
+ * @property {() => void} toggleLabels
+ */
+
+/**
+ * @typedef {{followed: string|null, headingUp: boolean, plans: boolean, predictions: boolean,
+ *   labels: boolean}} ToolbarState
+ */
+
+/**
  * Put the buttons on the world.
  *
  * @param {HTMLElement} root the element that holds the canvas
- * @param {object} actions zoomBy, fit, followNext, recenter, toggleHeading, togglePlans,
- *   togglePredictions, toggleLabels
- * @returns {{update: function(object): void}} update shows {followed, headingUp, plans,
- *   predictions, labels}
+ * @param {WorldActions} actions
+ * @returns {{update: (state: ToolbarState) => void}} update shows the state
  */
 export function createToolbar(root, actions) {
-  const bar = document.createElement('div');
-  bar.className = 'world-toolbar';
-  bar.setAttribute('role', 'toolbar');
-  bar.setAttribute('aria-label', 'View');
+  const bar = element('div', { class: 'world-toolbar', role: 'toolbar', 'aria-label': 'View' });
   const group = () => {
-    const element = document.createElement('div');
-    element.className = 'world-group';
-    bar.append(element);
-    return element;
+    const node = element('div', { class: 'world-group' });
+    bar.append(node);
+    return node;
   };
   const view = group();
   toolButton(view, ICONS.plus, 'Zoom in (+)', () => actions.zoomBy(1.4));
@@ -43,11 +57,8 @@ export function createToolbar(root, actions) {
   const camera = group();
   const follow = toolButton(camera, ICONS.follow, 'Follow the next vehicle (F)',
     actions.followNext);
-  const name = document.createElement('button');
-  name.type = 'button';
-  name.className = 'followed';
-  name.title = 'Centre on the followed vehicle';
-  name.addEventListener('click', actions.recenter);
+  const name = element('button', { type: 'button', class: 'followed',
+    title: 'Centre on the followed vehicle', on: { click: () => actions.recenter() } });
   camera.append(name);
   const heading = toolButton(camera, ICONS.heading, 'Heading or north up (H)',
     actions.toggleHeading);
@@ -76,40 +87,32 @@ export function createToolbar(root, actions) {
  * @param {HTMLElement} root group that gets it
  * @param {string} strokes SVG path of its picture in a square of 24
  * @param {string} title what it does
- * @param {function(): void} action called by a click
+ * @param {() => void} action called by a click
  * @returns {HTMLButtonElement}
  */
 export function toolButton(root, strokes, title, action) {
-  const element = document.createElement('button');
-  element.type = 'button';
-  element.title = title;
-  element.setAttribute('aria-label', title);
-  const svg = document.createElementNS(SVG, 'svg');
-  svg.setAttribute('viewBox', '0 0 24 24');
-  const path = document.createElementNS(SVG, 'path');
-  path.setAttribute('d', strokes);
-  for (const [key, value] of Object.entries({
-    fill: 'none', stroke: 'currentColor', 'stroke-width': '2', 'stroke-linecap': 'round',
-    'stroke-linejoin': 'round' })) {
-    path.setAttribute(key, value);
-  }
-  svg.append(path);
-  element.append(svg);
-  // The keyboard stays with the world: a button that kept it would take the space bar.
-  element.addEventListener('click', () => {
-    action();
-    element.blur();
-  });
-  root.append(element);
-  return element;
+  const button = element('button', {
+    type: 'button', title, 'aria-label': title, on: {
+      click: () => {
+        action();
+        // The keyboard stays with the world: a button that kept it would take the space bar.
+        button.blur();
+      },
+    },
+  }, svg('svg', { viewBox: '0 0 24 24' }, svg('path', {
+    d: strokes, fill: 'none', stroke: 'currentColor', 'stroke-width': 2,
+    'stroke-linecap': 'round', 'stroke-linejoin': 'round',
+  })));
+  root.append(button);
+  return button;
 }
 
 /**
  * Show whether what a button switches is on.
  *
- * @param {HTMLElement} element the button
+ * @param {HTMLElement} button
  * @param {boolean} pressed whether it is
  */
-export function press(element, pressed) {
-  element.setAttribute('aria-pressed', String(pressed));
+export function press(button, pressed) {
+  button.setAttribute('aria-pressed', String(pressed));
 }

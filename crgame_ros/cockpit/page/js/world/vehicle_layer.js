@@ -6,8 +6,16 @@ import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { drawOutline } from './hollow.js';
 import { lookOf, TYRE } from './vehicle_shape.js';
 
+/** @import { ObjectsFrame } from '../frames.js' */
+/** @import { Pose, Scene, SceneObject, SceneVehicle } from '../messages.js' */
+/** @import { Shown } from '../store.js' */
+/** @import { LiveView, View } from './painter.js' */
+/** @import { ColorName } from './palette.js' */
+/** @import { Look } from './vehicle_shape.js' */
+
 // Far out, things stay this long on the screen [px]: driven vehicles, people
 // on foot or bicycles, and all others.
+/** @type {Record<string, number>} */
 const LEAST_PX = { driven: 15, vulnerable: 14, other: 6 };
 // Below this length on the screen a thing is its body only [px].
 const DETAIL_PX = 13;
@@ -18,17 +26,32 @@ const STANDING = 0.1;
 const TYRE_INSET_M = 0.2;
 const SHADOW_PX = 2;
 
+/**
+ * @typedef {{look: Look, color: ColorName}} Appearance
+ * @typedef {SceneVehicle & Appearance} DrawnVehicle
+ * @typedef {SceneObject & Appearance} DrawnObject
+ * @typedef {Appearance & {id: string, rear_to_center?: number}} Thing either of them
+ * @typedef {(view: LiveView) => Uint8Array|null} ChooseHollow
+ */
+
 /** Everything that has a pose. */
 export class VehicleLayer {
-  /** In the order of STATE and OBJECTS: {id, look, color, radius, …}. */
+  // In the order of STATE and OBJECTS.
+  /** @type {DrawnVehicle[]} */
   vehicles = [];
+  /** @type {DrawnObject[]} */
   objects = [];
-  /** Chooses in each frame what is drawn hollow; see World.drawHollow. */
+  /**
+   * Chooses in each frame what is drawn hollow; see World.drawHollow.
+   *
+   * @type {ChooseHollow}
+   */
   hollow = () => null;
   #braking = new Uint8Array(0);
+  /** @type {Pick<ObjectsFrame, 'k'|'t'|'objects'>|null} */
   #lastStep = null;
 
-  /** @param {object} scene the scene document */
+  /** @param {Scene} scene the scene document */
   load(scene) {
     this.vehicles = scene.vehicles.map((vehicle) => ({
       ...vehicle, look: lookOf('car', vehicle.shape, true),
@@ -45,7 +68,7 @@ export class VehicleLayer {
   /**
    * Learn from a scenario step which objects slow down.
    *
-   * @param {{k: number, t: number, objects: Float64Array}} step as the store got it
+   * @param {Pick<ObjectsFrame, 'k'|'t'|'objects'>} step as the store got it
    */
   takeStep(step) {
     const last = this.#lastStep;
@@ -64,8 +87,8 @@ export class VehicleLayer {
    * Give the pose of the centre of a driven vehicle or an object in the frame shown last.
    *
    * @param {string} id of it
-   * @param {object} shown as Store.displayed gives it
-   * @returns {{x: number, y: number, yaw: number, speed: number}|null} null while it is absent
+   * @param {Shown} shown as Store.displayed gives it
+   * @returns {Pose|null} null while it is absent
    */
   poseOf(id, shown) {
     const index = this.vehicles.findIndex((vehicle) => vehicle.id === id);
@@ -83,6 +106,9 @@ export class VehicleLayer {
   /**
    * Find what is at a point of the canvas.
    *
+   * @param {number} px
+   * @param {number} py
+   * @param {LiveView} view
    * @returns {string|null} the id of the nearest within a finger's reach
    */
   pick(px, py, { camera, shown }) {
@@ -101,7 +127,12 @@ export class VehicleLayer {
     return best;
   }
 
-  /** Draw objects, then the driven vehicles over them. */
+  /**
+   * Draw objects, then the driven vehicles over them.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {LiveView} view
+   */
   draw(context, view) {
     const { camera, shown } = view;
     const hollow = this.hollow(view);
@@ -125,6 +156,12 @@ export class VehicleLayer {
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {LiveView} view
+   * @param {number} index
+   * @param {boolean} hollow
+   */
   #drawVehicle(context, view, index, hollow) {
     const { camera, shown, ratio, palette, store } = view;
     const vehicle = this.vehicles[index];
@@ -153,6 +190,16 @@ export class VehicleLayer {
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {View} view
+ * @param {Thing} thing
+ * @param {number} x
+ * @param {number} y
+ * @param {number} yaw
+ * @param {boolean} braking
+ * @param {number} leastPx
+ */
 function drawLook(context, { camera, palette, ratio }, thing, x, y, yaw, braking, leastPx) {
   const { look } = thing;
   const factor = Math.max(1, leastPx / (look.extent * camera.scale));
@@ -187,7 +234,17 @@ function drawLook(context, { camera, palette, ratio }, thing, x, y, yaw, braking
   return factor;
 }
 
-/** The front wheels, turned by the steering angle. */
+/**
+ * The front wheels, turned by the steering angle.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {View} view
+ * @param {DrawnVehicle} vehicle
+ * @param {number} x
+ * @param {number} y
+ * @param {number} yaw
+ * @param {number} steering
+ */
 function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, steering) {
   const aside = vehicle.shape.width / 2 - TYRE_INSET_M;
   context.fillStyle = palette.outline;
@@ -203,6 +260,10 @@ function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, stee
   }
 }
 
+/**
+ * @param {Float64Array} rows
+ * @param {number} row
+ */
 function brakes(rows, row) {
   const pedal = rows[row + VEHICLE.brake];
   if (!Number.isNaN(pedal)) {
@@ -213,6 +274,12 @@ function brakes(rows, row) {
     && Math.abs(speed) > STANDING;
 }
 
+/**
+ * @param {SceneVehicle} vehicle
+ * @param {Float64Array} rows
+ * @param {number} index
+ * @returns {Pose|null}
+ */
 function centerOf({ rear_to_center: ahead }, rows, index) {
   const row = index * VEHICLE_WIDTH;
   const yaw = rows[row + VEHICLE.yaw];
@@ -223,13 +290,21 @@ function centerOf({ rear_to_center: ahead }, rows, index) {
     } : null;
 }
 
+/**
+ * @param {Float64Array} rows
+ * @param {number} index
+ */
 function speedOf(rows, index) {
   return Math.hypot(rows[index * OBJECT_WIDTH + 3], rows[index * OBJECT_WIDTH + 4]);
 }
 
+/**
+ * @param {SceneObject} object
+ * @returns {ColorName}
+ */
 function colorOf({ type, role }) {
   if (type === 'pedestrian' || type === 'bicycle') {
     return 'vulnerable';
   }
-  return ['traffic', 'scripted', 'static'].includes(role) ? role : 'recorded';
+  return role === 'traffic' || role === 'scripted' || role === 'static' ? role : 'recorded';
 }

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What things look like from above: paths in metres around the centre, x forward. */
 
+/** @import { Shape } from '../messages.js' */
+
 /**
  * @typedef {object} Look
  * @property {Path2D} body filled in the colour of its role
@@ -13,6 +15,8 @@
  * @property {number} radius of the circle around it [m]
  */
 
+/** @typedef {Omit<Look, 'extent'|'radius'>} Parts */
+
 const LONG_VEHICLES = new Set(['truck', 'bus', 'train']);
 const TWO_WHEELS = new Set(['bicycle', 'motorcycle']);
 const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknown']);
@@ -21,7 +25,7 @@ const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknow
  * Build the look of a vehicle or obstacle.
  *
  * @param {string} type CommonRoad obstacle type
- * @param {{kind: string, length: number, width: number, vertices: number[]}} shape
+ * @param {Shape} shape
  * @param {boolean} moves whether it has a front
  * @returns {Look} paths around the shape's centre
  */
@@ -48,6 +52,11 @@ export function lookOf(type, shape, moves) {
 /** A tyre seen from above, around its own centre. */
 export const TYRE = boxes([[-0.33, -0.12, 0.66, 0.24]], 0.08);
 
+/**
+ * @param {number} length
+ * @param {number} width
+ * @returns {Parts}
+ */
 function car(length, width) {
   const l = length / 2;
   const w = width / 2;
@@ -77,6 +86,10 @@ function car(length, width) {
   return { body, glass, roof, ...lamps(l, w) };
 }
 
+/**
+ * @param {number} l
+ * @param {number} w
+ */
 function lamps(l, w) {
   return {
     lamps: boxes([[l - 0.34, 0.5 * w, 0.2, 0.34 * w], [l - 0.34, -0.84 * w, 0.2, 0.34 * w]], 0.06),
@@ -84,6 +97,12 @@ function lamps(l, w) {
   };
 }
 
+/**
+ * @param {number} length
+ * @param {number} width
+ * @param {boolean} isTruck
+ * @returns {Parts}
+ */
 function longVehicle(length, width, isTruck) {
   const l = length / 2;
   const w = width / 2;
@@ -96,6 +115,11 @@ function longVehicle(length, width, isTruck) {
   return { body, glass, roof: null, ...lamps(l, w) };
 }
 
+/**
+ * @param {number} length
+ * @param {number} width
+ * @returns {Parts}
+ */
 function twoWheeler(length, width) {
   const l = length / 2;
   const w = Math.max(width / 2, 0.2);
@@ -112,6 +136,11 @@ function twoWheeler(length, width) {
   };
 }
 
+/**
+ * @param {number} length
+ * @param {number} width
+ * @returns {Parts}
+ */
 function pedestrian(length, width) {
   const body = new Path2D();
   body.ellipse(0, 0, length / 2, width / 2, 0, 0, 2 * Math.PI);
@@ -123,6 +152,11 @@ function pedestrian(length, width) {
   return { body, glass: head, roof: null, lamps: null, brakes: null };
 }
 
+/**
+ * @param {Shape} shape
+ * @param {boolean} moves
+ * @returns {Parts}
+ */
 function block({ kind, length, width, vertices }, moves) {
   const body = new Path2D();
   if (kind === 'circle') {
@@ -147,6 +181,10 @@ function block({ kind, length, width, vertices }, moves) {
   return { body, glass: nose, roof: null, lamps: null, brakes: null };
 }
 
+/**
+ * @param {number[][]} list
+ * @param {number} radius
+ */
 function boxes(list, radius) {
   const path = new Path2D();
   for (const [x, y, length, width] of list) {

@@ -11,15 +11,35 @@ import { onThemeChange, Palette } from './palette.js';
 import { keepShown } from './shown.js';
 import { createToolbar } from './toolbar.js';
 
+/** @import { Connection } from '../connection.js' */
+/** @import { Pose, Scene } from '../messages.js' */
+/** @import { Shown, Store } from '../store.js' */
+/** @import { DrawLayer, LiveView, Place, View } from './painter.js' */
+/** @import { WorldActions } from './toolbar.js' */
+/** @import { ChooseHollow, DrawnVehicle } from './vehicle_layer.js' */
+
 const FRAMES_KEPT = 600;
-const REDRAWN_ON = ['state', 'objects', 'plan', 'prediction', 'perception', 'signals', 'status',
-  'seats', 'events', 'epoch', 'hello'];
+const REDRAWN_ON = /** @type {const} */ (['state', 'objects', 'plan', 'prediction', 'perception',
+  'signals', 'status', 'seats', 'events', 'epoch', 'hello']);
+
+/**
+ * @typedef {object} Options
+ * @property {Connection|null} [connection] told which layers are wanted
+ * @property {boolean} [keys] whether it has them
+ * @property {boolean} [toolbar] whether it has one
+ * @property {boolean} [follow] begin with the first vehicle instead of the whole map
+ * @property {HTMLElement|null} [covered] an element that lies over the lower edge
+ */
 
 /** One canvas that shows what a store holds. */
 export class World {
   /** Script time of the last frames [ms], a ring: frame i is at i % its length. */
   stats = { frames: 0, frame_ms: new Float32Array(FRAMES_KEPT) };
-  /** {t, n, k, epoch, vehicles, objects} exactly as drawn last; null before. */
+  /**
+   * Exactly as drawn last; null before.
+   *
+   * @type {Shown|null}
+   */
   shown = null;
   camera = new Camera();
 
@@ -27,24 +47,28 @@ export class World {
   #context;
   #store;
   #connection;
-  #palette = new Palette();
+  #palette = Palette.ofTheme();
   #painter = new Painter();
   #navigation = new Navigation(this.camera, () => this.#changed());
+  /** @type {ReturnType<typeof createToolbar>|null} */
   #toolbar = null;
   #follow;
   #dirty = true;
+  /** @type {View} */
   #view;
+  /** @type {(() => void)[]} */
   #ends = [];
   #frame = 0;
 
   /**
    * @param {HTMLCanvasElement} canvas its parent gets the toolbar
-   * @param {import('../store.js').Store} store what is shown
-   * @param {object} options as createWorld takes them
+   * @param {Store} store what is shown
+   * @param {Options} options
    */
   constructor(canvas, store, options) {
     this.#canvas = canvas;
-    this.#context = canvas.getContext('2d', { alpha: false });
+    this.#context = /** @type {CanvasRenderingContext2D} */ (
+      canvas.getContext('2d', { alpha: false }));
     this.#store = store;
     this.#connection = options.connection ?? null;
     this.#follow = options.follow ?? true;
@@ -75,13 +99,17 @@ export class World {
 
   /**
    * @param {number} index of a driven vehicle
-   * @returns {object|undefined} its scene entry with its look and color, undefined for none
+   * @returns {DrawnVehicle|undefined} undefined for none
    */
   vehicle(index) {
     return this.#painter.vehicles.vehicles[index];
   }
 
-  /** Show a vehicle or object in the middle, without following it. */
+  /**
+   * Show a vehicle or object in the middle, without following it.
+   *
+   * @param {string|null} id
+   */
   centerOn(id) {
     const pose = this.#poseOf(id);
     if (pose !== null) {
@@ -114,10 +142,8 @@ export class World {
    * Add a layer of one's own.
    *
    * @param {string} name by which setLayer knows it
-   * @param {function(CanvasRenderingContext2D, object): void} draw called in each frame with the
-   *   context and {camera, palette, ratio, store, scene, shown, now_ms}; camera.enterMap and
-   *   enterPose set the context up for metres
-   * @param {'below'|'above'} [where] below or above the vehicles
+   * @param {DrawLayer} draw called in each frame
+   * @param {Place} [where]
    */
   addLayer(name, draw, where = 'below') {
     this.#painter.add(name, draw, where);
@@ -127,8 +153,8 @@ export class World {
   /**
    * Let a function choose what is drawn as an outline only.
    *
-   * @param {function(object): Uint8Array|null} choose called in each frame with what layers get;
-   *   gives 1 for each vehicle, then object, that is to be hollow, null for none
+   * @param {ChooseHollow} choose called in each frame with what layers get; gives 1 for each
+   *   vehicle, then object, that is to be hollow, null for none
    */
   drawHollow(choose) {
     this.#painter.vehicles.hollow = choose;
@@ -146,9 +172,11 @@ export class World {
     this.#ends.forEach((end) => end());
   }
 
+  /** @param {Options} options */
   #attachHands({ keys = true, toolbar = true }) {
     const navigation = this.#navigation;
     const { plans, predictions, labels } = this.#painter;
+    /** @type {WorldActions} */
     const actions = {
       zoomBy: (factor) => navigation.zoomBy(factor),
       turnBy: (angle) => navigation.turnBy(angle),
@@ -167,7 +195,7 @@ export class World {
       ...navigation.hands,
       pick: (x, y) => {
         const id = this.shown === null ? null
-          : this.#painter.vehicles.pick(x, y, this.#view);
+          : this.#painter.vehicles.pick(x, y, /** @type {LiveView} */ (this.#view));
         if (id !== null) {
           navigation.follow(id);
         }
@@ -176,12 +204,13 @@ export class World {
     if (keys) {
       this.#ends.push(attachKeys(actions));
     }
-    if (toolbar) {
+    if (toolbar && this.#canvas.parentElement !== null) {
       this.#toolbar = createToolbar(this.#canvas.parentElement, actions);
     }
     this.#changed();
   }
 
+  /** @param {HTMLElement|null} covered */
   #attachSizes(covered) {
     this.#ends.push(onThemeChange(() => {
       this.#palette.read();
@@ -209,6 +238,7 @@ export class World {
       ...REDRAWN_ON.map((name) => store.on(name, () => this.redraw())));
   }
 
+  /** @param {HTMLElement|null} covered */
   #resize(covered) {
     const { clientWidth: width, clientHeight: height } = this.#canvas;
     const ratio = window.devicePixelRatio || 1;
@@ -229,6 +259,7 @@ export class World {
     this.#draw(performance.now());
   }
 
+  /** @param {Scene} scene */
   #load(scene) {
     this.#painter.load(scene);
     this.#view.scene = scene;
@@ -249,16 +280,22 @@ export class World {
     this.#connection?.send({ type: 'layers', predictions: this.#painter.predictions.on });
   }
 
+  /**
+   * @param {string|null} id
+   * @returns {Pose|null}
+   */
   #poseOf(id) {
     return id === null || this.shown === null ? null
       : this.#painter.vehicles.poseOf(id, this.shown);
   }
 
+  /** @param {number} now_ms */
   #animate(now_ms) {
     this.#frame = requestAnimationFrame((next_ms) => this.#animate(next_ms));
     this.#draw(now_ms);
   }
 
+  /** @param {number} now_ms */
   #draw(now_ms) {
     const begin_ms = performance.now();
     const shown = this.#store.displayed(now_ms);
@@ -282,10 +319,8 @@ export class World {
  * Show a store's world on a canvas.
  *
  * @param {HTMLCanvasElement} canvas fills its parent
- * @param {import('../store.js').Store} store what is shown
- * @param {object} [options] connection: told which layers are wanted; keys, toolbar: whether it
- *   has them; follow: begin with the first vehicle instead of the whole map; covered: an element
- *   that lies over the lower edge
+ * @param {Store} store what is shown
+ * @param {Options} [options]
  * @returns {World} draws from now on
  */
 export function createWorld(canvas, store, options = {}) {

@@ -1,0 +1,90 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Queues behind junctions that leave no room for who waits before them.
+
+Nobody enters a junction that it cannot leave: whoever stands behind it, without a length and
+`GAP` between its rear and the last crossing, explains who is first before it. Of several ways on
+the one counts that was taken later; of who never got on, any.
+"""
+
+from judge.history import FloatArray, History, IntArray
+from judge.roads import JudgedRoads
+import shapely
+
+GAP = 4.0
+# Whoever's centre is nearer to the way that was taken stood on it [m].
+ON_WAY = 1.5
+# So far ahead one looks [m]: over the junction and a length behind it.
+REACH = 70.0
+
+
+class Spillback:
+    """
+    Who at a time leaves no room behind a junction.
+
+    :param here: columns of those who stand, those who are no agents included.
+    """
+
+    def __init__(self, history: History, roads: JudgedRoads, row: int, here: IntArray) -> None:
+        self._history, self._roads, self._row = history, roads, row
+        self._lane = dict(zip(here.tolist(), roads.lanes_at(
+            history.poses[row, here]).tolist(), strict=True))
+        self._on: dict[int, list[tuple[float, int]]] = {}
+        for column, lane in self._lane.items():
+            if lane >= 0:
+                self._on.setdefault(lane, []).append(
+                    (self._s(lane, history.poses[row, column]), column))
+
+    def _s(self, lane: int, pose: FloatArray) -> float:
+        return float(self._roads.lanes[lane].line.project(shapely.Point(pose[:2])))
+
+    def _driven(self, agent: int) -> shapely.LineString:
+        """Give the way that an agent took from now on."""
+        row, born = self._row, self._history.born[:, agent]
+        places = self._history.poses[row::5, agent, :2][born[row::5] == born[row]]
+        return shapely.LineString(places if len(places) > 1 else places[[0, 0]])
+
+    def before(self, agent: int) -> int:
+        """Find who leaves an agent that stands no room behind the junction before it, or -1."""
+        lane = self._lane.get(agent, -1)
+        if lane < 0:
+            return -1
+        history, roads = self._history, self._roads
+        driven = self._driven(agent)
+        start = -self._s(lane, history.poses[self._row, agent]) - 0.5 * history.length[agent]
+        ways, seen = [(lane, start, start if roads.crossed[lane] else -REACH)], {lane}
+        while ways:
+            lane, offset, crossed = ways.pop()
+            end = offset + float(roads.lanes[lane].s[-1])
+            ahead = [(offset + s - 0.5 * history.length[other], other)
+                     for s, other in self._on.get(lane, [])
+                     if other != agent and offset + s > 0.0
+                     and (driven.length < offset + s or driven.distance(
+                         shapely.Point(history.poses[self._row, other, :2])) < ON_WAY)]
+            if ahead:
+                rear, other = min(ahead)
+                # On the crossing itself there is no room behind it at all.
+                room = -REACH if roads.crossed[lane] else rear - crossed
+                if crossed > -REACH and room < history.length[agent] + GAP:
+                    return other
+                continue
+            crossed = end if roads.crossed[lane] else crossed
+            following = [i for i in roads.successors[lane] if i not in seen]
+            if end < REACH:
+                seen.update(following)
+                ways += [(i, end, 0.0 if crossed == -REACH and roads.crossed[i] else crossed)
+                         for i in following]
+        return -1

@@ -1,0 +1,178 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The messages of a run as frames of the page: the same live and out of a recording."""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from crgame_ros.cockpit import frames
+from crgame_ros.cockpit.perception_frames import estimate_frame, occupancy_frame, Place, scan_frame
+from crgame_ros.cockpit.sensor_mounts import SensorMounts
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import GameDocument
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.messages.cdr import stamp_of
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.joints import vehicle_joint_names, vehicles_from_joints
+from crgame_ros.messages.request_layout import RequestLayout
+from crgame_ros.messages.world_messages import WorldMessages
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
+import numpy as np
+from numpy.typing import NDArray
+
+# Of a plan or a prediction: more would hold up everything else.
+MAX_POINTS = 1000
+
+FloatArray = NDArray[np.float64]
+
+
+class Frame(NamedTuple):
+    """A frame, and the slot of which a page needs but the newest."""
+
+    slot: str
+    data: bytes
+
+
+class MessageFrames:
+    """
+    Turns the messages of one run into frames.
+
+    Whatever somebody sends in another form than the contract's raises InputError, for the caller
+    to tell or to count.
+
+    :param game: of the run.
+    :param descriptions: of everything that can appear.
+    :ivar columns: of everything that can appear, by id; driven vehicles first.
+    :ivar mounts: of the AVs' sensors, and where the vehicles have been.
+    """
+
+    def __init__(self, game: GameDocument, descriptions: Iterable[ObjectDescription]) -> None:
+        self._game = game
+        self._world = WorldMessages(descriptions)
+        self.columns = {name: column for column, name in enumerate(
+            (*self._world.vehicles, *self._world.objects))}
+        self._transforms = {av.id: av.transform for av in game.avs}
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget where the vehicles have been: another part of the run comes next."""
+        self.mounts = SensorMounts(self._game.avs, self.columns, self._game.scheduler.dt_s)
+
+    def place(self, n: int) -> Place:
+        """Give where in the run a simulation step is."""
+        scheduler = self._game.scheduler
+        return Place(self._game.epoch, n, scheduler.k(n), n * scheduler.dt_s)
+
+    def place_of(self, message: Any) -> Place | None:
+        """Give where a message with a stamp belongs; None if it is of an earlier run."""
+        n = self._game.scheduler.step_of_stamp(stamp_of(message))
+        return None if n < 0 else self.place(n)
+
+    def states(self, message: Any) -> FloatArray:
+        """Give (V, 8) states of the vehicles, and remember them for scans."""
+        states = self._world.vehicle_states(message)
+        self.mounts.add_states(self._game.scheduler.step_of_stamp(stamp_of(message)), states)
+        return states
+
+    def state(self, place: Place, states: FloatArray, commands: FloatArray | None) -> Frame:
+        """
+        Make the frame of states (V, 8).
+
+        :param commands: (V, 4) consumed; None where they are not known.
+        """
+        return Frame('state', frames.encode_state(*place, state_rows(states, commands)))
+
+    def objects(self, place: Place, message: Any) -> Frame:
+        """Make the frame of `/traffic/objects`."""
+        objects = self._world.object_states(message)
+        return Frame('objects', frames.encode_objects(
+            *place, np.concatenate((objects.poses, objects.velocities), axis=1)))
+
+    def plan(self, place: Place, av: str, message: Any) -> Frame:
+        """Make the frame of an AV's plan."""
+        where = f'/{av}/plan'
+        series = from_joint_trajectory(_short(message, where), where)
+        if series.names != vehicle_joint_names(av):
+            raise InputError('names other joints', where,
+                             'name ' + ', '.join(vehicle_joint_names(av)))
+        states = vehicles_from_joints(series.positions, series.velocities, series.accelerations)
+        rows = np.column_stack((states[:, :StateColumn.SPEED + 1], 1e-9 * series.times_ns))
+        rows[:, :3] = self._transforms[av].to_simulation(rows[:, :3])
+        column = self.columns[av]
+        return Frame(f'plan:{column}', frames.encode_plan(*place, column, rows))
+
+    def seen(self, place: Place, av: str, message: Any) -> Frame | None:
+        """Make the frame of whom a request names at its first point; None without perception."""
+        if av not in self.mounts.avs:
+            return None
+        layout = RequestLayout.of(message.joint_names, av)
+        first = np.asarray(_short(message, layout.where).points[0].positions)
+        if len(first) != len(message.joint_names):
+            raise InputError('its first point does not give every joint', layout.where)
+        layout = layout.among(self.columns)
+        column = self.columns[av]
+        here = np.flatnonzero(np.isfinite(first[layout.columns[:, 0]])).tolist()
+        seen = sorted((column, *(self.columns[layout.ids[number]] for number in here)))
+        return Frame(f'seen:{column}', frames.encode_seen(*place, column, seen))
+
+    def prediction(self, place: Place, av: str, message: Any) -> Frame:
+        """Make the frame of what a request says of others' future: of those who are there."""
+        where = f'/{av}/plan_request'
+        series = from_joint_trajectory(_short(message, where), where)
+        layout = RequestLayout.of(series.names, av).among(self.columns)
+        futures = self._transforms[av].to_simulation(
+            series.positions[:, layout.columns].swapaxes(0, 1))
+        present = np.flatnonzero(np.isfinite(futures[:, 0, 0]))
+        columns = [self.columns[layout.ids[number]] for number in present.tolist()]
+        column = self.columns[av]
+        return Frame(f'prediction:{column}', frames.encode_prediction(
+            *place, column, columns, futures[present]))
+
+    def estimate(self, place: Place, av: str, message: Any) -> Frame:
+        """Make the frame of where an AV takes itself to be."""
+        column = self.columns[av]
+        return Frame(f'estimate:{column}', estimate_frame(place, column, message))
+
+    def scan(self, place: Place, av: str, message: Any) -> Frame | None:
+        """Make the frame of a scan; None for a sensor that the AV has not or that was nowhere."""
+        scan = scan_frame(place, message, self.mounts, self.columns)
+        if scan is None or scan.av != av:
+            return None
+        return Frame(f'scan:{scan.column}:{scan.sensor}', scan.frame)
+
+    def occupancy(self, place: Place, message: Any) -> Frame:
+        """Make the frame of the map of permanent obstacles, which holds from a place on."""
+        return Frame('occupancy', occupancy_frame(place, message))
+
+
+def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:
+    """
+    Give the rows (V, 12) of a frame of states (V, 8).
+
+    :param commands: (V, 4) consumed; None where they are not known.
+    """
+    rows = np.full((len(states), frames.STATE_COLUMNS), np.nan)
+    rows[:, :STATE_WIDTH] = states
+    if commands is not None:
+        rows[:, STATE_WIDTH:] = commands
+    return rows
+
+
+def _short(message: Any, where: str) -> Any:
+    """Refuse a plan or request without points, or with more than there is time for."""
+    if not 0 < len(message.points) <= MAX_POINTS:
+        raise InputError(f'has {len(message.points)} points', where,
+                         f'give 1 to {MAX_POINTS}')
+    return message

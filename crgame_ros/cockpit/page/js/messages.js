@@ -1,0 +1,333 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * What the page and its server say to each other in JSON, as types: nothing here runs.
+ *
+ * The other ends are crgame_ros/cockpit/scene.py, run_status.py, seat_table.py, run_files.py,
+ * library.py, replay_backend.py and, of what the page sends, page_messages.py. The binary frames
+ * are in frames.js. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
+ *
+ * @typedef {[xmin: number, ymin: number, xmax: number, ymax: number]} Box [m]
+ * @typedef {{x: number, y: number, yaw: number, speed: number}} Pose [m, rad, m/s]
+ */
+
+export {};
+
+/**
+ * @typedef {object} Shape
+ * @property {'rectangle'|'circle'|'polygon'} kind
+ * @property {number} length [m]
+ * @property {number} width [m]
+ * @property {number[]} vertices of a polygon, flat
+ */
+
+/**
+ * @typedef {object} Lanelet
+ * @property {number} id
+ * @property {number[]} left bound
+ * @property {number[]} right bound
+ * @property {number[]} center line
+ * @property {string[]} types CommonRoad's
+ * @property {string} left_line marking of the bound, as CommonRoad calls it
+ * @property {string} right_line
+ * @property {boolean} one_way
+ * @property {number|null} speed_limit [m/s]
+ * @property {boolean} intersection
+ * @property {number|null} adj_left id of the neighbour
+ * @property {boolean} adj_left_same whether it leads the same way
+ * @property {number|null} adj_right
+ * @property {boolean} adj_right_same
+ * @property {number[]} successors
+ */
+
+/** @typedef {{id: number, x: number, y: number, yaw: number, lanelets: number[]}} Light */
+
+/**
+ * @typedef {object} SceneVehicle
+ * @property {string} id
+ * @property {'human'|'autonomous'} role
+ * @property {Shape} shape
+ * @property {number} rear_to_center [m]
+ * @property {number} wheelbase [m]
+ * @property {number} max_steering_angle [rad]
+ * @property {{localisation: boolean, sensors: string[], range: number|null}|null} perception
+ *   range [m], null for no limit
+ */
+
+/** @typedef {'recorded'|'static'|'traffic'|'scripted'} ObjectRole */
+/** @typedef {{id: string, type: string, role: ObjectRole, shape: Shape}} SceneObject */
+
+/**
+ * What an event of the game does, by its kind.
+ *
+ * @typedef {{kind: 'release', object: string}} ReleaseAction
+ * @typedef {{kind: 'brake', object: string, deceleration: number, speed: number}} BrakeAction
+ * @typedef {{kind: 'obstacle', x: number, y: number, length: number, width: number,
+ *   type: string}} ObstacleAction
+ * @typedef {{kind: 'speed_limit', speed: number, lanelets: number[]}} SpeedLimitAction
+ * @typedef {{kind: 'plan_display', av: string, show: boolean}} PlanDisplayAction
+ * @typedef {{kind: 'planner', av: string, planner: string}} PlannerAction
+ * @typedef {{kind: 'planner_run', av: string, run: boolean}} PlannerRunAction
+ * @typedef {ReleaseAction|BrakeAction|ObstacleAction|SpeedLimitAction|TrafficAction
+ *   |PlanDisplayAction|PlannerAction|PlannerRunAction} EventAction
+ */
+
+/**
+ * @typedef {object} TrafficAction
+ * @property {'traffic'} kind
+ * @property {string} agent id, or all
+ * @property {Record<string, unknown>} [options]
+ * @property {number} [speed_factor]
+ * @property {number} [desired_speed] [m/s]
+ * @property {number} [politeness]
+ * @property {boolean} [lane_changes]
+ * @property {number} [reaction_time] [s]
+ * @property {number} [imperfection]
+ * @property {boolean} [red_runner]
+ * @property {boolean} [late_yielder]
+ */
+
+/**
+ * @typedef {{time: number}|{step: number}|{between: [string, string], distance: number}
+ *   |{vehicle: string, x: number, y: number, radius: number}} EventCondition
+ * @typedef {{name: string, label: string, when: EventCondition|null} & EventAction} GameEvent
+ */
+
+/**
+ * @typedef {object} SceneTime
+ * @property {number} epoch counts resets
+ * @property {number} dt_s
+ * @property {number} dt_c_s of a scenario step
+ * @property {number} k0
+ * @property {number} clock_offset_s
+ * @property {number|null} duration_s
+ */
+
+/**
+ * @typedef {object} Scene all that stays as it is during a run
+ * @property {string} id
+ * @property {string} benchmark_id
+ * @property {string} title
+ * @property {Box} bounds
+ * @property {Lanelet[]} lanelets
+ * @property {number[][]} gaps slits between lanelets, for display alone
+ * @property {{points: number[], lanelet: number}[]} stop_lines
+ * @property {Light[]} lights
+ * @property {{x: number, y: number, kind: string, value: string}[]} signs
+ * @property {SceneVehicle[]} vehicles
+ * @property {SceneObject[]} objects
+ * @property {{av: string, polygons: number[][]}[]} goals
+ * @property {SceneTime} time
+ * @property {Record<string, string>} drivers
+ * @property {Record<string, string>} planners
+ * @property {boolean} occupancy whether there is a map of permanent obstacles
+ * @property {GameEvent[]} events
+ * @property {number} [again] counts how often a recording was played
+ */
+
+/** @typedef {{client: string, name: string}} Person */
+
+/**
+ * @typedef {object} Seat
+ * @property {string} source whose commands the vehicle obeys
+ * @property {string} driver the source that the game names
+ * @property {string|null} holder id of a client
+ * @property {string|null} holder_name
+ * @property {Person[]} [requests] who asks for it
+ * @property {Person[]} [others] who could get it
+ * @property {boolean} [lost] whether nothing comes from its driver
+ */
+
+/** @typedef {{name: string, n: number, k: number, by: string}} FiredEvent */
+
+/**
+ * @typedef {object} Alarm
+ * @property {string} id
+ * @property {string} kind
+ * @property {string} subject
+ * @property {string} text
+ * @property {number} [since_t] [s]
+ */
+
+/** @typedef {'waiting'|'running'|'paused'|'ended'} RunState */
+
+/**
+ * @typedef {object} Recording
+ * @property {'none'|'recording'|'recorded'|'failed'|'unknown'} state
+ * @property {number} [messages]
+ * @property {number} [megabytes]
+ * @property {string} [text]
+ */
+
+/**
+ * @typedef {object} PlannerStatus
+ * @property {boolean} running
+ * @property {boolean} stale
+ * @property {number|null} latency_ms
+ * @property {number|null} age_ms
+ * @property {number} accepted
+ * @property {number} refused
+ * @property {number|null} plan_time_ms
+ * @property {number|null} fallbacks
+ * @property {string} planner
+ * @property {string} last_refusal
+ * @property {Record<string, number|null>|null} tracking
+ */
+
+/**
+ * Figures of the time-sync supervisor by key; in timing.json some are nested.
+ *
+ * @typedef {Record<string, number|boolean|null|undefined|Record<string, number|null>>} Timing
+ */
+
+/** @typedef {{vehicle: string, with: string, t: number}} Contact */
+/** @typedef {{vehicle: string, with: string, side: string, avoidable_by: string}} NamedContact */
+
+/**
+ * @typedef {object} Status
+ * @property {RunState} run
+ * @property {string} [reason] why it ended
+ * @property {boolean} [stays] whether the program goes on after the run
+ * @property {string[]} [awaited] seats without a driver
+ * @property {Contact[]} [contacts]
+ * @property {{vehicle: string, t: number}[]} [departures]
+ * @property {number} real_time_factor
+ * @property {number|null} measured_factor
+ * @property {Recording} recording
+ * @property {Timing|null} timing
+ * @property {Record<string, PlannerStatus>} planners
+ * @property {Record<string, {collision: boolean, off_road: boolean, hit: string[]}>} drivability
+ * @property {Record<string, boolean>} seats_lost
+ * @property {boolean} frames_skipped
+ * @property {number} t [s]
+ * @property {number} n
+ * @property {number} k
+ * @property {number} epoch
+ * @property {number} clients
+ */
+
+/**
+ * @typedef {object} Files
+ * @property {number} epoch
+ * @property {string} folder
+ * @property {string[]} names
+ * @property {boolean} complete
+ * @property {NamedContact[]} contacts
+ */
+
+/** @typedef {'info'|'warn'|'error'} NoticeLevel */
+
+/**
+ * What the server sends and the store takes in.
+ *
+ * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
+ *   version: string}} HelloMessage
+ * @typedef {{type: 'scene'} & Scene} SceneMessage
+ * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
+ * @typedef {{type: 'signals', k: number, states: Record<string, string>}} SignalsMessage
+ * @typedef {{type: 'events', fired: FiredEvent[]}} EventsMessage
+ * @typedef {{type: 'alarms', active: Alarm[]}} AlarmsMessage
+ * @typedef {{type: 'status'} & Status} StatusMessage
+ * @typedef {{type: 'files'} & Files} FilesMessage
+ * @typedef {{type: 'notice', level: NoticeLevel, text: string}} NoticeMessage
+ * @typedef {HelloMessage|SceneMessage|SeatsMessage|SignalsMessage|EventsMessage|AlarmsMessage
+ *   |StatusMessage|FilesMessage|NoticeMessage} StoreMessage
+ */
+
+/**
+ * What the server answers to one page.
+ *
+ * @typedef {{ok: boolean, text: string}} Reply
+ * @typedef {{type: 'reply', to: number} & Reply} ReplyMessage
+ * @typedef {{type: 'pong', t: number}} PongMessage
+ * @typedef {StoreMessage|ReplyMessage|PongMessage} ServerMessage
+ */
+
+/**
+ * What the page sends.
+ *
+ * @typedef {{away: true}|{keys: number[], reverse: number}
+ *   |{axes: number[], reverse: number}} Hands
+ * @typedef {'start'|'pause'|'step'|'reset'|'stop'} RunAction
+ * @typedef {{type: 'input', seat: string} & Hands} InputMessage
+ * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
+ *   scans?: boolean}} LayersMessage
+ * @typedef {InputMessage|LayersMessage|{type: 'name', name: string}
+ *   |{type: 'ping', t: number}} TellingMessage
+ * @typedef {{type: 'claim'|'release'|'ask', seat: string}
+ *   |{type: 'hand_over', seat: string, to: string}|{type: 'control', action: RunAction}
+ *   |{type: 'rate', factor: number}|{type: 'planner', av: string, run: boolean}
+ *   |{type: 'trigger', event: string}} RequestMessage
+ * @typedef {TellingMessage|(RequestMessage & {id: number})} PageMessage
+ */
+
+/**
+ * What /api/scenarios, /api/preview and /api/load speak of.
+ *
+ * @typedef {{id: string, kind: 'game'|'scenario'|'upload', name: string, title: string}} Entry
+ * @typedef {{folders: {name: string, entries: Entry[]}[], planners: string[],
+ *   drivers: string[]}} Offer
+ * @typedef {{id: string, planner: string, planning_problem: number|null}} PreviewAv
+ * @typedef {object} Preview
+ * @property {Scene} scene
+ * @property {{vehicles: (number|null)[][], objects: (number|null)[][]}} states rows, as in frames
+ * @property {{id: string, driver: string}[]} humans
+ * @property {PreviewAv[]} avs
+ * @property {string[]} notices
+ */
+
+/**
+ * @typedef {object} Choice
+ * @property {string} id of an entry
+ * @property {{id: string, driver: string}[]} humans
+ * @property {{id: string, planner: string}[]} avs
+ */
+
+/**
+ * A mark on the time line of a recording.
+ *
+ * @typedef {{t: number, until_t: number, n: number, k: number, kind: string, subject: string,
+ *   text: string, count: number}} ReplayMark
+ */
+
+/**
+ * Documents of a recorded run over time: from which time [s] on which content holds.
+ *
+ * @template Content
+ * @typedef {[t: number, content: Content][]} Track
+ */
+
+/**
+ * @typedef {object} ReplayTracks
+ * @property {Track<Omit<SignalsMessage, 'type'>>} [signals]
+ * @property {Track<Omit<EventsMessage, 'type'>>} [events]
+ * @property {Track<Omit<SeatsMessage, 'type'>>} [seats]
+ * @property {Track<Omit<AlarmsMessage, 'type'>>} [alarms]
+ * @property {Track<Status['timing']>} [timing]
+ * @property {Track<Status['planners']>} [planners]
+ * @property {Track<Status['drivability']>} [drivability]
+ * @property {Track<Status['seats_lost']>} [seats_lost]
+ * @property {Track<boolean>} [frames_skipped]
+ */
+
+/**
+ * @typedef {object} ReplayInfo what /api/replay/info says of a run
+ * @property {number} epoch
+ * @property {number[]} epochs of the recording
+ * @property {string} recording
+ * @property {number} start_s
+ * @property {number} end_s
+ * @property {number} duration_s
+ * @property {number} first_n
+ * @property {number} last_n
+ * @property {number} k0
+ * @property {number} dt_s
+ * @property {number} steps_per_tick
+ * @property {number} chunk_s
+ * @property {number} chunks
+ * @property {number} real_time_factor
+ * @property {ReplayMark[]} events
+ * @property {ReplayTracks} documents
+ * @property {string[]} notices
+ * @property {Scene} scene
+ */

@@ -1,0 +1,220 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The messages of the page: JSON of strangers in, checked mappings or one clear error out."""
+
+from collections.abc import Callable, Mapping
+import json
+import math
+import re
+from typing import Any
+import unicodedata
+
+from crgame_ros.errors import InputError
+
+MAX_BYTES = 64 * 1024
+MAX_NAME = 40
+MAX_EVENT = 100
+REAL_TIME_FACTORS = (0.1, 10.0)
+ACTIONS = ('start', 'pause', 'step', 'reset', 'stop')
+# Rounding of a calibrated axis in the page.
+_AXIS_TOLERANCE = 1e-3
+_MAX_ID = 2 ** 53
+
+_VEHICLE = re.compile(r'(hv|av)[0-9]{1,3}')
+_AV = re.compile(r'av[0-9]{1,3}')
+_CLIENT = re.compile(r'c[0-9]{1,9}')
+# Control and format characters, surrogates, private use, unassigned, line and paragraph breaks:
+# they hide or reorder what others read. Angle brackets and ampersands are for mark-up only.
+_HIDDEN = frozenset({'Cc', 'Cf', 'Cs', 'Co', 'Cn', 'Zl', 'Zp'})
+_MARKUP = frozenset('<>&')
+
+
+def parse_message(text: str) -> dict[str, Any]:
+    """
+    Check a message of a client.
+
+    :param text: one JSON object of at most `MAX_BYTES`.
+    :return: its `type`, the fields of that type, and `id` where the type has a reply; numbers
+        are finite and in range, pedals and axes floats, flags booleans. Other fields are left out.
+    :raises InputError: if it is anything else.
+    """
+    try:
+        message = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise _wrong('message', 'is no JSON') from error
+    if not isinstance(message, dict):
+        raise _wrong('message', 'is no JSON object')
+    kind = message.get('type')
+    reader = _READERS.get(kind) if isinstance(kind, str) else None
+    if reader is None:
+        raise _wrong('type', 'is unknown')
+    return {'type': kind, **reader(message)}
+
+
+def clean_text(text: str, length: int) -> str:
+    """
+    Make a stranger's text fit to be shown to others: one line without hidden characters, mark-up.
+
+    :param length: most characters that are kept.
+    """
+    kept = ''.join(
+        ' ' if character.isspace() else character for character in text[:16 * length]
+        if character.isspace() or not (character in _MARKUP
+                                       or unicodedata.category(character) in _HIDDEN))
+    return ' '.join(kept.split())[:length].strip()
+
+
+def _input(message: Mapping[str, Any]) -> dict[str, Any]:
+    seat = _matching(message, 'seat', _VEHICLE)
+    given = [key for key in ('keys', 'axes', 'away') if key in message]
+    if len(given) != 1:
+        raise _wrong('input', 'needs one of keys, axes and away')
+    if given == ['away']:
+        if _flag(message, 'away') is not True:
+            raise _wrong('away', 'is not true')
+        return {'seat': seat, 'away': True}
+    reverse = _flag(message, 'reverse') if 'reverse' in message else False
+    if given == ['keys']:
+        keys = _list(message, 'keys', 4)
+        return {'seat': seat, 'keys': [_as_flag(key, 'keys') for key in keys],
+                'reverse': reverse}
+    axes = _list(message, 'axes', 3)
+    lows = (0.0, 0.0, -1.0)
+    return {'seat': seat, 'reverse': reverse,
+            'axes': [_axis(axis, low) for axis, low in zip(axes, lows, strict=True)]}
+
+
+def _seat(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {'seat': _matching(message, 'seat', _VEHICLE), 'id': _id(message)}
+
+
+def _hand_over(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {**_seat(message), 'to': _matching(message, 'to', _CLIENT)}
+
+
+def _control(message: Mapping[str, Any]) -> dict[str, Any]:
+    action = message.get('action')
+    if action not in ACTIONS:
+        raise _wrong('action', f'is none of {", ".join(ACTIONS)}')
+    return {'action': action, 'id': _id(message)}
+
+
+def _rate(message: Mapping[str, Any]) -> dict[str, Any]:
+    low, high = REAL_TIME_FACTORS
+    factor = _number(message.get('factor'), 'factor')
+    if not low <= factor <= high:
+        raise _wrong('factor', f'is not from {low:g} to {high:g}')
+    return {'factor': factor, 'id': _id(message)}
+
+
+def _planner(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {'av': _matching(message, 'av', _AV), 'run': _flag(message, 'run'),
+            'id': _id(message)}
+
+
+def _trigger(message: Mapping[str, Any]) -> dict[str, Any]:
+    event = message.get('event')
+    if not isinstance(event, str) or not 0 < len(event) <= MAX_EVENT:
+        raise _wrong('event', f'is no text of 1 to {MAX_EVENT} characters')
+    return {'event': event, 'id': _id(message)}
+
+
+def _name(message: Mapping[str, Any]) -> dict[str, Any]:
+    name = message.get('name')
+    cleaned = clean_text(name, MAX_NAME) if isinstance(name, str) else ''
+    if not cleaned:
+        raise _wrong('name', 'has no visible characters')
+    return {'name': cleaned}
+
+
+def _layers(message: Mapping[str, Any]) -> dict[str, Any]:
+    """Read those of the layers that are named: the others stay as they are."""
+    named: dict[str, Any] = {
+        field: _flag(message, field) for field in ('predictions', 'scans') if field in message}
+    if 'perception' in message:
+        named['perception'] = '' if message['perception'] == '' \
+            else _matching(message, 'perception', _AV)
+    if not named:
+        raise _wrong('layers', 'names none of predictions, perception and scans')
+    return named
+
+
+def _ping(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {'t': _number(message.get('t'), 't')}
+
+
+_READERS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
+    'input': _input, 'claim': _seat, 'release': _seat, 'ask': _seat, 'hand_over': _hand_over,
+    'control': _control, 'rate': _rate, 'planner': _planner, 'trigger': _trigger,
+    'name': _name, 'layers': _layers, 'ping': _ping}
+
+
+def _id(message: Mapping[str, Any]) -> int:
+    value = message.get('id')
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _MAX_ID:
+        raise _wrong('id', 'is no whole number')
+    return value
+
+
+def _matching(message: Mapping[str, Any], field: str, pattern: re.Pattern[str]) -> str:
+    value = message.get(field)
+    if not isinstance(value, str) or pattern.fullmatch(value) is None:
+        raise _wrong(field, 'names nobody')
+    return value
+
+
+def _number(value: Any, field: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise _wrong(field, 'is no number')
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise _wrong(field, 'is no finite number')
+    return number
+
+
+def _axis(value: Any, low: float) -> float:
+    number = _number(value, 'axes')
+    if not low - _AXIS_TOLERANCE <= number <= 1.0 + _AXIS_TOLERANCE:
+        raise _wrong('axes', f'holds a value outside {low:g} to 1')
+    return min(max(number, low), 1.0)
+
+
+def _flag(message: Mapping[str, Any], field: str) -> bool:
+    return _as_flag(message.get(field), field)
+
+
+def _as_flag(value: Any, field: str) -> bool:
+    if isinstance(value, int) and value in (0, 1):
+        return bool(value)
+    raise _wrong(field, 'is no 0 or 1')
+
+
+def _list(message: Mapping[str, Any], field: str, length: int) -> list[Any]:
+    values = message.get(field)
+    if not isinstance(values, list) or len(values) != length:
+        raise _wrong(field, f'is no list of {length}')
+    return values
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(name)
+
+
+def _wrong(field: str, what: str) -> InputError:
+    # What was sent is not repeated: it may be long, and others may read the log.
+    return InputError(what, field)

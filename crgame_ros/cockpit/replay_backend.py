@@ -1,0 +1,303 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A recording behind the page: what happened in it, and its frames in chunks."""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+import json
+from pathlib import Path
+from typing import Any, Literal, TYPE_CHECKING
+
+from aiohttp import web
+from crgame_ros.cockpit.replay_chunks import ChunkBuilder
+from crgame_ros.cockpit.replay_index import index_run, RunIndex
+from crgame_ros.cockpit.replay_marks import Mark
+from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.errors import CrgameError
+from crgame_ros.recording.epochs import epoch_numbers, read_epoch
+from crgame_ros.recording.metadata import METADATA_FILE
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.scenario.loading import parse_scenario
+
+if TYPE_CHECKING:
+    from crgame_ros.cockpit.client import Client
+    from crgame_ros.cockpit.hub import Hub
+
+Progress = Callable[[float], None]
+
+# Each holds 5 s: what two people who look at different places need, and no more.
+CHUNKS_KEPT = 8
+RUNS_KEPT = 2
+_MOST_DIGITS = 9
+
+
+class Replay:
+    """
+    One run of a recording; not to be used by two threads at once.
+
+    :param reader: the recording.
+    :param epoch: which run.
+    :param progress: told which share of the recording has been gone through, 0 to 1.
+    :raises InputError: if the recording lacks what describes the run, or its states.
+    """
+
+    def __init__(self, reader: BagReader, epoch: int, progress: Progress | None = None) -> None:
+        self._reader = reader
+        self.index: RunIndex = index_run(reader, read_epoch(reader, epoch), progress)
+        self.builder = ChunkBuilder(reader, self.index)
+        run = self.index.run
+        loaded = parse_scenario(run.xml_text, f'{reader.path}, /scenario/xml')
+        self.scene = scene_document(loaded, run.descriptions, run.game)
+        self._chunks: OrderedDict[int, bytes] = OrderedDict()
+
+    @property
+    def chunks_held(self) -> int:
+        """Count the chunks in memory, at most `CHUNKS_KEPT`."""
+        return len(self._chunks)
+
+    def chunk(self, number: int) -> bytes:
+        """
+        Give a chunk, built anew unless it was asked for lately.
+
+        :raises InputError: if there is no such chunk, or the recording is damaged in it.
+        """
+        if number not in self._chunks:
+            data = self.builder.build(number)
+            while len(self._chunks) >= CHUNKS_KEPT:
+                self._chunks.popitem(last=False)
+            self._chunks[number] = data
+        self._chunks.move_to_end(number)
+        return self._chunks[number]
+
+    def info(self) -> dict[str, Any]:
+        """Describe the run: its times, its marks and its documents over time."""
+        scheduler = self.index.run.game.scheduler
+        first, last = self.index.first_n, self.index.last_n
+        dt_s = scheduler.dt_s
+        return {
+            'epoch': self.index.run.game.epoch,
+            'start_s': first * dt_s, 'end_s': last * dt_s, 'duration_s': (last - first) * dt_s,
+            'first_n': first, 'last_n': last, 'k0': scheduler.k0, 'dt_s': dt_s,
+            'steps_per_tick': scheduler.steps_per_tick,
+            'chunk_s': self.builder.chunk_s, 'chunks': self.builder.count,
+            'real_time_factor': self.index.run.game.real_time_factor,
+            'events': [_event(mark, dt_s, self.index) for mark in self.index.tracks.marks],
+            'documents': {kind: [[n * dt_s, content] for n, content in track]
+                          for kind, track in self.index.tracks.documents.items()},
+            'notices': list(self._reader.notices), 'scene': self.scene}
+
+
+def _event(mark: Mark, dt_s: float, index: RunIndex) -> dict[str, Any]:
+    # A violation can be told of a step whose state was lost at the end: shown at the nearest.
+    n = min(max(mark.n, index.first_n), index.last_n)
+    return {'t': n * dt_s, 'until_t': min(max(mark.last_n, n), index.last_n) * dt_s, 'n': n,
+            'k': index.run.game.scheduler.k(n), 'kind': mark.kind, 'subject': mark.subject,
+            'text': mark.text, 'count': mark.count}
+
+
+class ReplayBackend:
+    """
+    Shows a recording; everything that reads it happens in one thread beside the server's.
+
+    :param path: a recording (as for `BagReader`), or the folder of a run that holds it in `bag`.
+    :param epoch: the run that is shown first, None for the last of the recording.
+    :param progress: told which share of the recording has been gone through, 0 to 1.
+    :raises InputError: if it is no recording, or lacks what describes the run, or its states.
+    """
+
+    mode: Literal['live', 'replay'] = 'replay'
+
+    def __init__(self, path: Path, epoch: int | None = None,
+                 progress: Progress | None = None) -> None:
+        self.path = _recording_in(path)
+        self._progress = progress
+        # SQLite and the chunks in memory belong to one thread.
+        self._thread = ThreadPoolExecutor(1, 'replay')
+        self._runs: OrderedDict[int, Replay] = OrderedDict()
+        try:
+            self._reader, self.epochs = self._thread.submit(self._open).result()
+            self.epoch = self.epochs[-1] if epoch is None else epoch
+            self._thread.submit(self._run, self.epoch).result()
+        except BaseException:
+            self._thread.shutdown()
+            raise
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Say what is wrong with the recording although it can be shown."""
+        return self._reader.notices
+
+    def close(self) -> None:
+        """Close the recording, after what is being read."""
+        self._thread.submit(self._reader.close)
+        self._thread.shutdown()
+
+    def _open(self) -> tuple[BagReader, tuple[int, ...]]:
+        reader = BagReader(self.path)
+        return reader, epoch_numbers(reader)
+
+    def _run(self, epoch: int) -> Replay:
+        if epoch not in self._runs:
+            replay = Replay(self._reader, epoch, self._progress)
+            while len(self._runs) >= RUNS_KEPT:
+                self._runs.popitem(last=False)
+            self._runs[epoch] = replay
+        self._runs.move_to_end(epoch)
+        return self._runs[epoch]
+
+    def info(self, epoch: int | None = None) -> dict[str, Any]:
+        """
+        Describe a run; waits until it has been read.
+
+        :param epoch: which, None for the one that is shown first.
+        :raises InputError: if it is not in the recording or cannot be read.
+        """
+        return self._thread.submit(self._info, epoch).result()
+
+    def chunk(self, number: int, epoch: int | None = None) -> bytes:
+        """
+        Give frames, each after its length in bytes; waits until they have been read.
+
+        :param number: which chunk, from 0.
+        :raises InputError: if there is no such chunk or epoch, or the recording is damaged there.
+        """
+        return self._thread.submit(self._chunk, number, epoch).result()
+
+    def _info(self, epoch: int | None) -> dict[str, Any]:
+        replay = self._run(self.epoch if epoch is None else epoch)
+        return {**replay.info(), 'epochs': list(self.epochs), 'recording': self.path.name}
+
+    def _chunk(self, number: int, epoch: int | None) -> bytes:
+        return self._run(self.epoch if epoch is None else epoch).chunk(number)
+
+    def outline(self, epoch: int | None = None) -> bytes:
+        """Give thinned-out STATE frames of the whole run, each after its length in bytes."""
+        return self._thread.submit(self._outline, epoch).result()
+
+    def _outline(self, epoch: int | None) -> bytes:
+        return self._run(self.epoch if epoch is None else epoch).index.outline.encoded()
+
+    def routes(self) -> list[web.RouteDef]:
+        """Give what the server is to answer besides the page."""
+        return [web.get('/api/replay/info', self._answer_info),
+                web.get('/api/replay/chunk', self._answer_chunk),
+                web.get('/api/replay/outline', self._answer_outline)]
+
+    async def _answer_info(self, request: web.Request) -> web.Response:
+        content = await self._read(self._info, self._asked_epoch(request))
+        # A string, compressed: an hour's documents are some megabytes of repetitions.
+        response = web.Response(text=json.dumps(content, separators=(',', ':')),
+                                content_type='application/json')
+        response.enable_compression()
+        return response
+
+    async def _answer_chunk(self, request: web.Request) -> web.Response:
+        epoch = self._asked_epoch(request)
+        number = _whole_number(request.query.get('i'))
+        if number is None:
+            raise _missing('there is no such chunk')
+        return web.Response(body=await self._read(self._chunk, number, epoch),
+                            content_type='application/octet-stream')
+
+    async def _answer_outline(self, request: web.Request) -> web.Response:
+        data = await self._read(self._outline, self._asked_epoch(request))
+        return web.Response(body=data, content_type='application/octet-stream')
+
+    async def _read(self, what: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return await asyncio.get_running_loop().run_in_executor(
+                self._thread, what, *arguments)
+        except CrgameError as error:
+            raise _missing(str(error)) from error
+
+    def _asked_epoch(self, request: web.Request) -> int:
+        if 'epoch' not in request.query:
+            return self.epoch
+        epoch = _whole_number(request.query['epoch'])
+        if epoch is None or epoch not in self.epochs:
+            raise _missing('there is no such epoch')
+        return epoch
+
+    async def start(self, hub: 'Hub') -> None:
+        """Set the scene; all else the page fetches when it needs it."""
+        loop = asyncio.get_running_loop()
+        replay = await loop.run_in_executor(self._thread, self._run, self.epoch)
+        hub.set_document('scene', replay.scene)
+
+    async def stop(self) -> None:
+        """Close the recording."""
+        self.close()
+
+    async def command(self, client: 'Client', message: Mapping[str, Any]) -> str:
+        """
+        Refuse: what was recorded cannot be steered.
+
+        :raises CrgameError: always.
+        """
+        raise CrgameError('This is a recording: nothing in it can be changed.')
+
+    def joined(self, client: 'Client') -> None:
+        """Do nothing: each page has a time of its own."""
+
+    def left(self, client: 'Client') -> None:
+        """Do nothing."""
+
+    async def load_game(self, path: Path) -> str:
+        """
+        Refuse: no simulation runs.
+
+        :raises CrgameError: always.
+        """
+        raise CrgameError('This is a recording: start ./run.sh without --replay to play a game.')
+
+
+def _recording_in(path: Path) -> Path:
+    """Choose the recording in the folder of a run."""
+    inside = path / 'bag'
+    return inside if inside.is_dir() and not (path / METADATA_FILE).exists() else path
+
+
+def _whole_number(text: str | None) -> int | None:
+    if text is None or not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
+        return None
+    return int(text)
+
+
+def _missing(text: str) -> web.HTTPNotFound:
+    return web.HTTPNotFound(text=json.dumps({'error': text}), content_type='application/json')
+
+
+def open_replay(path: Path, epoch: int | None, say: Callable[[str], None],
+                clock_s: Callable[[], float], patience_s: float = 2.0) -> ReplayBackend:
+    """
+    Open a recording, and tell how far that is where it takes long.
+
+    :param epoch: the run that is shown first, None for the last.
+    :param say: prints a line.
+    :param clock_s: steady clock [s].
+    :param patience_s: a line each time so much has passed [s].
+    :raises InputError: as `ReplayBackend`.
+    """
+    told_s = clock_s()
+
+    def tell(share: float) -> None:
+        nonlocal told_s
+        if clock_s() - told_s > patience_s:
+            told_s = clock_s()
+            say(f'reading {path}: {share:.0%}')
+
+    return ReplayBackend(path, epoch, tell)

@@ -1,0 +1,55 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A driver that repeats recorded commands, cycle by cycle."""
+
+import math
+
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.driver.watchdog import SeatWatchdog
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+import numpy as np
+from numpy.typing import NDArray
+
+
+class ReplayDriver(DriverSource):
+    """
+    Repeats the commands that a recorded run consumed.
+
+    After their end nobody is there: as after any loss of a driver the pedals and the steering are
+    let go at their rates, then the brake is applied gently and stays, in simulation time.
+
+    :param commands: (cycles, 4) throttle, brake, steering, reverse of cycle 0, 1, …; NaN where an
+        AV followed its plan.
+    """
+
+    def __init__(self, commands: NDArray[np.float64]) -> None:
+        self._commands = [DriverCommand(row[0], row[1], row[2], row[3] == 1.0)
+                          for row in commands.tolist()]
+        self._recorded = len(self._commands)
+        self._end = SeatWatchdog()
+
+    def drives(self, n: int) -> bool:
+        """Tell whether somebody drove in the recorded cycle n."""
+        return n < self._recorded and not math.isnan(self._commands[n].throttle)
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Give the recorded command of cycle n; after the last one that of a seat left alone."""
+        if n >= len(self._commands) == self._recorded:
+            last = self._commands[-1] if self._commands else RELEASED
+            self._end.filter(last, 0.0, dt_s, 0.0)
+        while n >= len(self._commands):
+            # At an infinite speed it never takes the brake off again.
+            self._commands.append(self._end.filter(RELEASED, math.inf, dt_s, math.inf))
+        return self._commands[n]

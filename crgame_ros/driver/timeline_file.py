@@ -1,0 +1,191 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Timeline files as they say it: read into timelines, and written from them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from crgame_ros.driver.timeline import (
+    AxisName,
+    JOY_AXES,
+    JoyTimeline,
+    KeyInterval,
+    KeyTimeline,
+    Timeline,
+)
+from crgame_ros.errors import InputError, short
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Advice, Called, Keyed, LeftOut, Listed, Within
+from crgame_ros.schema.reading import read
+from crgame_ros.schema.writing import write
+from crgame_ros.yaml_text import parse_yaml, read_yaml
+import yaml
+
+MAX_TIME_S = 1e6
+REMEDY = 'see docs/driving.md, section "Scripted drivers"'
+_FORM = Form(REMEDY)
+Time = Annotated[float, Within(0.0, MAX_TIME_S)]
+KeyName = Literal['throttle', 'brake', 'left', 'right', 'reverse']
+
+
+@dataclass(frozen=True)
+class Span:
+    """
+    A half-open interval of simulation time.
+
+    :param start: first instant, since the start of the run [s]
+    :param end: first instant after it [s]
+    """
+
+    FORM: ClassVar[Form] = _FORM
+
+    start: Annotated[Time, Called('from')]
+    end: Annotated[Time, Called('to')]
+
+    def check(self) -> None:
+        """Refuse one that ends before it starts."""
+        if round(self.start * 1e9) >= round(self.end * 1e9):
+            raise InputError(f'ends at {self.end:g} s, not after its start at {self.start:g} s',
+                             '', 'let "from" be less than "to"')
+
+    def interval(self, keys: tuple[str, ...]) -> KeyInterval:
+        """Give it as the program has it."""
+        return KeyInterval(round(self.start * 1e9), round(self.end * 1e9), keys)
+
+
+@dataclass(frozen=True)
+class HeldKeys(Span):
+    """
+    Keys held over an interval.
+
+    :param start: first instant, since the start of the run [s]
+    :param end: first instant after it [s]
+    :param hold: the keys, a list or one of them; reverse is the gear, asked for while held.
+    """
+
+    hold: Annotated[KeyName | tuple[KeyName, ...], Advice(
+        'give one or a list of throttle, brake, left, right, reverse')]
+
+
+@dataclass(frozen=True)
+class JoyEntry:
+    """
+    The axes of a device.
+
+    :param points: time [s] and axes, throttle and brake from 0 to 1, steering from -1 to 1 and
+        positive to the left; linear in between.
+    :param axes: what stands in the points behind the time; axes that are not listed rest.
+    :param reverse: intervals in which the reverse gear is asked for.
+    """
+
+    FORM: ClassVar[Form] = Form(REMEDY, first=('axes',))
+
+    points: Annotated[tuple[tuple[float, ...], ...], Listed(1)]
+    axes: tuple[AxisName, ...] = JOY_AXES
+    reverse: Annotated[tuple[Span, ...], LeftOut()] = ()
+
+    def check(self) -> None:
+        """Refuse axes that come twice, and points that do not fit them or do not rise in time."""
+        for axis in self.axes:
+            if self.axes.count(axis) > 1:
+                raise InputError(f'"{axis}" is doubled', 'axes', 'name each axis once')
+        for index, point in enumerate(self.points):
+            self._check_point(index, point)
+
+    def _check_point(self, index: int, point: tuple[float, ...]) -> None:
+        place = f'points[{index}]'
+        if len(point) != 1 + len(self.axes):
+            raise InputError(f'is {short(list(point))}', place,
+                             f'give [{", ".join(["t", *self.axes])}]')
+        bounds = [(0.0, MAX_TIME_S), *(
+            (-1.0 if axis == 'steering' else 0.0, 1.0) for axis in self.axes)]
+        for name, value, (low, high) in zip(('t', *self.axes), point, bounds, strict=True):
+            if not low <= value <= high:
+                raise InputError(f'"{name}" is {value:g}', place,
+                                 f'give a number from {low:g} to {high:g}')
+        if index and point[0] <= self.points[index - 1][0]:
+            raise InputError(f'is at {point[0]:g} s, not after {self.points[index - 1][0]:g} s',
+                             place, 'let the times rise')
+
+    def timeline(self) -> JoyTimeline:
+        """Give it as the program has it."""
+        at = [dict(zip(self.axes, point[1:], strict=True)) for point in self.points]
+        return JoyTimeline(
+            tuple(point[0] for point in self.points),
+            tuple((values.get('throttle', 0.0), values.get('brake', 0.0),
+                   values.get('steering', 0.0)) for values in at),
+            KeyTimeline(tuple(span.interval(('reverse',)) for span in self.reverse)))
+
+
+@dataclass(frozen=True)
+class TimelineFile:
+    """
+    A scripted driver.
+
+    :param content: keys that are held, or the axes of a device.
+    """
+
+    FORM: ClassVar[Form] = _FORM
+
+    content: Annotated[tuple[HeldKeys, ...] | JoyEntry, Keyed(
+        {'keys': tuple[HeldKeys, ...], 'joy': JoyEntry}, 'timeline')]
+
+
+def read_timeline(path: Path) -> Timeline:
+    """
+    Read a timeline file.
+
+    :raises InputError: if it cannot be read or is no timeline.
+    """
+    return _timeline(read_yaml(path, 'timeline', REMEDY), str(path))
+
+
+def parse_timeline(text: str, where: str) -> Timeline:
+    """
+    Read the text of a timeline (YAML, or JSON, which is YAML too).
+
+    :param text: what `KeyTimeline` or `JoyTimeline` describes.
+    :param where: the file's name, for messages.
+    :raises InputError: naming the file and the entry of the timeline that is wrong.
+    """
+    return _timeline(parse_yaml(text, where, REMEDY), where)
+
+
+def _timeline(values: Any, where: str) -> Timeline:
+    content = read(TimelineFile, values, where).content
+    if isinstance(content, JoyEntry):
+        return content.timeline()
+    return KeyTimeline(tuple(
+        entry.interval((entry.hold,) if isinstance(entry.hold, str) else entry.hold)
+        for entry in content))
+
+
+def timeline_text(timeline: Timeline) -> str:
+    """Give a timeline as the text of a file; `parse_timeline` reads the same again."""
+    if isinstance(timeline, KeyTimeline):
+        document = {'keys': write(tuple(
+            HeldKeys(*_seconds(held), held.keys)  # type: ignore[arg-type]
+            for held in timeline.intervals))}
+    else:
+        points = ((t, *values) for t, values in zip(timeline.times_s, timeline.values,
+                                                    strict=True))
+        document = {'joy': write(JoyEntry(points=tuple(points), reverse=tuple(
+            Span(*_seconds(held)) for held in timeline.reverse.intervals)))}
+    return str(yaml.safe_dump(document, default_flow_style=None, sort_keys=False, width=1000))
+
+
+def _seconds(interval: KeyInterval) -> tuple[float, float]:
+    return interval.start_ns / 1e9, interval.end_ns / 1e9

@@ -1,0 +1,242 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The run described as JSON text: `/scenario/game` and `/scenario/objects`.
+
+Written by the simulation, read by planners, monitor, recorder and conversion, so that nobody
+needs the game's files, nor the engine.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.driven_vehicle import (
+    DrivenAv,
+    DrivenHuman,
+    DrivenVehicle,
+    read_av,
+    read_human,
+    VEHICLE_ID,
+)
+from crgame_ros.game.event_file import parse_document_entries
+from crgame_ros.game.events import EventSpec, FiredEvent
+from crgame_ros.game.game import DrivabilitySpec, MAX_VEHICLES, TimingSpec
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.schema.reading import read
+
+GAME_TOPIC = '/scenario/game'
+OBJECTS_TOPIC = '/scenario/objects'
+EVENTS_TOPIC = '/scenario/events'
+SIGNALS_TOPIC = '/scenario/signals'
+SEATS_TOPIC = '/seats'
+# Of a stamp of ROS [ns].
+LARGEST_NUMBER = 2**31 * 10**9
+# What reading a text that somebody else wrote can raise: huge numbers and deep nesting included.
+MALFORMED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
+
+
+@dataclass(frozen=True)
+class GameDocument:
+    """
+    What others need of `/scenario/game`.
+
+    :param epoch: counts resets.
+    :param benchmark_id: of the scenario.
+    :param title: one line for people.
+    :param scenario_sha256: of the text on `/scenario/xml`.
+    :param scheduler: time grids with the clock offset.
+    :param seed: of everything random.
+    :param duration_s: simulated time until the run ends; None if nobody says [s]
+    :param real_time_factor: simulated seconds per wall second at the start.
+    :param humans: the humans' vehicles.
+    :param avs: the AVs.
+    :param drivability: which checks run.
+    :param timing: of the time controller.
+    :param traffic: vehicles that react; None for none.
+    :param occupancy: file of the map of permanent obstacles; None for none.
+    :param events: the game's events.
+    :param event_entries: the same, as pages are told.
+    :param file: text of the game file; empty where there is none.
+    """
+
+    epoch: int
+    benchmark_id: str
+    title: str
+    scenario_sha256: str
+    scheduler: ScenarioScheduler
+    seed: int
+    duration_s: float | None
+    real_time_factor: float
+    humans: tuple[DrivenHuman, ...]
+    avs: tuple[DrivenAv, ...]
+    drivability: DrivabilitySpec
+    timing: TimingSpec
+    traffic: TrafficSpec | None
+    occupancy: Path | None
+    events: tuple[EventSpec, ...]
+    event_entries: tuple[Any, ...]
+    file: str
+
+    @property
+    def vehicles(self) -> tuple[DrivenVehicle, ...]:
+        """All driven vehicles, in the order of `/vehicles/state`."""
+        return (*self.humans, *self.avs)
+
+    def human(self, vehicle_id: str) -> DrivenHuman | None:
+        """Give a human's vehicle, None if it takes no part."""
+        return next((item for item in self.humans if item.id == vehicle_id), None)
+
+    def av(self, vehicle_id: str) -> DrivenAv | None:
+        """Give an AV, None if it takes no part."""
+        return next((item for item in self.avs if item.id == vehicle_id), None)
+
+
+def parse_game_document(text: str) -> GameDocument:
+    """
+    Read `/scenario/game`.
+
+    :raises InputError: if it is not what `simulation.document_writer` writes.
+    """
+    try:
+        content = json.loads(text)
+        humans, avs = content['humans'], content['avs']
+        if len(humans) + len(avs) > MAX_VEHICLES:
+            raise ValueError(f'{len(humans) + len(avs)} driven vehicles, at most {MAX_VEHICLES} '
+                             'are read')
+        for name, least in (('dt_c_ns', 1), ('steps_per_tick', 1), ('epoch', 0),
+                            ('clock_offset_ns', 0), ('k0', 0)):
+            if not least <= content[name] < LARGEST_NUMBER:
+                raise ValueError(f'{name} is {str(content[name])[:40]}')
+        duration_s, traffic = content.get('duration'), content.get('traffic')
+        occupancy, events = content.get('occupancy'), content.get('events') or []
+        game = GameDocument(
+            epoch=int(content['epoch']), benchmark_id=str(content.get('benchmark_id', '')),
+            title=str(content.get('title') or ''),
+            scenario_sha256=str(content['scenario_sha256']),
+            scheduler=ScenarioScheduler(
+                int(content['dt_c_ns']), int(content['steps_per_tick']), int(content['k0']),
+                int(content['clock_offset_ns'])),
+            seed=int(content['seed']),
+            duration_s=None if duration_s is None else float(duration_s),
+            real_time_factor=float(content.get('real_time_factor', 1.0)),
+            humans=tuple(map(read_human, humans)), avs=tuple(map(read_av, avs)),
+            drivability=read(
+                DrivabilitySpec, content['drivability'], f'{GAME_TOPIC}: drivability'),
+            timing=read(TimingSpec, content['timing'], f'{GAME_TOPIC}: timing'),
+            traffic=None if traffic is None else read(
+                TrafficSpec, traffic, f'{GAME_TOPIC}: traffic'),
+            occupancy=None if occupancy is None else Path(occupancy),
+            events=parse_document_entries(events, GAME_TOPIC), event_entries=tuple(events),
+            file=str(content.get('file') or ''))
+    except MALFORMED as error:
+        raise InputError(f'is no game document ({type(error).__name__}: {error})',
+                         GAME_TOPIC) from error
+    names = [item.id for item in game.vehicles]
+    if len(set(names)) < len(names):
+        raise InputError('is no game document (ids come twice)', GAME_TOPIC)
+    return game
+
+
+def objects_document(descriptions: Sequence[ObjectDescription]) -> str:
+    """Write what can appear (fields as in the contract, `/scenario/objects`)."""
+    return json.dumps([
+        {'id': item.id, 'type': item.type, 'role': item.role.value, 'shape': asdict(item.shape),
+         'reference_point': item.reference_point, 'rear_to_center': item.rear_to_center}
+        for item in descriptions], allow_nan=False)
+
+
+def parse_objects_document(text: str) -> tuple[ObjectDescription, ...]:
+    """
+    Read `/scenario/objects`.
+
+    :raises InputError: if it is not what `objects_document` writes.
+    """
+    try:
+        return tuple(
+            ObjectDescription(
+                str(item['id']), str(item['type']), Role(item['role']),
+                Shape(item['shape']['kind'], float(item['shape']['length']),
+                      float(item['shape']['width']),
+                      tuple((float(x), float(y)) for x, y in item['shape']['vertices'])),
+                float(item['rear_to_center']))
+            for item in json.loads(text))
+    except MALFORMED as error:
+        raise InputError(f'is no list of objects ({type(error).__name__}: {error})',
+                         OBJECTS_TOPIC) from error
+
+
+def parse_signals_document(text: str) -> tuple[int, dict[str, str]]:
+    """
+    Read `/scenario/signals`.
+
+    :return: the scenario step k, and the state of each traffic light by its id.
+    :raises InputError: if it is something else.
+    """
+    try:
+        content = json.loads(text)
+        return int(content['k']), {str(light): str(state)
+                                   for light, state in content['states'].items()}
+    except MALFORMED as error:
+        raise InputError(f'is no list of states ({type(error).__name__}: {error})',
+                         SIGNALS_TOPIC) from error
+
+
+def parse_seats_document(text: str) -> dict[str, dict[str, str]]:
+    """
+    Read `/seats`.
+
+    :return: source and driver of each seat, by vehicle.
+    :raises InputError: if it is not what the contract says.
+    """
+    try:
+        seats = {name: {'source': entry['source'], 'driver': entry['driver']}
+                 for name, entry in json.loads(text).items()}
+    except MALFORMED as error:
+        raise InputError('is not what the contract says', SEATS_TOPIC) from error
+    for name, entry in seats.items():
+        if VEHICLE_ID.fullmatch(name) is None \
+                or not all(isinstance(value, str) for value in entry.values()):
+            raise InputError('is not what the contract says', SEATS_TOPIC)
+    return seats
+
+
+def events_document(epoch: int, fired: Sequence[FiredEvent]) -> str:
+    """Write what has taken effect in a run so far (fields as in the contract)."""
+    return json.dumps({'epoch': epoch, 'fired': [asdict(event) for event in fired]})
+
+
+def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
+    """
+    Read `/scenario/events`.
+
+    :return: the epoch, and what took effect in it, in order.
+    :raises InputError: if it is not what `events_document` writes.
+    """
+    try:
+        content = json.loads(text)
+        return int(content['epoch']), tuple(
+            FiredEvent(str(item['name']), int(item['n']), int(item['k']),
+                       'trigger' if item['by'] == 'trigger' else 'condition')
+            for item in content['fired'])
+    except MALFORMED as error:
+        raise InputError(f'is no list of events ({type(error).__name__}: {error})',
+                         EVENTS_TOPIC) from error

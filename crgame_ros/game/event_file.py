@@ -1,0 +1,47 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Reading and writing the events of a game file and of `/scenario/game`."""
+
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.events import EventList, EventSpec
+from crgame_ros.schema.reading import read
+from crgame_ros.schema.writing import write
+
+_COMMON = ('name', 'label', 'kind', 'when')
+
+
+def document_entry(event: EventSpec) -> dict[str, Any]:
+    """Give an event as `/scenario/game` has it: name, label, kind, when and its parameters."""
+    entry = write(event)
+    parameters = entry.pop(event.kind)
+    return {'name': None, 'label': None, 'kind': event.kind, 'when': None} | entry | parameters
+
+
+def parse_document_entries(entries: Any, where: str) -> tuple[EventSpec, ...]:
+    """
+    Read what `document_entry` writes.
+
+    :raises InputError: if it is something else.
+    """
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError('"events" is no list of events', where)
+    events: tuple[EventSpec, ...] = read(EventList, [
+        {key: entry[key] for key in _COMMON if key in entry and key != 'kind'}
+        | {str(entry.get('kind')): {key: value for key, value in entry.items()
+                                    if key not in _COMMON}}
+        for entry in entries], where)
+    return events

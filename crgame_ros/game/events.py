@@ -1,0 +1,314 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The events of a game: what an experimenter triggers, or a condition (FS, external triggers)."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar, Literal
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.game.traffic_spec import ReactionTime, Share, SpeedFactor
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Advice, Keyed, Listed, Named, Parts, Within, Wording
+
+MAX_EVENTS = 100
+# Names every agent of traffic.
+ALL_AGENTS = 'all'
+_SEE = 'see docs/games.md for the keys'
+Metres = Annotated[float, Within(0.0, above=True)]
+PutType = Literal['constructionZone', 'parkedVehicle', 'roadBoundary', 'unknown']
+
+
+@dataclass(frozen=True)
+class Release:
+    """
+    Let a recorded obstacle go, which stands at its first pose until then.
+
+    :param object: obstacle id.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    object: int  # noqa: A003
+
+
+@dataclass(frozen=True)
+class Brake:
+    """
+    Slow a recorded obstacle down along its own path, to a speed that it then keeps.
+
+    :param object: obstacle id.
+    :param deceleration: [m/s^2]
+    :param speed: [m/s]; an obstacle that is slower keeps its own.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    object: int  # noqa: A003
+    deceleration: Annotated[float, Within(0.0, above=True)] = 4.0
+    speed: Annotated[float, Within(0.0, 100.0)] = 0.0
+
+
+@dataclass(frozen=True)
+class PutObstacle:
+    """
+    Put a static obstacle, a rectangle.
+
+    :param x: of its centre [m]
+    :param y: of its centre [m]
+    :param yaw: [rad]
+    :param length: [m]
+    :param width: [m]
+    :param type: CommonRoad's name of what it is.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    x: float
+    y: float
+    yaw: float = 0.0
+    length: Metres = 2.0
+    width: Metres = 1.0
+    type: PutType = 'constructionZone'  # noqa: A003
+
+
+@dataclass(frozen=True)
+class SpeedLimit:
+    """
+    Set the speed limit.
+
+    :param speed: [m/s]
+    :param lanelets: ids of lanelets; all where none is named.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    speed: Annotated[float, Within(0.0, 100.0, above=True)]
+    lanelets: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class PlanDisplay:
+    """
+    Show or hide an AV's plan in the cockpit.
+
+    :param av: its id.
+    :param show: whether the plan is shown.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    av: str
+    show: bool
+
+
+@dataclass(frozen=True)
+class PlannerSwap:
+    """
+    Replace an AV's planner.
+
+    :param av: its id.
+    :param planner: registered name, `module:Class` or `file.py:Class`.
+    :param options: keyword arguments of the planner.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    av: str
+    planner: Annotated[str, Named(), Wording(r'[\s\S]+', 'give the name of a planner')]
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PlannerRun:
+    """
+    Stop an AV's planner, or let it go on: while stopped it is asked for no plan.
+
+    :param av: its id.
+    :param run: whether it runs from then on.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    av: str
+    run: bool
+
+
+@dataclass(frozen=True)
+class TrafficChange:
+    """
+    Let one agent of traffic, or all of them, drive otherwise; None leaves things as they are.
+
+    :param agent: id of the agent, or `all`: whoever comes later included.
+    :param speed_factor: desired speed over speed limit; of all, its mean.
+    :param desired_speed: whatever the limit, instead [m/s]
+    :param options: of the car-following model, besides those that it has.
+    :param politeness: weight of others' loss when changing lanes for speed (MOBIL).
+    :param lane_changes: whether it changes lanes.
+    :param reaction_time: after which it does what it has decided [s]
+    :param imperfection: random share of its greatest acceleration by which it fails to do so.
+    :param red_runner: whether it ignores traffic lights.
+    :param late_yielder: whether it sees late that it has to yield.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    agent: str
+    speed_factor: SpeedFactor | None = None
+    desired_speed: Annotated[float, Within(0.0, 100.0)] | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+    politeness: Share | None = None
+    lane_changes: bool | None = None
+    reaction_time: ReactionTime | None = None
+    imperfection: Share | None = None
+    red_runner: bool | None = None
+    late_yielder: bool | None = None
+
+    def check(self) -> None:
+        """Refuse to change nothing, and one thing twice."""
+        if self == TrafficChange(self.agent):
+            raise InputError('changes nothing', '', 'give what is to change, such as speed_factor')
+        if self.speed_factor is not None and self.desired_speed is not None:
+            raise InputError('has both "speed_factor" and "desired_speed"', '',
+                             'give one of them')
+
+
+@dataclass(frozen=True)
+class AtTime:
+    """
+    From a time on.
+
+    :param time: since the start of the run [s]
+    """
+
+    time: float
+
+
+@dataclass(frozen=True)
+class AtStep:
+    """
+    From a scenario time step on: how a recorded run's events are repeated.
+
+    :param step: scenario time step k.
+    """
+
+    step: int
+
+
+@dataclass(frozen=True)
+class Near:
+    """
+    While the centre of a vehicle or object is within a circle.
+
+    :param vehicle: its id.
+    :param x: of the circle's centre [m]
+    :param y: of the circle's centre [m]
+    :param radius: [m]
+    """
+
+    vehicle: str
+    x: float
+    y: float
+    radius: Metres
+
+
+@dataclass(frozen=True)
+class Between:
+    """
+    While the centres of two vehicles or objects are near each other.
+
+    :param between: their two ids.
+    :param distance: that they are at most apart [m]
+    """
+
+    between: Annotated[tuple[str, str], Parts(('id', 'id')),
+                       Advice('name two ids')]
+    distance: Metres
+
+    def check(self) -> None:
+        """Refuse the distance from an object to itself."""
+        if self.between[0] == self.between[1]:
+            raise InputError(f'"between" is {short(self.between)}', '', 'name two ids')
+
+
+# What agents of traffic do otherwise from then on.
+TrafficOrder = SpeedLimit | TrafficChange
+Action = Release | Brake | PutObstacle | TrafficOrder | PlanDisplay | PlannerSwap | PlannerRun
+Condition = AtTime | AtStep | Near | Between
+
+# The key of each action in a game file, which is its kind everywhere else.
+ACTIONS: dict[str, type[Action]] = {
+    'release': Release, 'brake': Brake, 'obstacle': PutObstacle, 'speed_limit': SpeedLimit,
+    'traffic': TrafficChange, 'plan_display': PlanDisplay, 'planner': PlannerSwap,
+    'planner_run': PlannerRun}
+# The key by which each condition is known.
+CONDITIONS: dict[str, type[Condition]] = {
+    'time': AtTime, 'step': AtStep, 'vehicle': Near, 'between': Between}
+
+
+@dataclass(frozen=True)
+class EventSpec:
+    """
+    One event of a game; it takes effect at most once in a run.
+
+    :param name: by which it is triggered.
+    :param action: what it does.
+    :param label: text for people; without it the name.
+    :param when: condition under which it fires by itself; None leaves it to triggers.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE, first=('name', 'label'))
+
+    name: Annotated[str, Wording('[a-z0-9_-]{1,40}',
+                                 'give 1 to 40 of the characters a-z, 0-9, _ and -')]
+    action: Annotated[Action, Keyed(ACTIONS, 'action')]
+    label: Annotated[str, Wording(r'[\s\S]{1,80}', 'give a text of 80 characters at most')] = ''
+    when: Condition | None = None
+
+    def __post_init__(self) -> None:
+        """Let the name be the label where there is none."""
+        if not self.label:
+            object.__setattr__(self, 'label', self.name)
+
+    @property
+    def kind(self) -> str:
+        """Key of its action."""
+        return next(key for key, kind in ACTIONS.items() if type(self.action) is kind)
+
+    @property
+    def object_id(self) -> str | None:
+        """Id of the obstacle that it changes or puts; None if it leaves all as they are."""
+        if isinstance(self.action, Release | Brake):
+            return f'o{self.action.object}'
+        return f'e_{self.name}' if isinstance(self.action, PutObstacle) else None
+
+
+EventList = Annotated[tuple[EventSpec, ...], Listed(0, MAX_EVENTS, 'event', 'name')]
+
+
+@dataclass(frozen=True)
+class FiredEvent:
+    """
+    An event that took effect.
+
+    :param name: of the event.
+    :param n: simulation step, a tick of the scenario.
+    :param k: scenario time step.
+    :param by: what made it fire.
+    """
+
+    name: str
+    n: int
+    k: int
+    by: Literal['trigger', 'condition']

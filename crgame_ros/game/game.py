@@ -1,0 +1,309 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The game file: who takes part in a scenario, driven by what, under which rules."""
+
+from dataclasses import dataclass, field
+import math
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.events import EventList
+from crgame_ros.game.object_spec import ObjectList
+from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import (
+    Advice,
+    Folder,
+    LeftOut,
+    Listed,
+    Meaning,
+    Named,
+    Numbered,
+    Within,
+    Wording,
+)
+from crgame_ros.vehicle.parameters import DEFAULT_VEHICLE
+
+DEFAULT_PLANNER = 'idm'
+# Humans and AVs together.
+MAX_VEHICLES = 200
+_SEE = Form('see docs/games.md for the keys')
+Speed = Annotated[float, Within(-100.0, 100.0)]
+
+
+class DriverName(Named):
+    """Where a human's command comes from; what stands behind the colon may be a file."""
+
+    def resolved(self, name: str, base: Path) -> str:
+        """Leave the name: a driver's file is found when it is opened."""
+        return name
+
+    def written(self, name: str, base: Path) -> str:
+        """Make the file's name absolute; a device's name is none."""
+        kind, colon, argument = name.partition(':')
+        if not colon or kind == 'evdev':
+            return name
+        return f'{kind}:{(base / Path(argument).expanduser()).resolve()}'
+
+
+@dataclass(frozen=True)
+class ModelSpec:
+    """
+    A model by its registered name, `module:Class` or `file.py:Class`.
+
+    :param name: of the model.
+    :param options: keyword arguments of its constructor.
+    """
+
+    FORM: ClassVar[Form] = Form('name a model', short='name', rest='options')
+
+    name: Annotated[str, Named(), Advice('name a model')]
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class TrackerSpec:
+    """
+    What steers a tracked AV along its plan (FS II-C1).
+
+    :param model: the tracking controller.
+    :param pose: whether it steers by the true pose or by the estimated one.
+    """
+
+    FORM: ClassVar[Form] = Form('name a tracker', short='name', rest='model')
+
+    model: ModelSpec = ModelSpec('lqr')
+    # YAML reads a bare true as a truth value.
+    pose: Annotated[Literal['true', 'estimated'], Meaning(True, 'true')] = 'true'
+
+
+@dataclass(frozen=True)
+class LaneletSpawn:
+    """
+    A pose on a lanelet.
+
+    :param lanelet: lanelet id.
+    :param s: rear-axle position along its centre line [m].
+    :param d: offset to the left of the centre line [m].
+    :param speed: initial speed [m/s].
+    """
+
+    lanelet: int
+    s: float
+    d: float = 0.0
+    speed: Speed = 0.0
+
+
+@dataclass(frozen=True)
+class PoseSpawn:
+    """
+    A pose in the scenario's frame.
+
+    :param x: of the rear axle [m]
+    :param y: of the rear axle [m]
+    :param yaw: [rad]
+    :param speed: initial speed [m/s]
+    """
+
+    x: float
+    y: float
+    yaw: float
+    speed: Speed = 0.0
+
+
+@dataclass(frozen=True)
+class HumanSpec:
+    """
+    One human's vehicle.
+
+    :param id: hv0, hv1, …
+    :param driver: where its command comes from: auto, cockpit, idle, evdev[:NAME], keys:FILE,
+        joy:FILE, joy, replay:BAG.
+    :param vehicle: name of the vehicle parameters.
+    :param spawn: where it starts; None places it beside or behind the first AV, where it can.
+    :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
+    """
+
+    FORM: ClassVar[Form] = _SEE
+
+    id: Annotated[str, Numbered('hv'), Wording('hv[0-9]{1,3}', 'use hv0, hv1, …')]  # noqa: A003
+    driver: Annotated[str, DriverName()] = 'auto'
+    vehicle: Annotated[str, Named()] = DEFAULT_VEHICLE
+    spawn: Annotated[LaneletSpawn | PoseSpawn | None, Meaning('auto', None)] = None
+    dynamics: ModelSpec | None = None
+
+
+@dataclass(frozen=True)
+class AvSpec:
+    """
+    One autonomous vehicle.
+
+    :param id: av0, av1, …
+    :param planner: registered name or `module:Class`.
+    :param options: keyword arguments of the planner.
+    :param planning_problem: id of its planning problem; None takes the next unused one.
+    :param vehicle: name of the vehicle parameters.
+    :param spawn: `problem` starts at the planning problem's pose; `lanelet` at the nearest pose
+        of lanelet geometry, aligned to the former by CRG 6-10.
+    :param execution: `perfect` follows the plan exactly (CRG), `tracked` by a controller on a
+        vehicle model (FS II-C).
+    :param tracker: the controller of a tracked AV.
+    :param dynamics: the vehicle model of a tracked AV (FS 2).
+    :param perception: how it perceives the world; None is perfectly.
+    """
+
+    FORM: ClassVar[Form] = _SEE
+
+    id: Annotated[str, Numbered('av'), Wording('av[0-9]{1,3}', 'use av0, av1, …')]  # noqa: A003
+    planner: Annotated[str, Named()] = DEFAULT_PLANNER
+    options: dict[str, Any] = field(default_factory=dict)
+    planning_problem: int | None = None
+    vehicle: Annotated[str, Named()] = DEFAULT_VEHICLE
+    spawn: Annotated[Literal['problem', 'lanelet'], Meaning('auto', 'problem')] = 'problem'
+    execution: Literal['perfect', 'tracked'] = 'perfect'
+    tracker: TrackerSpec = TrackerSpec()
+    dynamics: ModelSpec = ModelSpec('dynamic-bicycle')
+    perception: PerceptionSpec | None = None
+
+    @property
+    def localisation_steers(self) -> bool:
+        """Tell whether a tracking controller steers by the estimated pose."""
+        return self.execution == 'tracked' and self.tracker.pose == 'estimated'
+
+
+@dataclass(frozen=True)
+class PredictionSpec:
+    """
+    What a planner is told about the future of others.
+
+    :param mode: `constant` (nobody's future is known), `recorded` (recorded obstacles' true
+        future), `plans` (other AVs' current plans); the last two leak.
+    :param horizon: H_pred [s].
+    """
+
+    FORM: ClassVar[Form] = _SEE
+
+    mode: Literal['constant', 'recorded', 'plans'] = 'constant'
+    horizon: Annotated[float, Within(0.1, 60.0)] = 3.0
+
+
+@dataclass(frozen=True)
+class DrivabilitySpec:
+    """
+    Which checks run, and whether a human's violation ends the run (CRG III-D).
+
+    :param collision: whether contacts are looked for.
+    :param road: whether vehicles have to stay on the road.
+    :param stop: whether a human's violation ends the run.
+    """
+
+    FORM: ClassVar[Form] = _SEE
+
+    collision: bool = True
+    road: bool = True
+    stop: bool = False
+
+
+@dataclass(frozen=True)
+class TimingSpec:
+    """
+    The time controller of CRG III-A2; each mechanism can be switched off.
+
+    :param rate: simulation rate [Hz]; the step becomes Delta t_c / N exactly (CRG 14).
+    :param pacing: wait for the wall-clock schedule.
+    :param frame_skipping: obey the supervisor's orders to suppress messages for people.
+    :param drift_reset: re-anchor the schedule when the lag exceeds `reset_threshold`.
+    :param measured_interval: integrate humans over the measured, clipped interval (CRG 13).
+    :param clip: `carry` brings what the clip cuts off into later steps, `drop` is the paper.
+    :param dt_min: Delta t_min [s].
+    :param dt_max: Delta t_max [s].
+    :param skip_threshold: lag above which frames are skipped [s].
+    :param reset_threshold: lag above which the schedule is re-anchored [s].
+    :param warm_up_steps: steps without reset at the start.
+    :param max_catch_up_steps: late steps in a row after which orders are served all the same.
+    :param realign: `time` follows the request's stamp, `nearest` is CRG 16.
+    :param sample: `interpolate` between plan states, `floor` is CRG 15.
+    """
+
+    FORM: ClassVar[Form] = _SEE
+
+    rate: Annotated[float, Within(1.0, 10000.0)] = 100.0
+    pacing: bool = True
+    frame_skipping: bool = True
+    drift_reset: bool = True
+    measured_interval: bool = True
+    clip: Literal['carry', 'drop'] = 'carry'
+    dt_min: Annotated[float, Within(1e-6, 1.0)] = 0.0001
+    dt_max: Annotated[float, Within(1e-4, 10.0)] = 0.05
+    skip_threshold: Annotated[float, Within(0.0)] = 0.02
+    reset_threshold: Annotated[float, Within(0.0)] = 0.25
+    warm_up_steps: Annotated[int, Within(0, 1e9)] = 50
+    max_catch_up_steps: Annotated[int, Within(1, 1e9)] = 50
+    realign: Literal['time', 'nearest'] = 'time'
+    sample: Literal['interpolate', 'floor'] = 'interpolate'
+
+    def check(self) -> None:
+        """Refuse bounds that are crossed."""
+        if self.dt_min > self.dt_max:
+            raise InputError('"dt_min" is larger than "dt_max"')
+
+
+@dataclass(frozen=True)
+class Game:
+    """
+    A game as its file says it, before the scenario is loaded.
+
+    :param title: one line for people.
+    :param scenario: path of the CommonRoad file.
+    :param humans: the humans' vehicles.
+    :param avs: the AVs; None makes one of each planning problem.
+    :param duration: simulated seconds until the run ends; infinite if nobody says.
+    :param seed: seed of everything random.
+    :param prediction: what planners are told of others' future.
+    :param drivability: which checks run.
+    :param timing: the time controller.
+    :param base: directory against which file names inside the game are resolved.
+    :param events: what triggers and conditions bring about.
+    :param objects: objects of the game's own (FS II-A3).
+    :param traffic: vehicles that react (FS III); None for none.
+    :param occupancy: map of permanent obstacles (FS II-A2).
+    """
+
+    FORM: ClassVar[Form] = Form(
+        _SEE.remedy, moved=(('rate', 'timing'),), first=('title', 'scenario', 'duration', 'seed'))
+
+    scenario: Annotated[Path, Advice('name a CommonRoad file')]
+    title: str = ''
+    humans: Annotated[tuple[HumanSpec, ...], Listed(noun='vehicle', own='id')] = (
+        HumanSpec('hv0'),)
+    avs: Annotated[tuple[AvSpec, ...], Listed(noun='vehicle', own='id')] | None = None
+    duration: Annotated[float, Within(0.0, endless=True), LeftOut()] = math.inf
+    seed: Annotated[int, Within(0, 2**63 - 1)] = 0
+    prediction: PredictionSpec = PredictionSpec()
+    drivability: DrivabilitySpec = DrivabilitySpec()
+    timing: TimingSpec = TimingSpec()
+    base: Annotated[Path, Folder()] = Path('.')
+    events: Annotated[EventList, LeftOut()] = ()
+    objects: Annotated[ObjectList, LeftOut()] = ()
+    traffic: TrafficSpec | None = None
+    occupancy: Annotated[Path, Advice('name the YAML file of a map')] | None = None
+
+    def check(self) -> None:
+        """Refuse more vehicles than anybody can follow."""
+        count = len(self.humans) + len(self.avs or ())
+        if count > MAX_VEHICLES:
+            raise InputError(f'{count} humans and AVs', '', f'have {MAX_VEHICLES} at most')

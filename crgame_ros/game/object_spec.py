@@ -1,0 +1,274 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The objects that a game adds to its scenario (FS II-A3), and what each type is like."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+import math
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Literal
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.game.object_trajectory import (
+    checked_trajectory,
+    MAX_COORDINATE,
+    MAX_ROWS,
+    MAX_SPEED,
+    read_trajectory,
+    TrajectoryRow,
+)
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import (
+    Advice,
+    LeftOut,
+    Listed,
+    Numbered,
+    OnlyWith,
+    Parts,
+    Special,
+    Within,
+    Wording,
+)
+
+ObjectKind = Literal['static', 'particle', 'bicycle']
+
+STATIC_TYPES = ('unknown', 'parkedVehicle', 'constructionZone', 'roadBoundary', 'building',
+                'pillar', 'median_strip')
+
+
+@dataclass(frozen=True)
+class MoverType:
+    """
+    How things of one type look and move, unless a game says otherwise.
+
+    :param shape: around the centre.
+    :param speed: [m/s]
+    :param acceleration: that it likes to have at most; of a particle the hardest, in any
+        direction [m/s^2]
+    :param deceleration: comfortable [m/s^2]
+    :param hardest: deceleration [m/s^2]
+    :param headway: time gap behind what is ahead, the T of the IDM; of a particle the time gap in
+        the traffic that it accepts to cross [s]
+    :param distance: gap at standstill, the s0 of the IDM [m]
+    :param wheelbase: [m]
+    :param steering: largest angle [rad]
+    :param rear_to_center: from the rear axle forward to the centre [m]
+    :param lateral: acceleration in bends [m/s^2]
+    """
+
+    shape: Shape
+    speed: float
+    acceleration: float
+    deceleration: float
+    hardest: float
+    headway: float
+    distance: float
+    wheelbase: float = 0.0
+    steering: float = 0.0
+    rear_to_center: float = 0.0
+    lateral: float = 2.5
+
+    @property
+    def sharpest(self) -> float:
+        """Largest curvature of the rear axle's path, tan(steering) / wheelbase [1/m]."""
+        return 0.0 if self.wheelbase == 0.0 else math.tan(self.steering) / self.wheelbase
+
+
+# The car is CommonRoad's vehicle 2, with a turning circle of 11 m; a, b, T and s0 of motor
+# vehicles are those of the planner idm. Circles of 0.35 m are the pedestrians of our scenarios,
+# 1.34 m/s their mean speed (Weidmann 1993), 2 m/s^2 about what the relaxation time of 0.5 s of
+# Helbing and Molnár (1995) means from standstill; 3 s is the start-up and end clearance time of
+# the critical gap in the Highway Capacity Manual. The size of bicycles is that of recorded ones
+# (DEU_Guetersloh-36); everything else is ours.
+_CAR = MoverType(Shape.rectangle(4.508, 1.61), 13.9, 1.5, 2.0, 8.0, 1.5, 2.0, 2.579, 0.56, 1.4227)
+MOVER_TYPES: Mapping[str, MoverType] = MappingProxyType({
+    'pedestrian': MoverType(Shape.circle(0.35), 1.34, 2.0, 1.0, 2.0, 3.0, 0.5),
+    'bicycle': MoverType(Shape.rectangle(1.9, 0.7), 4.2, 1.0, 1.5, 4.0, 1.0, 1.0, 1.05, 0.6,
+                         0.525, 2.0),
+    'motorcycle': MoverType(Shape.rectangle(2.2, 0.8), 13.9, 2.0, 2.5, 8.0, 1.5, 2.0, 1.4, 0.5,
+                            0.7),
+    'car': _CAR, 'taxi': _CAR, 'priorityVehicle': _CAR,
+    'truck': MoverType(Shape.rectangle(8.4, 2.5), 11.1, 1.0, 1.5, 6.0, 1.5, 2.0, 4.8, 0.6, 2.4,
+                       1.5),
+    'bus': MoverType(Shape.rectangle(12.0, 2.55), 11.1, 1.0, 1.5, 6.0, 1.5, 2.0, 6.0, 0.65, 3.0,
+                     1.5),
+    'unknown': MoverType(Shape.circle(0.35), 1.34, 2.0, 1.0, 2.0, 3.0, 0.5)})
+PARTICLE_TYPES = ('pedestrian', 'unknown')
+BICYCLE_TYPES = tuple(name for name in MOVER_TYPES if name not in PARTICLE_TYPES)
+
+
+MAX_OBJECTS = 200
+MAX_PATH = 20_000.0
+# Of each kind, the first is the default.
+TYPES = {'static': STATIC_TYPES, 'particle': PARTICLE_TYPES, 'bicycle': BICYCLE_TYPES}
+PLACES = {'static': ('at',), 'particle': ('path', 'trajectory'),
+          'bicycle': ('path', 'lanelet', 'trajectory')}
+Coordinate = Annotated[float, Within(-MAX_COORDINATE, MAX_COORDINATE)]
+Point = Annotated[tuple[Coordinate, Coordinate], Parts(('x', 'y'))]
+Acceleration = Annotated[float, Within(0.0, 20.0, above=True)]
+_MOVING = OnlyWith(('path', 'lanelet', 'trajectory'))
+_DRIVEN = OnlyWith(('path', 'lanelet'))
+
+
+class Rows(Special):
+    """The rows of a trajectory, or the name of a CSV file that holds them."""
+
+    def read(self, given: Any, where: str, key: str, base: Path) -> tuple[TrajectoryRow, ...]:
+        """Read and check the rows."""
+        if isinstance(given, str):
+            return read_trajectory(given, base, where)
+        return checked_trajectory(given, f'{where}: {key}')
+
+    def json_schema(self) -> dict[str, Any]:
+        """Describe both."""
+        row = {'type': 'array', 'items': {'type': 'number'}, 'minItems': 3, 'maxItems': 4}
+        return {'anyOf': [{'type': 'string'}, {'type': 'array', 'items': row, 'minItems': 2,
+                                               'maxItems': MAX_ROWS}]}
+
+    def __str__(self) -> str:
+        """Say what is wanted."""
+        return 'a CSV file, or a list of rows [t, x, y, yaw]'
+
+
+@dataclass(frozen=True)
+class ObjectSpec:
+    """
+    One object of a game; what is None is taken from its type (`MOVER_TYPES`).
+
+    Exactly one of `at`, `path`, `lanelet` and `trajectory` says where it is.
+
+    :param id: unique name, b0, b1, … by default; hv0, av0, o0, t0 and e_… are others'.
+    :param kind: movement model: static, particle (goes in any direction), bicycle (kinematic:
+        everything on wheels).
+    :param type: CommonRoad's name of what it is; the first of its kind by default, a car with
+        `lanelet`.
+    :param size: length and width of its rectangle [m]; without size and radius that of its type.
+    :param at: pose of its centre [m, m, rad]
+    :param path: way-points of its centre [m]
+    :param trajectory: predetermined states t [s], x [m], y [m], yaw [rad], see below.
+    :param lanelet: where it starts; it goes on along the straightest successors, 5 km at most.
+    :param s: station of its centre on that lanelet [m]
+    :param speeds: that it wants at each way-point, linear in between [m/s]
+    :param start: time since the start of the run at which it sets off [s]; until then it stands at
+        its beginning, and one that starts at 0 moves at its speed already.
+    :param end: what it does at its end; it stays by default at that of a path alone.
+    :param reactive: whether it minds others.
+    :param radius: of its circle, instead of a size [m]
+    :param speed: that it wants, instead of speeds [m/s]
+    :param acceleration: that it likes to have at most; of a particle the most in any direction
+        [m/s^2]
+    :param deceleration: comfortable [m/s^2]
+    :param headway: T of the IDM, or the time gap that a particle accepts [s]
+    :param distance: s0 of the IDM, or the distance that a particle keeps from vehicles [m]
+    """
+
+    FORM: ClassVar[Form] = Form('see docs/objects.md for the keys', by='kind', one_of=PLACES,
+                                choices={'type': TYPES})
+
+    # The names that the program gives to vehicles, obstacles, traffic and events are reserved.
+    id: Annotated[str, Numbered('b'), Wording(  # noqa: A003
+        r'(?!(?:(?:hv|av|o|t)[0-9]+|e_.*)$)[a-z][A-Za-z0-9_]{0,39}',
+        'begin with a-z, go on with letters, digits and _ (40 at most), and leave hv0, av0, o0, '
+        't0, e_… to others')]
+    kind: ObjectKind
+    type: str = ''  # noqa: A003
+    size: Annotated[tuple[float, float], Parts(('length', 'width')),
+                    Within(0.0, 200.0, above=True)] | None = None
+    at: Annotated[tuple[Coordinate, Coordinate, Coordinate], Parts(('x', 'y', 'yaw'), 1),
+                  OnlyWith(('at',))] | None = None
+    path: Annotated[tuple[Point, ...], Listed(2, 1000, 'way-point'), OnlyWith(('path',))] = ()
+    trajectory: Annotated[tuple[TrajectoryRow, ...], Rows(), OnlyWith(('trajectory',))] = ()
+    lanelet: Annotated[int | None, OnlyWith(('lanelet',)),
+                       Advice('give the id of a lanelet')] = None
+    s: Annotated[float, Within(0.0, MAX_COORDINATE), OnlyWith(('lanelet',))] = 0.0
+    speeds: Annotated[tuple[Annotated[float, Within(0.0, MAX_SPEED)], ...], OnlyWith(('path',)),
+                      LeftOut()] = ()
+    start: Annotated[float, Within(0.0, 1e6), _MOVING] = 0.0
+    end: Annotated[Literal['stay', 'vanish'], _MOVING] | None = None
+    reactive: Annotated[bool, _DRIVEN] = False
+    radius: Annotated[float, Within(0.0, 100.0, above=True)] | None = None
+    speed: Annotated[float, Within(0.0, MAX_SPEED, above=True), _DRIVEN] | None = None
+    acceleration: Annotated[Acceleration, _DRIVEN] | None = None
+    deceleration: Annotated[Acceleration, _DRIVEN] | None = None
+    headway: Annotated[float, Within(0.0, 60.0, above=True), _DRIVEN] | None = None
+    distance: Annotated[float, Within(0.0, 50.0, above=True), _DRIVEN] | None = None
+
+    def __post_init__(self) -> None:
+        """Give it what its kind and place mean, where it does not say."""
+        if self.end is None:
+            object.__setattr__(self, 'end', 'stay' if self.path or self.at else 'vanish')
+        if not self.type:
+            object.__setattr__(self, 'type', 'car' if self.lanelet is not None
+                               else TYPES[self.kind][0])
+
+    def check(self) -> None:
+        """Refuse what contradicts itself."""
+        if self.size is not None and self.radius is not None:
+            raise InputError('has a size and a radius', '', 'leave one out')
+        if self.path:
+            _check_path(self.path)
+        if self.speeds:
+            _check_speeds(self)
+
+    @property
+    def shape(self) -> Shape:
+        """Footprint around its centre; a static one of unknown size measures 1 m by 1 m."""
+        if self.radius is not None:
+            return Shape.circle(self.radius)
+        if self.size is not None:
+            return Shape.rectangle(*self.size)
+        if self.kind != 'static':
+            return MOVER_TYPES[self.type].shape
+        return MOVER_TYPES['car'].shape if self.type == 'parkedVehicle' \
+            else Shape.rectangle(1.0, 1.0)
+
+    @property
+    def mover(self) -> MoverType:
+        """Tell what its type is like, with everything that the game says otherwise."""
+        base = MOVER_TYPES[self.type]
+        own = {name: getattr(self, name) for name in
+               ('speed', 'acceleration', 'deceleration', 'headway', 'distance')}
+        return replace(base, shape=self.shape,
+                       **{name: value for name, value in own.items() if value is not None})
+
+
+ObjectList = Annotated[tuple[ObjectSpec, ...], Listed(0, MAX_OBJECTS, 'object', 'id')]
+
+
+def _check_path(path: tuple[Point, ...]) -> None:
+    steps = [math.dist(a, b) for a, b in zip(path, path[1:], strict=False)]
+    for index, step in enumerate(steps, start=1):
+        if step < 0.01:
+            raise InputError('is the same place as the way-point before', f'path[{index}]',
+                             'leave it out')
+    if sum(steps) > MAX_PATH:
+        raise InputError(f'is {sum(steps) / 1000.0:.4g} km long', 'path',
+                         f'give {MAX_PATH / 1000.0:g} km at most')
+
+
+def _check_speeds(spec: ObjectSpec) -> None:
+    if spec.speed is not None:
+        raise InputError('has "speed" and "speeds"', '', 'leave one out')
+    if len(spec.speeds) != len(spec.path):
+        raise InputError(f'"speeds" is {short(list(spec.speeds))}', '',
+                         f'give {len(spec.path)} numbers, one for each way-point of "path"')
+    if 0.0 in spec.speeds[:-1]:
+        raise InputError(f'"speeds" is {short(list(spec.speeds))}', '',
+                         'give numbers above 0; the last may be 0')
+    if spec.end == 'vanish' and spec.speeds[-1] == 0.0:
+        raise InputError('its last speed is 0, so that it never vanishes', '',
+                         'let it end with a speed, or stay')

@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What can appear in a run, and where it is at a scenario time step."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from crgame_ros.geometry.shape import Shape
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Role(Enum):
+    """Who moves an object."""
+
+    HUMAN = 'human'
+    AUTONOMOUS = 'autonomous'
+    RECORDED = 'recorded'
+    STATIC = 'static'
+    TRAFFIC = 'traffic'
+    SCRIPTED = 'scripted'
+
+    @property
+    def is_ego(self) -> bool:
+        """Tell whether the object is a driven vehicle (a human's or an AV)."""
+        return self in (Role.HUMAN, Role.AUTONOMOUS)
+
+
+@dataclass(frozen=True)
+class ObjectDescription:
+    """
+    One object that may appear; a row of `/scenario/objects`.
+
+    :param id: name used in joint names: hv0, av0, o<obstacle id> for scenario obstacles, t0 for
+        agents of traffic, and the game's own names for its objects (scripted, or static).
+    :param type: CommonRoad obstacle type in its XML spelling (car, pedestrian, parkedVehicle…).
+    :param role: who moves it.
+    :param shape: footprint around its centre.
+    :param rear_to_center: distance from the reference point forward to the centre [m]; the
+        reference point is the rear axle of driven vehicles and the centre (0 m) of all others.
+    """
+
+    id: str  # noqa: A003
+    type: str  # noqa: A003
+    role: Role
+    shape: Shape
+    rear_to_center: float = 0.0
+
+    @property
+    def reference_point(self) -> str:
+        """Name the reference point of the object's poses: rear_axle or center."""
+        return 'rear_axle' if self.role.is_ego else 'center'
+
+
+@dataclass(frozen=True)
+class ObjectStates:
+    """
+    Where M objects that are not driven vehicles are at one scenario time step.
+
+    :param poses: (M, 3) centre x [m], y [m], yaw [rad] in frame map; NaN where absent.
+    :param velocities: (M, 3) derivatives of the poses [m/s, m/s, rad/s]; NaN where absent.
+    """
+
+    poses: NDArray[np.float64]
+    velocities: NDArray[np.float64]

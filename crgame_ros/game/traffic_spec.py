@@ -1,0 +1,86 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a game file says about traffic."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar, Literal
+
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Named, Within
+
+MAX_AGENTS = 20_000
+MAX_REACTION_TIME = 2.0
+Agents = Annotated[int, Within(0, MAX_AGENTS)]
+Share = Annotated[float, Within(0.0, 1.0)]
+SpeedFactor = Annotated[float, Within(0.1, 3.0)]
+ReactionTime = Annotated[float, Within(0.0, MAX_REACTION_TIME)]
+
+
+@dataclass(frozen=True)
+class TrafficSpec:
+    """
+    Traffic of intelligent agents (FS section III); the defaults put nobody on the road.
+
+    :param recorded: `reactive` turns recorded vehicles that drive on lanes into agents.
+    :param agents: how many are placed on the road at the start.
+    :param flow: arrivals at each lane that begins at the edge of the map [vehicles/h]
+    :param capacity: most agents at a time besides the recorded ones; None takes what `agents` and
+        `flow` want, at most 300.
+    :param model: car following: acc (FS 3), idm, or a class of your own.
+    :param options: of the car-following model.
+    :param lane_changes: whether agents change lanes (FS 4).
+    :param cooperative: whether agents make room for one that has to change (Hidas 2005).
+    :param swerve: whether agents swerve around standing obstacles (M1).
+    :param seed: of everything random here; None takes the game's.
+    :param speed_factor: mean of desired speed over speed limit.
+    :param speed_spread: its standard deviation between drivers.
+    :param truck_share: share of trucks among agents that were not recorded.
+    :param lateral_acceleration: comfortable in curves [m/s^2]
+    :param politeness: weight of others' loss when changing lanes for speed (MOBIL).
+    :param reaction_time: after which a driver does what it has decided [s]
+    :param imperfection: random share of its greatest acceleration by which a driver fails to do so
+        (sigma of Krauss 1998).
+    :param red_runners: share of drivers who ignore traffic lights, for tests of AVs.
+    :param late_yielders: share of drivers who see late that they have to yield, for tests of AVs.
+    """
+
+    FORM: ClassVar[Form] = Form('see docs/traffic.md for the keys', short='recorded',
+                                written='changed')
+
+    recorded: Literal['replayed', 'reactive'] = 'replayed'
+    agents: Agents = 0
+    flow: Annotated[float, Within(0.0, 3600.0)] = 0.0
+    capacity: Agents | None = None
+    model: Annotated[str, Named()] = 'acc'
+    options: Mapping[str, Any] = field(default_factory=dict)
+    lane_changes: bool = True
+    cooperative: bool = True
+    swerve: bool = True
+    seed: Annotated[int, Within(0, 2**63 - 1)] | None = None
+    speed_factor: SpeedFactor = 1.0
+    speed_spread: Annotated[float, Within(0.0, 0.5)] = 0.1
+    truck_share: Share = 0.1
+    lateral_acceleration: Annotated[float, Within(0.5, 6.0)] = 2.0
+    politeness: Share = 0.2
+    reaction_time: ReactionTime = 0.0
+    imperfection: Share = 0.0
+    red_runners: Share = 0.0
+    late_yielders: Share = 0.0
+
+    @property
+    def is_reactive(self) -> bool:
+        """Tell whether there can be any agent."""
+        return self.recorded == 'reactive' or self.agents > 0 or self.flow > 0.0

@@ -1,0 +1,59 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Points along a pose's heading: from a vehicle's rear axle to its centre, and back."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def ahead(x: float, y: float, yaw: float, distance: float) -> tuple[float, float]:
+    """
+    Give the point at a distance ahead of a pose.
+
+    :param distance: negative is behind it [m]
+    :return: its x and y [m]
+    """
+    return x + distance * math.cos(yaw), y + distance * math.sin(yaw)
+
+
+def shifted(poses: Array, distance: Array | float) -> Array:
+    """
+    Move poses along their headings.
+
+    :param poses: (..., 3) x [m], y [m] and yaw [rad]
+    :param distance: (...) forward [m]
+    :return: (..., 3), the yaw unchanged
+    """
+    yaw = poses[..., 2]
+    return np.stack((poses[..., 0] + distance * np.cos(yaw),
+                     poses[..., 1] + distance * np.sin(yaw), yaw), axis=-1)
+
+
+def shifted_velocities(yaw: Array, velocities: Array, distance: Array | float) -> Array:
+    """
+    Give the velocities of points ahead of others on the same rigid bodies.
+
+    :param yaw: (...) [rad]
+    :param velocities: (..., 3) [m/s, m/s, rad/s]
+    :param distance: (...) forward [m]
+    :return: (..., 3)
+    """
+    rate = velocities[..., 2]
+    return np.stack((velocities[..., 0] - distance * np.sin(yaw) * rate,
+                     velocities[..., 1] + distance * np.cos(yaw) * rate, rate), axis=-1)

@@ -1,0 +1,64 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What ends a run from outside: Ctrl-C, a signal, a closed terminal, a pipe that breaks."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import os
+import signal
+import sys
+from types import FrameType
+
+# A closed terminal is a wish to end like any other.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def say(text: str) -> None:
+    """
+    Print one line at once.
+
+    Where nobody reads it any more the run is asked to end, in good order and silently.
+    """
+    try:
+        print(text, flush=True)
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+        os.kill(os.getpid(), signal.SIGHUP)
+
+
+@contextmanager
+def writing(tell: Callable[[str], None]) -> Iterator[None]:
+    """
+    Let the files of a run be written whatever signal comes; a second one is meant.
+
+    :param tell: prints one line.
+    """
+    heard = 0
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        nonlocal heard
+        heard += 1
+        if heard > 1:
+            raise KeyboardInterrupt
+        tell('still writing the files; once more leaves that to `crgame recover`')
+
+    before = {number: signal.signal(number, on_signal) for number in ENDING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,80 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The arguments of `ros2 launch crgame_ros crgame.launch.py`, as words for the launcher."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+
+
+class LaunchArgument(NamedTuple):
+    """
+    One argument.
+
+    :param option: the launcher's option, '' for the game; given once for each value of a list.
+    :param what: what it means.
+    :param default: as text; an empty value is none.
+    :param flag: whether it is true or false.
+    """
+
+    option: str
+    what: str
+    default: str = ''
+    flag: bool = False
+
+
+LAUNCH_ARGUMENTS = {
+    'game': LaunchArgument('', 'game file; the cut-in game if it is empty'),
+    'scenario': LaunchArgument('--scenario', "CommonRoad file instead of the game's"),
+    'driver': LaunchArgument('--driver', "who drives the first human's vehicle"),
+    'planners': LaunchArgument('--planner', 'planners of the AVs, separated by commas; one '
+                               'serves all'),
+    'duration': LaunchArgument('--duration', "simulated seconds; the game's if it is empty"),
+    'rate': LaunchArgument('--rate', "simulation rate [Hz]; the game's if it is empty"),
+    'real_time_factor': LaunchArgument('--real-time-factor', 'simulated seconds per second',
+                                       '1.0'),
+    'headless': LaunchArgument('--headless', 'true: without the cockpit', 'false', flag=True),
+    'port': LaunchArgument('--port', "of the cockpit's page", '8080'),
+    'namespace': LaunchArgument('--namespace', 'of every node, topic and service', '/'),
+    'out': LaunchArgument('--out', "folder of the run's files; runs/<time>_<scenario> if it is "
+                          'empty'),
+}
+
+
+def launch_words(values: Mapping[str, str]) -> list[str]:
+    """
+    Give the command line of the launcher.
+
+    :param values: of `LAUNCH_ARGUMENTS`; those left out have their defaults.
+    :raises InputError: if an argument is unknown, or a flag is neither true nor false.
+    """
+    unknown = values.keys() - LAUNCH_ARGUMENTS.keys()
+    if unknown:
+        raise InputError(f'there is no argument {min(unknown)}', 'crgame.launch.py',
+                         'see --show-args')
+    words: list[str] = []
+    for name, argument in LAUNCH_ARGUMENTS.items():
+        value = values.get(name, argument.default)
+        if argument.flag:
+            if value.lower() not in ('true', 'false', ''):
+                raise InputError(f'{name} is {value}', 'crgame.launch.py', 'give true or false')
+            words += [argument.option] * (value.lower() == 'true')
+        elif name == 'planners':
+            words += [word for item in value.split(',') if item
+                      for word in (argument.option, item)]
+        elif value:
+            words += [argument.option, value] if argument.option else [value]
+    return words

@@ -1,0 +1,172 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Trajectories as flat joint arrays: the core's image of trajectory_msgs/JointTrajectory.
+
+Both runners pass requests and plans through these functions, so that a planner sees the same
+bits in process and over DDS. A driven vehicle is the joints x, y, yaw and steering of its rear
+axle, any other object x, y and yaw of its centre; absence is NaN (`msg_defs/interfaces.yaml`).
+"""
+
+from dataclasses import dataclass
+import math
+
+from crgame_ros.errors import InputError
+from crgame_ros.messages.plan import Plan
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+VEHICLE_JOINTS = ('x', 'y', 'yaw', 'steering')
+OBJECT_JOINTS = ('x', 'y', 'yaw')
+
+
+@dataclass(frozen=True)
+class JointSeries:
+    """
+    A stamped series of P points over J joints.
+
+    :param stamp_ns: simulation time of the first point [ns]
+    :param names: (J) `<id>/x` …
+    :param times_ns: (P) time from the stamp [ns]
+    :param positions: (P, J) [m] and [rad]
+    :param velocities: (P, J) derivatives of the positions [m/s] and [rad/s]
+    :param accelerations: (P, J) second derivatives [m/s^2] and [rad/s^2]
+    """
+
+    stamp_ns: int
+    names: tuple[str, ...]
+    times_ns: NDArray[np.int64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    accelerations: NDArray[np.float64]
+
+
+def without_absent(series: JointSeries, vehicles: int) -> JointSeries:
+    """
+    Leave out the objects that are at none of the points: of many that may appear few are there.
+
+    :param series: of driven vehicles, which all stay, and of objects behind them.
+    :param vehicles: number of driven vehicles.
+    """
+    width = len(VEHICLE_JOINTS) * vehicles
+    joints = len(OBJECT_JOINTS)
+    here = np.isfinite(series.positions[:, width::joints]).any(axis=0)
+    if here.all():
+        return series
+    columns = np.concatenate((np.arange(width), width + np.flatnonzero(np.repeat(here, joints))))
+    return JointSeries(series.stamp_ns, tuple(series.names[i] for i in columns.tolist()),
+                       series.times_ns, *(values.take(columns, axis=1) for values in (
+                           series.positions, series.velocities, series.accelerations)))
+
+
+def vehicle_joint_names(vehicle_id: str) -> tuple[str, ...]:
+    """Name the joints of a driven vehicle."""
+    return tuple(f'{vehicle_id}/{joint}' for joint in VEHICLE_JOINTS)
+
+
+def object_joint_names(object_id: str) -> tuple[str, ...]:
+    """Name the joints of an object that is no driven vehicle."""
+    return tuple(f'{object_id}/{joint}' for joint in OBJECT_JOINTS)
+
+
+def vehicle_to_joints(
+    state: VehicleState,
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    """
+    Give a vehicle's joint positions, velocities and accelerations (4 each).
+
+    The angular accelerations are no part of the model and stay NaN.
+    """
+    cos, sin = math.cos(state.yaw), math.sin(state.yaw)
+    return (
+        (state.x, state.y, state.yaw, state.steering_angle),
+        (state.speed * cos, state.speed * sin, state.yaw_rate, state.steering_rate),
+        (state.acceleration * cos - state.speed * state.yaw_rate * sin,
+         state.acceleration * sin + state.speed * state.yaw_rate * cos, math.nan, math.nan))
+
+
+def vehicles_from_joints(
+    positions: NDArray[np.float64], velocities: NDArray[np.float64],
+    accelerations: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """
+    Give vehicle states from joints; the inverse of `vehicle_to_joints` up to rounding.
+
+    :param positions: (..., 4) x, y, yaw, steering
+    :param velocities: (..., 4)
+    :param accelerations: (..., 4); only x and y are used
+    :return: (..., 8) states, columns as in `StateColumn`
+    """
+    states = np.empty((*positions.shape[:-1], STATE_WIDTH))
+    cos, sin = np.cos(positions[..., 2]), np.sin(positions[..., 2])
+    states[..., StateColumn.X:StateColumn.YAW + 1] = positions[..., :3]
+    states[..., StateColumn.SPEED] = velocities[..., 0] * cos + velocities[..., 1] * sin
+    states[..., StateColumn.STEERING_ANGLE] = positions[..., 3]
+    states[..., StateColumn.ACCELERATION] = (
+        accelerations[..., 0] * cos + accelerations[..., 1] * sin)
+    states[..., StateColumn.YAW_RATE] = velocities[..., 2]
+    states[..., StateColumn.STEERING_RATE] = velocities[..., 3]
+    return states
+
+
+def plan_to_joints(plan: Plan, vehicle_id: str, time_step_ns: int) -> JointSeries:
+    """
+    Give a plan as joints.
+
+    :param vehicle_id: the AV it is for.
+    :param time_step_ns: Delta t_c [ns]
+    """
+    states = plan.states
+    cos, sin = np.cos(states[:, StateColumn.YAW]), np.sin(states[:, StateColumn.YAW])
+    speed, yaw_rate = states[:, StateColumn.SPEED], states[:, StateColumn.YAW_RATE]
+    acceleration = states[:, StateColumn.ACCELERATION]
+    nowhere = np.full(len(states), np.nan)
+    positions = states[:, (StateColumn.X, StateColumn.Y, StateColumn.YAW,
+                           StateColumn.STEERING_ANGLE)]
+    velocities = np.stack((speed * cos, speed * sin, yaw_rate,
+                           states[:, StateColumn.STEERING_RATE]), axis=1)
+    accelerations = np.stack((acceleration * cos - speed * yaw_rate * sin,
+                              acceleration * sin + speed * yaw_rate * cos, nowhere, nowhere),
+                             axis=1)
+    times_ns = np.arange(len(states), dtype=np.int64) * time_step_ns
+    return JointSeries(plan.stamp_ns, vehicle_joint_names(vehicle_id), times_ns,
+                       positions, velocities, accelerations)
+
+
+def plan_from_joints(series: JointSeries, vehicle_id: str, time_step_ns: int) -> Plan:
+    """
+    Read a plan from joints, whoever sent them; accelerations may be left out (NaN).
+
+    :param vehicle_id: the AV that the plan must be for.
+    :param time_step_ns: Delta t_c [ns], the grid that the points must be on.
+    :raises InputError: naming what is wrong: joints, empty, lengths, grid.
+    """
+    where = f'/{vehicle_id}/plan'
+    if series.names != vehicle_joint_names(vehicle_id):
+        raise InputError('joint_names are ' + ', '.join(series.names)[:200], where,
+                         'name ' + ', '.join(vehicle_joint_names(vehicle_id)))
+    if not len(series.times_ns):
+        raise InputError('has no points', where)
+    grid = np.arange(len(series.times_ns), dtype=np.int64) * time_step_ns
+    if np.abs(series.times_ns - grid).max() > time_step_ns // 100:
+        raise InputError('time_from_start is off the grid', where,
+                         f'space the points {time_step_ns / 1e9:g} s apart, the first at 0')
+    states = vehicles_from_joints(series.positions, series.velocities, series.accelerations)
+    column = states[:, StateColumn.ACCELERATION]
+    if np.isnan(series.accelerations).all() and len(states) > 1:
+        # Accelerations may be left out: they follow from the speeds.
+        column[:] = np.gradient(states[:, StateColumn.SPEED], time_step_ns * 1e-9)
+    return Plan(series.stamp_ns, states)

@@ -1,0 +1,73 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What is asked of a motion planner, and what it answers.
+
+Poses of the ego are rear-axle poses, those of obstacles are centre poses, all in the CommonRoad
+scenario frame.
+"""
+
+from dataclasses import dataclass, field
+
+from crgame_ros.errors import InputError
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """
+    One atomic snapshot at scenario time step k, with predictions over P - 1 further steps.
+
+    :param stamp_ns: simulation time of the snapshot [ns]; the plan carries it back.
+    :param k: scenario time step.
+    :param time_step_s: scenario step Delta t_c [s].
+    :param ego: state of the planner's own vehicle (rear axle).
+    :param obstacle_ids: (M) names; keys of `PlannerContext.objects`.
+    :param obstacle_poses: (P, M, 3) centre x, y, yaw at k, k + 1, …; NaN where absent.
+    :param obstacle_velocities: (P, M, 3) derivatives of the poses; NaN where absent.
+    """
+
+    stamp_ns: int
+    k: int
+    time_step_s: float
+    ego: VehicleState
+    obstacle_ids: tuple[str, ...] = ()
+    obstacle_poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((1, 0, 3)))
+    obstacle_velocities: NDArray[np.float64] = field(
+        default_factory=lambda: np.empty((1, 0, 3)))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """
+    Planned states of the ego on the scenario grid; state 0 is at the request's time.
+
+    :param stamp_ns: stamp of the request that this plan answers [ns].
+    :param states: (S, 8) rear-axle states, columns as in `StateColumn`, rows Delta t_c apart.
+    :param fallback: True when the planner failed and its adapter answered by braking.
+    """
+
+    stamp_ns: int
+    states: NDArray[np.float64]
+    fallback: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse an array that is no list of states."""
+        if self.states.ndim != 2 or self.states.shape[1] != STATE_WIDTH or not len(self.states):
+            raise InputError(f'a plan has shape {self.states.shape}', 'plan',
+                             f'give at least one row of {STATE_WIDTH} columns: '
+                             + ', '.join(c.name.lower() for c in StateColumn))

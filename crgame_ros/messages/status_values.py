@@ -1,0 +1,49 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The values of a status, which ROS's diagnostics carry as text: written and read in one way."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+def status_text(value: object) -> str:
+    """Write a value: yes and no as `true` and `false`, as ROS's own tools do."""
+    if isinstance(value, bool | np.bool_):
+        return 'true' if value else 'false'
+    return str(value)
+
+
+def status_truth(values: Mapping[str, str], key: str, default: bool = False) -> bool:
+    """Read a yes or no; recordings of earlier versions have `True`."""
+    return values[key].lower() == 'true' if key in values else default
+
+
+class Status(NamedTuple):
+    """A diagnostic_msgs/DiagnosticStatus: level 0 OK, 1 WARN, 2 ERROR, 3 STALE."""
+
+    name: str
+    level: int
+    text: str
+    values: dict[str, str]
+
+
+def read_status(message: Any) -> Status:
+    """Read a status, whichever library has decoded it."""
+    level = message.level
+    return Status(str(message.name), level[0] if isinstance(level, bytes) else int(level),
+                  str(message.message),
+                  {str(item.key): str(item.value) for item in message.values})

@@ -1,0 +1,85 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The world in messages: where all vehicles and objects are, whoever reads it from wherever."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from crgame_ros.game.objects import ObjectDescription, ObjectStates
+from crgame_ros.messages.joint_messages import JointReader
+from crgame_ros.messages.joints import (
+    object_joint_names,
+    OBJECT_JOINTS,
+    vehicle_joint_names,
+    VEHICLE_JOINTS,
+    vehicles_from_joints,
+)
+import numpy as np
+from numpy.typing import NDArray
+
+VEHICLES_TOPIC = '/vehicles/state'
+TICK_STATES_TOPIC = '/vehicles/tick_state'
+OBJECT_STATES_TOPIC = '/traffic/objects'
+
+FloatArray = NDArray[np.float64]
+
+
+def joints_of(topic: str, ids: Iterable[str]) -> list[str]:
+    """Name the joints of vehicles or objects, by the topic that holds them."""
+    names = object_joint_names if topic == OBJECT_STATES_TOPIC else vehicle_joint_names
+    return [name for item in ids for name in names(item)]
+
+
+class WorldMessages:
+    """
+    Reads where the vehicles and objects of one run are.
+
+    :param descriptions: of the run.
+    :ivar vehicles: ids of the V driven vehicles, in order.
+    :ivar objects: ids of the M others, in order.
+    """
+
+    def __init__(self, descriptions: Iterable[ObjectDescription]) -> None:
+        known = tuple(descriptions)
+        self.vehicles = tuple(item.id for item in known if item.role.is_ego)
+        self.objects = tuple(item.id for item in known if not item.role.is_ego)
+        self._vehicles = JointReader(joints_of(VEHICLES_TOPIC, self.vehicles), VEHICLES_TOPIC)
+        self._objects = JointReader(joints_of(OBJECT_STATES_TOPIC, self.objects),
+                                    OBJECT_STATES_TOPIC)
+
+    def vehicle_joints(self, message: Any) -> FloatArray:
+        """
+        Give (3, V, 4) positions, velocities and accelerations of the vehicles' joints.
+
+        :raises InputError: if the message is another run's.
+        """
+        return self._vehicles.read(message).reshape(3, -1, len(VEHICLE_JOINTS))
+
+    def vehicle_states(self, message: Any) -> FloatArray:
+        """
+        Give (V, 8) states, columns as in `StateColumn`.
+
+        :raises InputError: if the message is another run's.
+        """
+        return vehicles_from_joints(*self.vehicle_joints(message))
+
+    def object_states(self, message: Any) -> ObjectStates:
+        """
+        Give the objects' states.
+
+        :raises InputError: if the message is another run's.
+        """
+        point = self._objects.read(message).reshape(3, -1, len(OBJECT_JOINTS))
+        return ObjectStates(point[0], point[1])

@@ -1,0 +1,269 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the cockpit shows of a live run: topics in, documents and frames for the page out."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+import time
+
+from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.message_frames import MessageFrames
+from crgame_ros.cockpit.run_files import files_document
+from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.documents import (
+    MALFORMED,
+    parse_events_document,
+    parse_signals_document,
+)
+from crgame_ros.messages.status_values import read_status
+from crgame_ros.nodes.cockpit.av_feed import AvFeed
+from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.run_time import RunTime, TimeCourse
+from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
+from crgame_ros.timing.cycle_rows import CycleTable
+from diagnostic_msgs.msg import DiagnosticStatus
+import numpy as np
+from numpy.typing import NDArray
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
+
+STATUS_PERIOD_S = 0.2
+# Of the state frames that a client gets: who drives gets each.
+WATCHER_PERIOD_S = 1.0 / 30.0
+SKIPPING_PERIOD_S = 0.1
+# sim_node tells its state every second; after a longer silence it is gone [s].
+SILENCE_S = 3.0
+QUEUE = 100
+# What people do not notice the delay of is looked at less often than what moves [s].
+SLOW_PERIOD_S = 0.02
+UNREADABLE = (CrgameError, IndexError, *MALFORMED)
+
+
+class CockpitFeed:
+    """
+    Reads the graph without an executor and passes on what the page shows.
+
+    :param endpoints: of the node.
+    :param hub: all pages.
+    :param runs: folder of the session's files; None where nobody keeps any.
+    """
+
+    def __init__(self, endpoints: Endpoints, hub: Hub, runs: Path | None = None) -> None:
+        self._endpoints = endpoints
+        self._hub = hub
+        self._runs = runs
+        self.status = RunStatus()
+        self._documents = ScenarioDocuments(endpoints)
+        self._avs = AvFeed(endpoints, hub)
+        # Of what moves the newest is enough.
+        self._states = endpoints.polled('/vehicles/state', depth=1)
+        self._objects = endpoints.polled('/traffic/objects', depth=1)
+        self._cycles = endpoints.polled('/timing/cycle', depth=1)
+        self._signals = endpoints.polled('/scenario/signals')
+        self._fired = endpoints.polled('/scenario/events')
+        self._frame_skip = endpoints.polled('/timing/frame_skip')
+        self._diagnostics = endpoints.polled('/diagnostics', depth=QUEUE)
+        self._verdicts: dict[str, PolledSubscription] = {}
+        self.scenario: ScenarioSet | None = None
+        self.frames_skipped = False
+        self._vehicle_ids: list[str] = []
+        self._frames: MessageFrames | None = None
+        self._commands: NDArray[np.float64] | None = None
+        self.n = 0
+        self._time = RunTime()
+        # How often time has run back: pages then forget what they have shown.
+        self._again = 0
+        self._run_heard_s = 0.0
+        self._slow_s = 0.0
+        self._status_s = 0.0
+        self._told_run = ''
+        self._pace: tuple[float, int] = (0.0, 0)
+        self._measured_factor: float | None = None
+
+    @property
+    def t(self) -> float:
+        """Time of the run [s]."""
+        return 0.0 if self.scenario is None else self.n * self.scenario.game.scheduler.dt_s
+
+    def poll(self) -> list[str]:
+        """
+        Take what has come, and pass it on.
+
+        :return: what went wrong, one line each
+        """
+        problems: list[str] = []
+        now_s = time.monotonic()
+        if now_s - self._slow_s >= SLOW_PERIOD_S:
+            self._slow_s = now_s
+            for work in (self._poll_documents, self._poll_plans, self._poll_perception,
+                         self._poll_texts, self._poll_diagnostics):
+                _read(work, problems)
+        for work in (self._poll_commands, self._poll_states, self._poll_objects):
+            _read(work, problems)
+        # The page holds its picture still in a pause: it must not learn of it late.
+        if now_s - self._status_s >= STATUS_PERIOD_S or self.status.run != self._told_run:
+            self._status_s = now_s
+            self._told_run = self.status.run
+            self._send_status(now_s)
+        return problems
+
+    def pace(self, client: Client) -> None:
+        """Choose how many state frames a client gets."""
+        client.state_period_s = SKIPPING_PERIOD_S if self.frames_skipped else (
+            0.0 if client.drives else WATCHER_PERIOD_S)
+
+    def _poll_documents(self) -> None:
+        scenario = self._documents.poll()
+        if scenario is not None:
+            self._begin(scenario)
+        order = self._frame_skip.latest()
+        if order is not None:
+            self.frames_skipped = bool(order.data)
+
+    def _begin(self, scenario: ScenarioSet) -> None:
+        """Show another scenario, game or epoch."""
+        game = scenario.game
+        scene = scene_document(scenario.loaded, scenario.objects, game)
+        self._frames = MessageFrames(game, scenario.objects)
+        self._avs.begin(game, self._frames)
+        self.scenario = scenario
+        self._vehicle_ids = [item.id for item in scenario.driven]
+        self._commands = None
+        self.n = 0
+        self._time = RunTime()
+        self._run_heard_s = time.monotonic()
+        self.status.begin(self._vehicle_ids)
+        for vehicle in self._verdicts.keys() - set(self._vehicle_ids):
+            self._endpoints.release(self._verdicts.pop(vehicle))
+        for vehicle in self._vehicle_ids:
+            if vehicle not in self._verdicts:
+                self._verdicts[vehicle] = self._endpoints.polled('/<v>/drivability', vehicle)
+        self._hub.set_document('scene', {**scene, 'again': self._again})
+        self._hub.set_document('events', {'fired': []})
+        self._avs.show_map()
+
+    def _poll_plans(self) -> None:
+        self._avs.poll_plans(self.frames_skipped)
+
+    def _poll_perception(self) -> None:
+        self._avs.poll_perception(self.frames_skipped)
+
+    def _poll_commands(self) -> None:
+        """Keep what the vehicles obeyed in the last cycle."""
+        cycle: Float64MultiArray | None = self._cycles.latest()
+        if cycle is None or self.scenario is None:
+            return
+        table = CycleTable.from_message(cycle.layout.dim[1].label, cycle.data)
+        # One of the game before or after this one tells nothing.
+        if table.epoch == self.scenario.game.epoch:
+            self._commands = table.commands_of(self._vehicle_ids)[-1]
+
+    def _poll_states(self) -> None:
+        message: JointTrajectory | None = self._states.latest()
+        frames = self._frames
+        if message is None or frames is None or (place := frames.place_of(message)) is None:
+            return
+        course = self._time.follow(from_time(message.header.stamp))
+        if course is TimeCourse.BACK and self.scenario is not None:
+            # A recording that is played once more.
+            self._again += 1
+            self._begin(self.scenario)
+        elif course is TimeCourse.BEHIND:
+            return
+        # Those of the game before or after this one are passed over.
+        with suppress(InputError):
+            states = frames.states(message)
+            self.n = place.n
+            self._endpoints.diagnostics.now_ns = from_time(message.header.stamp)
+            self._hub.send_frame(*frames.state(place, states, self._commands))
+
+    def _poll_objects(self) -> None:
+        message: JointTrajectory | None = self._objects.latest()
+        frames = self._frames
+        if message is None or frames is None or (place := frames.place_of(message)) is None:
+            return
+        with suppress(InputError):
+            self._hub.send_frame(*frames.objects(place, message))
+
+    def _poll_texts(self) -> None:
+        if self.scenario is None:
+            return
+        signals, fired = self._signals.latest(), self._fired.latest()
+        if fired is not None:
+            epoch, events = parse_events_document(fired.data)
+            if epoch == self.scenario.game.epoch:
+                self._hub.set_document('events', {'fired': [asdict(event) for event in events]})
+        if signals is not None:
+            k, states = parse_signals_document(signals.data)
+            self._hub.set_document('signals', {'k': k, 'states': states})
+
+    def _poll_diagnostics(self) -> None:
+        for slot in (self._diagnostics, *self._verdicts.values()):
+            # A flood waits its turn.
+            for _ in range(QUEUE):
+                message = slot.take()
+                if message is None:
+                    break
+                stamp_ns = from_time(message.header.stamp)
+                for status in message.status:
+                    self._take_status(status, stamp_ns)
+
+    def _take_status(self, status: DiagnosticStatus, stamp_ns: int) -> None:
+        # Others speak before they have heard of any time.
+        timeless = stamp_ns == 0 and not (
+            status.name.startswith('sim_node: ') or status.name.endswith('/drivability'))
+        if self.scenario is not None and not timeless \
+                and stamp_ns < self.scenario.game.scheduler.clock_offset_ns:
+            # Of the run before.
+            return
+        self.status.take(read_status(status), self.t)
+        if status.name == 'sim_node: run':
+            self._run_heard_s = time.monotonic()
+
+    def _send_status(self, now_s: float) -> None:
+        if self.scenario is None:
+            return
+        if now_s - self._run_heard_s > SILENCE_S:
+            self.status.lose()
+        since_s, since_n = self._pace
+        if now_s - since_s >= 1.0:
+            passed = (self.n - since_n) * self.scenario.game.scheduler.dt_s
+            self._measured_factor = passed / (now_s - since_s) if passed >= 0.0 else None
+            self._pace = (now_s, self.n)
+        for client in self._hub.clients.values():
+            self.pace(client)
+        game = self.scenario.game
+        self._hub.set_document('status', {
+            **self.status.document(), 't': self.t, 'n': self.n,
+            'k': game.scheduler.k(self.n), 'epoch': game.epoch,
+            'measured_factor': self._measured_factor, 'frames_skipped': self.frames_skipped,
+            'clients': len(self._hub.clients)})
+        if self.status.run == 'ended' and self._runs is not None:
+            self._hub.set_document('files', files_document(self._runs, game.epoch))
+        self._hub.set_document('alarms', self.status.alarms_document())
+
+
+def _read(work: Callable[[], None], problems: list[str]) -> None:
+    """Take in one kind of message; one that cannot be read keeps nobody from the others."""
+    try:
+        work()
+    except UNREADABLE as error:
+        problems.append(f'{work.__name__[len("_poll_"):]}: {error}')

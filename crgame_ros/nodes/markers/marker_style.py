@@ -1,0 +1,85 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How markers look: colours that the colour-blind can tell apart, heights, and a blank marker."""
+
+from collections.abc import Iterable
+
+from builtin_interfaces.msg import Duration
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.messages.joint_messages import MAP
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker
+
+# The palette of Okabe and Ito, with greys and a lavender.
+ORANGE, SKY_BLUE, GREEN, YELLOW = '#E69F00', '#56B4E9', '#009E73', '#F0E442'
+VERMILLION, PURPLE, LAVENDER = '#D55E00', '#CC79A7', '#B3A2E8'
+WHITE, LIGHT_GREY, GREY, DARK_GREY = '#FFFFFF', '#C8C8C8', '#999999', '#666666'
+ROAD, PATHS, INK = '#3A3D42', '#5A5D63', '#101010'
+BRAKE_ON, BRAKE_OFF = '#FF1010', '#500000'
+ROLE_COLOURS = {Role.HUMAN: ORANGE, Role.AUTONOMOUS: SKY_BLUE, Role.RECORDED: LIGHT_GREY,
+                Role.STATIC: GREY, Role.TRAFFIC: GREEN, Role.SCRIPTED: LAVENDER}
+LIGHT_COLOURS = {'red': VERMILLION, 'redYellow': ORANGE, 'yellow': YELLOW, 'green': GREEN,
+                 'inactive': DARK_GREY}
+SOFT_TYPES = frozenset({'pedestrian', 'bicycle'})
+MOTOR_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'taxi', 'priorityVehicle'})
+# CommonRoad is plane: these heights [m] serve views from the side only.
+HEIGHTS = {'pedestrian': 1.75, 'bicycle': 1.7, 'motorcycle': 1.5, 'truck': 3.5, 'bus': 3.2,
+           'train': 3.8, 'building': 6.0}
+HEIGHT = 1.5
+
+
+def colour(code: str, alpha: float = 1.0) -> ColorRGBA:
+    """Give a colour of the form #RRGGBB as a message."""
+    red, green, blue = (int(code[place:place + 2], 16) / 255.0 for place in (1, 3, 5))
+    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
+
+
+def body_colour(item: ObjectDescription) -> str:
+    """Choose the colour of an object: people outside cars stand out, whoever moves them."""
+    return PURPLE if item.type in SOFT_TYPES else ROLE_COLOURS[item.role]
+
+
+def body_height(item: ObjectDescription) -> float:
+    """Give the height of an object's box [m]."""
+    return HEIGHTS.get(item.type, HEIGHT)
+
+
+def blank(header: Header, namespace: str, number: int, kind: int, paint: ColorRGBA,
+          scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+          lifetime_s: int = 0) -> Marker:
+    """
+    Build a marker at the origin of map.
+
+    :param header: shared by the markers of a message.
+    :param number: id, unique in the namespace.
+    :param kind: Marker.CUBE …
+    :param lifetime_s: after which viewers drop it, 0 for never [s]
+    """
+    marker = Marker(header=header, ns=namespace, id=number, type=kind, action=Marker.ADD,
+                    color=paint, lifetime=Duration(sec=lifetime_s))
+    marker.pose.orientation.w = 1.0
+    marker.scale.x, marker.scale.y, marker.scale.z = scale
+    return marker
+
+
+def map_header() -> Header:
+    """Give a header in frame map."""
+    return Header(frame_id=MAP)
+
+
+def points(rows: Iterable[Iterable[float]], z: float) -> list[Point]:
+    """Give (x, y) points as messages, all at one height [m]."""
+    return [Point(x=x, y=y, z=z) for x, y in rows]

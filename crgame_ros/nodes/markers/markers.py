@@ -1,0 +1,229 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The scene on `/markers`: the map once, and what moves, in messages refilled in place."""
+
+from collections.abc import Mapping
+
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.messages.joints import JointSeries, vehicle_joint_names
+from crgame_ros.messages.request_layout import RequestLayout
+from crgame_ros.nodes.markers import marker_style as style
+from crgame_ros.nodes.markers.body_markers import Body, BRAKING, Item, LIFETIME_S, Light, Line
+from crgame_ros.nodes.markers.map_markers import light_positions, map_markers
+from crgame_ros.ros.ros_messages import set_time
+from crgame_ros.ros.scenario_documents import ScenarioSet
+from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+FloatArray = NDArray[np.float64]
+
+PREDICTION_Z, PLAN_Z = 0.06, 0.08
+# Above the roofs of cars: where something is seen and where it is are then both in sight.
+PERCEIVED_Z = 1.6
+# Predictions are drawn with a point about every half second [s] …
+PREDICTION_STEP_S = 0.5
+# … where they lead anywhere [m], until they are so old [ns].
+PREDICTION_MOVES = 0.05
+PREDICTION_AGE_NS = 1_500_000_000
+# Of the line around a round thing.
+CIRCLE_CORNERS = 8
+
+
+class SceneMarkers:
+    """
+    The markers of one set of documents.
+
+    Driven vehicles stand where the game starts them until their first states come.
+
+    :param documents: what the run is.
+    """
+
+    def __init__(self, documents: ScenarioSet) -> None:
+        self._loaded = documents.loaded
+        game = documents.game
+        self._problems = [av.planning_problem for av in game.avs]
+        self._header: Header = style.map_header()
+        self._bodies = [Body(self._header, number, item)
+                        for number, item in enumerate(documents.objects)]
+        self._vehicles = len(documents.driven)
+        self._lights = {number: Light(self._header, number, place) for number, place
+                        in light_positions(self._loaded.scenario.lanelet_network).items()}
+        outlines = {
+            item.id: outline(item.shape, CIRCLE_CORNERS, False) + (item.rear_to_center, 0.0)
+            for item in documents.objects}
+        self._paths = {av.id: AvPaths(
+            self._header, number, av.id, av.transform,
+            outlines if av.perception is not None else {})
+            for number, av in enumerate(game.avs)}
+        self._stamp_ns = game.scheduler.clock_offset_ns
+        self._time_step_ns = game.scheduler.time_step_ns
+        self._objects: ObjectStates | None = None
+        self._objects_ns = 0
+        self._objects_brake = np.zeros(len(documents.others), dtype=bool)
+        self._message = MarkerArray()
+        self.set_vehicles(np.array([item.state for item in game.vehicles]),
+                          self._stamp_ns)
+
+    def map_message(self, clear: bool) -> MarkerArray:
+        """
+        Draw the map, which is never drawn again unless asked for.
+
+        :param clear: whether to delete whatever was shown before.
+        """
+        first = [Marker(header=style.map_header(), action=Marker.DELETEALL)] if clear else []
+        return MarkerArray(markers=[*first, *map_markers(self._loaded, self._problems)])
+
+    def set_vehicles(self, states: FloatArray, stamp_ns: int) -> None:
+        """
+        Place the driven vehicles.
+
+        :param states: (V, 8) rear-axle states, columns as in `StateColumn`
+        :param stamp_ns: simulation time, to which everything is drawn [ns]
+        """
+        self._stamp_ns = stamp_ns
+        speed, acceleration = states[:, StateColumn.SPEED], states[:, StateColumn.ACCELERATION]
+        braking = acceleration * np.sign(speed) < -BRAKING
+        for body, (x, y, yaw), brakes in zip(self._bodies, states[:, :3].tolist(),
+                                             braking.tolist(), strict=False):
+            body.place(x, y, yaw, brakes)
+
+    def set_objects(self, objects: ObjectStates, stamp_ns: int) -> None:
+        """Take the other objects at a scenario step; they brake where they got slower."""
+        before, passed_s = self._objects, (stamp_ns - self._objects_ns) * 1e-9
+        if before is not None and passed_s > 0.0:
+            slower = (_speeds(objects) - _speeds(before)) / passed_s
+            self._objects_brake = slower < -BRAKING
+        self._objects, self._objects_ns = objects, stamp_ns
+
+    def set_signals(self, states: Mapping[str, str]) -> None:
+        """Take traffic-light states by light id; lights that are not named are inactive."""
+        for number, light in self._lights.items():
+            light.show(states.get(str(number), 'inactive'))
+
+    def set_plan(self, av_id: str, series: JointSeries) -> None:
+        """Take an AV's plan."""
+        self._paths[av_id].set_plan(series)
+
+    def set_prediction(self, av_id: str, series: JointSeries) -> None:
+        """Take the request of an AV: what its planner is told of the others' future."""
+        self._paths[av_id].set_prediction(series)
+
+    def message(self) -> MarkerArray:
+        """Give everything that moves or changes, at the time of the vehicles' states."""
+        set_time(self._header.stamp, self._stamp_ns)
+        self._place_objects()
+        items: list[Item] = [*self._lights.values(), *self._bodies]
+        for paths in self._paths.values():
+            paths.expire(self._stamp_ns)
+            items += (paths.plan, paths.prediction, paths.perceived)
+        markers: list[Marker] = []
+        for item in items:
+            item.collect(markers)
+        self._message.markers = markers
+        return self._message
+
+    def _place_objects(self) -> None:
+        """Move the objects on from their scenario step: their velocities lead to the next."""
+        if self._objects is None:
+            return
+        since_ns = min(max(self._stamp_ns - self._objects_ns, 0), self._time_step_ns)
+        poses = self._objects.poses + np.nan_to_num(self._objects.velocities) * (since_ns * 1e-9)
+        for body, (x, y, yaw), brakes in zip(self._bodies[self._vehicles:], poses.tolist(),
+                                             self._objects_brake.tolist(), strict=True):
+            body.place(x, y, yaw, brakes)
+
+
+def _speeds(objects: ObjectStates) -> FloatArray:
+    """Give signed speeds (M) [m/s]; NaN, which is never braking, where absent."""
+    yaw = objects.poses[:, 2]
+    speeds: FloatArray = (objects.velocities[:, 0] * np.cos(yaw)
+                          + objects.velocities[:, 1] * np.sin(yaw))
+    return speeds
+
+
+class AvPaths:
+    """
+    The plan of an AV, and what it was told of the others, as lines.
+
+    :param transform: from simulation to the scenario coordinates in which the planner thinks.
+    :param outlines: corners (n, 2) of each object around its reference point, by id [m]; of an AV
+        that knows the truth, whose planner is told what everybody sees, nothing.
+    """
+
+    def __init__(self, header: Header, number: int, av_id: str, transform: RigidTransform,
+                 outlines: Mapping[str, FloatArray]) -> None:
+        self._transform = transform
+        self._outlines = outlines
+        self._own = av_id
+        self._names = vehicle_joint_names(av_id)
+        self.plan = Line(style.blank(
+            header, 'plan', number, Marker.LINE_STRIP, style.colour(style.SKY_BLUE),
+            (0.4, 0.0, 0.0), LIFETIME_S), PLAN_Z)
+        self.prediction = Line(style.blank(
+            header, 'prediction', number, Marker.LINE_LIST, style.colour(style.YELLOW, 0.7),
+            (0.2, 0.0, 0.0), LIFETIME_S), PREDICTION_Z)
+        self.perceived = Line(style.blank(
+            header, 'perceived', number, Marker.LINE_LIST, style.colour(style.VERMILLION),
+            (0.15, 0.0, 0.0), LIFETIME_S), PERCEIVED_Z)
+        self._plan_end_ns = 0
+        self._prediction_end_ns = 0
+
+    def set_plan(self, series: JointSeries) -> None:
+        """Draw the rear-axle positions of a plan; one for somebody else is passed over."""
+        if series.names != self._names or not len(series.times_ns):
+            return
+        places = self._transform.to_simulation(series.positions[:, :3])[:, :2]
+        self.plan.fill(places[np.isfinite(places).all(axis=1)])
+        self._plan_end_ns = series.stamp_ns + int(series.times_ns[-1])
+
+    def set_prediction(self, series: JointSeries) -> None:
+        """
+        Draw where everybody else is expected to go, of their reference points.
+
+        :raises InputError: if it is another AV's request.
+        """
+        if len(series.times_ns) < 2:
+            return
+        step_s = float(series.times_ns[1] - series.times_ns[0]) * 1e-9
+        stride = max(1, round(PREDICTION_STEP_S / max(step_s, 1e-3)))
+        chosen = np.unique([*range(0, len(series.times_ns), stride), len(series.times_ns) - 1])
+        layout = RequestLayout.of(series.names, self._own)
+        poses = series.positions[chosen][:, layout.columns]
+        poses = self._transform.to_simulation(poses)
+        ends = np.stack((poses[:-1, :, :2], poses[1:, :, :2]), axis=2)
+        moves = np.hypot(*np.moveaxis(ends[:, :, 1] - ends[:, :, 0], 2, 0))
+        self.prediction.fill(ends[moves > PREDICTION_MOVES].reshape(-1, 2))
+        edges = [_edges(self._outlines[owner], pose)
+                 for owner, pose in zip(layout.ids, poses[0], strict=True)
+                 if owner in self._outlines and np.isfinite(pose).all()]
+        self.perceived.fill(np.concatenate(edges) if edges else np.empty((0, 2)))
+        self._prediction_end_ns = series.stamp_ns + PREDICTION_AGE_NS
+
+    def expire(self, stamp_ns: int) -> None:
+        """Take away a plan that is used up and a prediction that is out of date."""
+        self.plan.present &= stamp_ns <= self._plan_end_ns
+        self.prediction.present &= stamp_ns <= self._prediction_end_ns
+        self.perceived.present &= stamp_ns <= self._prediction_end_ns
+
+
+def _edges(corners: FloatArray, pose: FloatArray) -> FloatArray:
+    """Give the ends (2 n, 2) of an outline's edges at a pose: x, y [m] and yaw [rad]."""
+    ends = placed(corners, pose)
+    return np.stack((ends, np.roll(ends, -1, axis=0)), axis=1).reshape(-1, 2)

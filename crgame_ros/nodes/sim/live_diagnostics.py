@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What sim_node tells of its planners and seats on /diagnostics."""
+
+from collections.abc import Mapping
+
+from crgame_ros.nodes.sim.sim_inputs import SimInputs
+from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
+from crgame_ros.simulation.engine import Simulation
+from diagnostic_msgs.msg import DiagnosticStatus
+
+# Refusals published as they happen, between two reports: a flood must not cost the cycle.
+MAX_REFUSALS_PER_REPORT = 5
+
+
+class LiveDiagnostics:
+    """Reports once a second, and refusals as they happen."""
+
+    def __init__(self, outputs: SimOutputs, simulation: Simulation, inputs: SimInputs) -> None:
+        self._outputs = outputs
+        self._simulation = simulation
+        self._inputs = inputs
+        self._refusals = 0
+
+    def refusal(self, av_id: str, reason: str) -> None:
+        """Tell why a plan was refused."""
+        self._refused(f'{av_id} plan refused', reason, {})
+
+    def run_state(self, state: str, more: Mapping[str, object]) -> None:
+        """Tell whether the run is waiting, running, paused or ended."""
+        simulation = self._simulation
+        self._outputs.publish_diagnostics(
+            'run', DiagnosticStatus.OK, state,
+            {'n': simulation.n, 'k': simulation.scheduler.k(simulation.n), **more},
+            simulation.scheduler.stamp_ns(simulation.n))
+
+    def late_traffic(self, n: int, k: int, agents_k: int) -> None:
+        """Tell that agents of an earlier tick had to do."""
+        self._outputs.publish_diagnostics(
+            'traffic', DiagnosticStatus.WARN, f'agents are {k - agents_k} scenario steps late',
+            {'n': n, 'k': k, 'agents_k': agents_k}, self._simulation.scheduler.stamp_ns(n))
+
+    def event_refused(self, name: str, reason: str) -> None:
+        """Tell why a trigger brought nothing about."""
+        self._refused('event refused', reason, {'event': name[:40]})
+
+    def order_refused(self, reason: str) -> None:
+        """Tell why a seat is not driven by whom somebody named."""
+        self._refused('seat order refused', reason, {})
+
+    def _refused(self, subject: str, reason: str, values: Mapping[str, object]) -> None:
+        self._refusals += 1
+        if self._refusals <= MAX_REFUSALS_PER_REPORT:
+            simulation = self._simulation
+            self._outputs.publish_diagnostics(
+                subject, DiagnosticStatus.WARN, reason, {**values, 'n': simulation.n},
+                simulation.scheduler.stamp_ns(simulation.n))
+
+    def publish(self, n: int) -> None:
+        """Report on every AV and seat."""
+        self._refusals = 0
+        simulation = self._simulation
+        stamp_ns, dt_s = simulation.scheduler.stamp_ns(n), simulation.scheduler.dt_s
+        for av in simulation.avs:
+            counters, age = av.counters, av.plan_age_steps(n)
+            stale = av.uses_no_plan
+            self._outputs.publish_diagnostics(
+                f'{av.setup.id} plans',
+                DiagnosticStatus.ERROR if stale else DiagnosticStatus.OK,
+                'no plan: braking' if stale else 'following its plan',
+                {'planner': av.setup.spec.planner, 'running': av.planner_running,
+                 'requests': counters.requests, 'accepted': counters.accepted,
+                 'refused': counters.refused, 'skipped': counters.skipped,
+                 'timed_out': counters.timed_out, 'realigned': counters.realigned,
+                 'steps_without_plan': counters.steps_without_plan,
+                 'latency_ms': round(counters.last_latency_steps * dt_s * 1e3, 3),
+                 'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
+                 'last_refusal': counters.last_refusal, **_tracking(av)}, stamp_ns)
+        for seat in self._inputs.seats.all:
+            self._outputs.publish_diagnostics(
+                f'{seat.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
+                'driver lost' if seat.lost else 'driven',
+                {'source': seat.source, 'losses': seat.losses, 'malformed': seat.malformed,
+                 'outdated': seat.outdated, 'passed_over': seat.passed_over}, stamp_ns)
+
+
+def _tracking(av: AutonomousVehicle) -> dict[str, object]:
+    """Give how far a tracked AV is from its route's lane and its plan, now and at worst."""
+    execution = av.execution
+    if execution is None:
+        return {}
+    values: dict[str, object] = {}
+    lane = av.route_lane
+    if lane is not None:
+        values['lane_error'] = '' if lane.error is None else round(lane.error, 4)
+        values['worst_lane_error'] = round(lane.worst, 4)
+    for when, errors in (('', execution.errors), ('worst_', execution.worst)):
+        for name in ('lateral', 'along', 'heading', 'speed'):
+            value = '' if errors is None else round(getattr(errors, name), 4)
+            values[f'{when}{name}_error'] = value
+    return values

@@ -1,0 +1,352 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One epoch of a live run: from the request of k0 to the end, a reset or a stop."""
+
+from dataclasses import replace
+from enum import auto, Enum
+import gc
+import time
+from typing import TYPE_CHECKING
+
+from crgame_ros.errors import InputError
+from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
+from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
+from crgame_ros.nodes.sim.run_state import RunState, SIGNAL
+from crgame_ros.nodes.sim.sim_control import SimControl
+from crgame_ros.nodes.sim.sim_inputs import SimInputs
+from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.nodes.sim.start_gate import StartGate
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.heard_topics import HeardTopics
+from crgame_ros.ros.node_main import StopFlag
+from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.time_controller import TimeController
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
+    from crgame_ros.recording.recorded_inputs import RecordedInputs
+
+NS_PER_S = 1_000_000_000
+# How often the executor looks for service calls [Hz], and the least time left for it [ns].
+SERVICE_RATE = 20.0
+SERVICE_SLACK_NS = 1_500_000
+# The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
+WAKE_UP_NS = 120_000
+SETTLE_NS = 200_000_000
+
+
+class Outcome(Enum):
+    """Why an epoch ended."""
+
+    FINISHED = auto()
+    RESET = auto()
+    STOPPED = auto()
+
+
+class LiveRun:
+    """
+    Paces one simulation against the steady clock.
+
+    :param node: the node that owns the endpoints.
+    :param executor: runs its services.
+    :param control: orders from outside.
+    :param setup: the run.
+    :param epoch: counts resets.
+    :param clock_offset_ns: simulation time of step 0 [ns]
+    :param recorded: what drives seats as in a recording; None for nothing.
+    """
+
+    def __init__(self, node: Node, executor: SingleThreadedExecutor, control: SimControl,
+                 setup: Setup, epoch: int, clock_offset_ns: int,
+                 recorded: 'RecordedInputs | None' = None) -> None:
+        self._node = node
+        self._executor = executor
+        self._control = control
+        self._epoch = epoch
+        self._outputs = SimOutputs(node, setup)
+        self._inputs = SimInputs(
+            node, setup, clock_offset_ns, control.seat_sources, recorded)
+        scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
+        feed = None if setup.traffic is None else RemoteTraffic(
+            self._inputs.take_agents, setup.traffic, scheduler)
+        self.simulation = Simulation(setup, clock_offset_ns, feed)
+        self._inputs.choose(self._answers, None if feed is None else feed.wants)
+        self._dt_s = scheduler.dt_s
+        self._controller = TimeController(setup.game.timing, self._dt_s)
+        self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
+        self._state = RunState(self._outputs, self.simulation, self._diagnostics, control)
+        duration_s = control.duration_s or setup.game.duration
+        self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
+        self._feed = feed
+        # At high rates half a step has to do, or nobody could ever stop the run.
+        self._service_slack_ns = min(SERVICE_SLACK_NS, 0.5 * self._dt_s * NS_PER_S)
+        self._service_every = max(1, round(1.0 / self._dt_s / SERVICE_RATE))
+        self._second = max(1, round(1.0 / self._dt_s))
+        self._setup = setup
+        self._sleep_from_ns = 0
+        self._stop = StopFlag()
+        self._reason = ''
+
+    def run(self, stop: StopFlag) -> Outcome:
+        """Run until the game's end, a reset or a stop."""
+        self._stop = stop
+        self._outputs.publish_documents(
+            self._epoch, self.simulation.scheduler.clock_offset_ns,
+            self._control.real_time_factor, self._inputs.seats.document())
+        result = self.simulation.begin()
+        if self._epoch:
+            self._settle()
+        outcome = self._wait_for_companions(result)
+        if outcome is not None:
+            self._reason = self._reason or self._reason_for(outcome)
+            self._state.tell('ended', self._reason)
+            return outcome
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        try:
+            now_ns = time.monotonic_ns()
+            self._controller.start(now_ns)
+            self._controller.resume(now_ns, self._control.real_time_factor)
+            self._inputs.forgive(now_ns)
+            outcome = self._loop()
+            self._reason = self._reason or self._reason_for(outcome)
+            return outcome
+        finally:
+            gc.enable()
+            gc.unfreeze()
+            self._outputs.publish_rows()
+            self._diagnostics.publish(self.simulation.n)
+            self._state.tell('ended', self._reason)
+            self._outputs.wait_until_received()
+
+    def linger(self) -> Outcome:
+        """Show how the run has ended until it is begun anew, or everything is to end."""
+        control = self._control
+        control.over, control.stop_wanted = True, False
+        self._state.stand()
+        while not (self._stop.requested or control.reset_wanted):
+            self._state.tell('ended', self._reason)
+            self._executor.spin_once(timeout_sec=0.02)
+            self._state.show_newcomers()
+            self._take_orders(time.monotonic_ns())
+        control.over = False
+        return Outcome.STOPPED if self._stop.requested else Outcome.RESET
+
+    def _reason_for(self, outcome: Outcome) -> str:
+        """Say why the run has ended: duration, reset, stop, or signal."""
+        if outcome is Outcome.STOPPED:
+            return SIGNAL if self._stop.requested else 'stop'
+        return 'duration' if outcome is Outcome.FINISHED else 'reset'
+
+    def destroy(self) -> None:
+        """Release the endpoints."""
+        self._outputs.destroy()
+        self._inputs.destroy()
+
+    def _settle(self) -> None:
+        """Let everybody take the new documents in before the first message that needs them."""
+        until_ns = time.monotonic_ns() + SETTLE_NS
+        while time.monotonic_ns() < until_ns:
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def _wait_for_companions(self, result: StepResult) -> Outcome | None:
+        """Stay at step 0 until everybody is there, or an order ends it."""
+        control = self._control
+        self._state.tell('waiting')
+        heard = HeardTopics(Endpoints(self._node), self.simulation.scheduler.clock_offset_ns) \
+            if 'recorder_node' in control.companions else None
+        gate = StartGate(self._outputs, self._inputs, self.simulation, result,
+                         control.companions, self._take_plan, self._node.get_logger().warning,
+                         None if self._feed is None else self._feed.is_ahead, heard)
+        try:
+            return self._wait_at(gate)
+        finally:
+            if heard is not None:
+                heard.close()
+
+    def _wait_at(self, gate: StartGate) -> Outcome | None:
+        control = self._control
+        while True:
+            now_ns = time.monotonic_ns()
+            is_open = gate.is_open(now_ns, control.planner_timeout_s)
+            control.awaited = self._inputs.seats.awaited(now_ns)
+            if is_open and not control.stands_still and not control.awaited:
+                return None
+            self._state.tell('paused' if is_open and control.stands_still else 'waiting')
+            self._executor.spin_once(timeout_sec=0.005)
+            if is_open:
+                self._state.show_newcomers()
+            self._take_orders(time.monotonic_ns())
+            outcome = self._ordered_end()
+            if outcome is not None:
+                return outcome
+
+    def _ordered_end(self) -> Outcome | None:
+        control = self._control
+        self._look_for_violation()
+        if control.stop_wanted or self._stop.requested:
+            return Outcome.STOPPED
+        if control.reset_wanted:
+            return Outcome.RESET
+        return None
+
+    def _look_for_violation(self) -> None:
+        """End the run if a human's violation says so, and record where it did."""
+        stop = self._inputs.stop_request()
+        if stop is None:
+            return
+        vehicle_id, violation_n = stop
+        n = self.simulation.n
+        self._outputs.publish_diagnostics(
+            'stop', DiagnosticStatus.ERROR, f'{vehicle_id} violates drivability',
+            {'violation_n': violation_n, 'stop_n': n}, self.simulation.scheduler.stamp_ns(n))
+        self._node.get_logger().warning(
+            f'{vehicle_id} violates drivability (n = {violation_n}): stopping at n = {n}')
+        self._control.stop_wanted = True
+        self._reason = f'drivability of {vehicle_id}'
+
+    def _answers(self, av_id: str, stamp_ns: int) -> bool:
+        """Tell whether a plan answers a request; others are refused, however many there are."""
+        reason = self.simulation.unasked_plan(av_id, stamp_ns)
+        if reason is not None:
+            self._diagnostics.refusal(av_id, reason)
+        return reason is None
+
+    def _take_plan(self, av_id: str) -> bool:
+        """Offer an AV the plan that has come for it; tell whether it was accepted."""
+        try:
+            perceived = self._inputs.take_perceived(av_id)
+            reason = None if perceived is None else self.simulation.request_perceived(
+                av_id, perceived)
+            plan = self._inputs.take_plan(av_id)
+            if plan is not None:
+                reason = self.simulation.offer_plan(av_id, plan)
+            elif reason is None:
+                return False
+        except InputError as error:
+            reason = str(error)
+            self.simulation.refuse_malformed_plan(av_id, reason)
+        if reason is not None:
+            self._diagnostics.refusal(av_id, reason)
+        return reason is None
+
+    def _take_orders(self, now_ns: int) -> None:
+        """Obey who is to drive what, and which planners are to go or stop."""
+        changed, refusals = self._inputs.seats.take_orders(now_ns)
+        if changed:
+            self._outputs.publish_seats(self._inputs.seats.document())
+        for refusal in refusals:
+            self._node.get_logger().warning(refusal, throttle_duration_sec=1.0)
+            self._diagnostics.order_refused(refusal)
+        for av_id, running in self._inputs.planner_orders.items():
+            self.simulation.set_planner_running(av_id, running)
+        self._inputs.planner_orders.clear()
+
+    def _take_triggers(self) -> None:
+        """Hand the events over that somebody triggered since the last tick."""
+        for name in self._inputs.triggers():
+            reason = self.simulation.trigger(name)
+            if reason is not None:
+                self._diagnostics.event_refused(name, reason)
+
+    def _loop(self) -> Outcome:
+        while self.simulation.n != self._last_n:
+            if self._control.stands_still:
+                self._stay_paused()
+            if self._control.real_time_factor != self._controller.real_time_factor:
+                self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
+            self._wait()
+            # Looked at last, so that a verdict on state n ends the run at n.
+            outcome = self._ordered_end()
+            if outcome is not None:
+                return outcome
+            # A pause ordered while waiting holds from this very step on.
+            if not self._control.stands_still:
+                self._cycle()
+        return Outcome.FINISHED
+
+    def _stay_paused(self) -> None:
+        """Serve orders while everything else stands still."""
+        self._state.stand()
+        self._outputs.publish_rows()
+        self._state.tell('paused')
+        while self._control.stands_still and self._ordered_end() is None:
+            self._executor.spin_once(timeout_sec=0.02)
+            self._state.tell('paused')
+            self._state.show_newcomers()
+            self._take_orders(time.monotonic_ns())
+        now_ns = time.monotonic_ns()
+        self._controller.resume(now_ns)
+        self._inputs.forgive(now_ns)
+
+    def _wait(self) -> None:
+        """Serve orders now and then, and wait until the next cycle is due (CRG 11)."""
+        deadline_ns = self._controller.deadline_ns()
+        self._sleep_from_ns = time.monotonic_ns()
+        left_ns = deadline_ns - self._sleep_from_ns
+        due = left_ns > self._service_slack_ns and self.simulation.n % self._service_every == 0
+        # A loop that is late all the time must be stoppable too.
+        if due or self._controller.serves_orders_now:
+            self._executor.spin_once(timeout_sec=0)
+            left_ns = deadline_ns - time.monotonic_ns()
+        if left_ns > WAKE_UP_NS:
+            time.sleep((left_ns - WAKE_UP_NS) / NS_PER_S)
+        while time.monotonic_ns() < deadline_ns:
+            pass
+
+    def _cycle(self) -> None:
+        """Do the work of one cycle, from reading the inputs to publishing the state."""
+        start_ns = time.monotonic_ns()
+        simulation, outputs, inputs = self.simulation, self._outputs, self._inputs
+        for av in simulation.avs:
+            self._take_plan(av.setup.id)
+        self._take_orders(start_ns)
+        # A recorded human moves over the recorded intervals, whatever this machine is busy with.
+        cycle = self._controller.begin_cycle(start_ns, inputs.seats.interval_s(simulation.n))
+        commands = inputs.seats.commands(start_ns, cycle.dt_eff_s, simulation)
+        if inputs.seats.repetition_changed():
+            outputs.publish_seats(inputs.seats.document())
+        if simulation.scheduler.is_tick(simulation.n + 1):
+            self._take_triggers()
+        result = simulation.step(cycle.dt_eff_s, commands)
+        outputs.publish_step(simulation, result)
+        if result.tick:
+            self._at_tick(result)
+        self._control.count_step(simulation.scheduler.steps_per_tick)
+        if outputs.rows.full:
+            outputs.publish_rows()
+        busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S
+        slept_s = (start_ns - self._sleep_from_ns) / NS_PER_S
+        factor = self._controller.real_time_factor
+        outputs.rows.add(self._epoch, result.k, cycle, busy_s * factor, slept_s * factor,
+                         simulation.commands)
+
+    def _at_tick(self, result: StepResult) -> None:
+        """Do what is due with the scenario's time."""
+        self._state.tell('running')
+        for event in result.fired:
+            self._node.get_logger().info(
+                f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
+        if result.agents_k is not None and result.agents_k < result.k:
+            self._diagnostics.late_traffic(result.n, result.k, result.agents_k)
+        order = self._inputs.frame_skip_order()
+        if order is not None:
+            self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping
+        if result.n % self._second < self.simulation.scheduler.steps_per_tick:
+            self._diagnostics.publish(result.n)

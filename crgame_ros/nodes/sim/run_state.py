@@ -1,0 +1,83 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What people are told of a run: its state, and its world while that stands still."""
+
+import time
+
+from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
+from crgame_ros.nodes.sim.sim_control import SimControl
+from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.simulation.engine import Simulation
+
+NS_PER_S = 1_000_000_000
+# Why a run has ended: it was to end with everything else.
+SIGNAL = 'signal'
+# Discovery is not the same on both sides for up to a second or two.
+NEWCOMERS_NS = 3 * NS_PER_S
+
+
+class RunState:
+    """
+    Tells how a run stands: waiting, running, paused or ended.
+
+    :param outputs: of the run.
+    :param simulation: whose world is shown.
+    :param diagnostics: carry the state.
+    :param control: knows the factor of time, and whom the run awaits.
+    """
+
+    def __init__(self, outputs: SimOutputs, simulation: Simulation, diagnostics: LiveDiagnostics,
+                 control: SimControl) -> None:
+        self._outputs = outputs
+        self._simulation = simulation
+        self._diagnostics = diagnostics
+        self._control = control
+        self._told: tuple[object, ...] = ()
+        self._told_ns = 0
+        self._listeners = 0
+        self._shown_ns = self._show_until_ns = 0
+
+    def tell(self, state: str, reason: str = '') -> None:
+        """
+        Tell a new state at once, and the present one every second.
+
+        :param reason: why it has ended.
+        """
+        now_ns, news = time.monotonic_ns(), (state, reason, self._control.awaited)
+        if news != self._told or now_ns - self._told_ns > NS_PER_S:
+            self._told, self._told_ns = news, now_ns
+            self._diagnostics.run_state(state, {
+                'real_time_factor': self._control.real_time_factor, 'reason': reason,
+                'stays': self._control.stays and reason != SIGNAL,
+                'awaited': ','.join(self._control.awaited)})
+
+    def stand(self) -> None:
+        """Begin to stand still: those who listen now have seen this world."""
+        self._listeners = self._outputs.listeners
+
+    def show_newcomers(self) -> None:
+        """
+        Send the world that stands still to who has come since it was published.
+
+        Who has just come may not hear the first message yet: it is told again for a while.
+        """
+        now_ns = time.monotonic_ns()
+        listeners = self._outputs.listeners
+        if listeners > self._listeners:
+            self._show_until_ns = now_ns + NEWCOMERS_NS
+        self._listeners = listeners
+        if self._shown_ns + NS_PER_S < now_ns < self._show_until_ns:
+            self._shown_ns = now_ns
+            self._outputs.resend_world(self._simulation)

@@ -1,0 +1,165 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What sim_node takes in at each cycle: commands of the seats and plans of the AVs."""
+
+from collections.abc import Callable, MutableMapping
+from contextlib import suppress
+from functools import partial
+from typing import Any, TYPE_CHECKING
+
+from crgame_ros.errors import InputError
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.joints import JointSeries
+from crgame_ros.messages.status_values import read_status, status_truth
+from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
+from crgame_ros.ros.request_head import request_head
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.seats import Seats
+from crgame_ros.simulation.setup import Setup
+from rclpy.node import Node
+
+if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
+    from crgame_ros.recording.recorded_inputs import RecordedInputs
+
+# Triggers read at one tick: a flood must not cost the cycle.
+MAX_TRIGGERS = 10
+# Ticks of the agents' states that are read at one of the simulation's.
+MAX_AGENTS = 10
+
+
+class SimInputs:
+    """
+    The polled subscriptions of sim_node for one game.
+
+    :param node: owner of the subscriptions.
+    :param setup: the run.
+    :param clock_offset_ns: simulation time of step 0 [ns]
+    :param seat_sources: who was ordered to drive what, by seat.
+    :param recorded: what drives seats as in a recording; None for nothing.
+    """
+
+    def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
+                 seat_sources: MutableMapping[str, str],
+                 recorded: 'RecordedInputs | None' = None) -> None:
+        self._node = node
+        self._clock_offset_ns = clock_offset_ns
+        endpoints = Endpoints(node)
+        self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources, recorded)
+        # Orders to a planner to go or stop, until the loop takes them.
+        self.planner_orders: dict[str, bool] = {}
+        self._services = [
+            endpoints.service('/<av>/planner_run', partial(self._on_planner_run, av.id), av.id)
+            for av in setup.avs]
+        self._plans = {
+            av.id: endpoints.polled('/<av>/plan', av.id, strict=True, depth=SHARED_DEPTH)
+            for av in setup.avs}
+        # What planners are told instead of the truth; a plan is checked against it.
+        self._perceived = {av.id: endpoints.polled('/<av>/plan_request', av.id, raw=True)
+                           for av in setup.avs if av.spec.perception is not None}
+        self._agents = None if setup.traffic is None else endpoints.polled(
+            '/traffic/agents', depth=SHARED_DEPTH)
+        self._frame_skip = endpoints.polled('/timing/frame_skip')
+        self._triggers = endpoints.polled('/trigger')
+        self._drivability = {}
+        if setup.game.drivability.stop:
+            self._drivability = {human.id: endpoints.polled('/<v>/drivability', human.id)
+                                 for human in setup.humans}
+
+    def forgive(self, now_ns: int) -> None:
+        """Begin to count the silence of every driver now."""
+        for seat in self.seats.all:
+            seat.forgive(now_ns)
+
+    def choose(self, answers: Callable[[str, int], bool],
+               awaits: Callable[[int], bool] | None) -> None:
+        """
+        Pass over what others say, before it displaces what is meant for this run.
+
+        :param answers: whether a plan with a stamp [ns] is one for an AV.
+        :param awaits: whether agents' states with a stamp [ns] may be of use; None without agents.
+        """
+        for av_id, plans in self._plans.items():
+            plans.wanted = lambda stamp_ns, _frame, av_id=av_id: answers(av_id, stamp_ns)
+        if self._agents is not None and awaits is not None:
+            self._agents.wanted = lambda stamp_ns, _frame: awaits(stamp_ns)
+
+    def _on_planner_run(self, av_id: str, request: Any, response: Any) -> Any:
+        self.planner_orders[av_id] = bool(request.data)
+        response.success = True
+        response.message = f'{av_id}: planner {"goes" if request.data else "stops"}'
+        return response
+
+    def take_plan(self, av_id: str) -> JointSeries | None:
+        """
+        Take an AV's plan, if one has come.
+
+        :raises InputError: if the message is malformed.
+        """
+        message = self._plans[av_id].take()
+        return None if message is None else from_joint_trajectory(message, f'/{av_id}/plan')
+
+    def take_perceived(self, av_id: str) -> JointSeries | None:
+        """
+        Take the head of the request that perception has sent to an AV's planner, if one has come.
+
+        :raises InputError: if the message is malformed.
+        """
+        slot = self._perceived.get(av_id)
+        message = None if slot is None else slot.take()
+        return None if message is None else request_head(message, f'/{av_id}/plan_request')
+
+    def take_agents(self) -> list[JointSeries]:
+        """Take the agents' states that have come; a flood waits its turn."""
+        taken: list[JointSeries] = []
+        while self._agents is not None and len(taken) < MAX_AGENTS \
+                and (message := self._agents.take()) is not None:
+            with suppress(InputError):
+                taken.append(from_joint_trajectory(message, '/traffic/agents'))
+        return taken
+
+    def frame_skip_order(self) -> bool | None:
+        """Give the supervisor's latest order to skip frames, None if there is no new one."""
+        message = self._frame_skip.latest()
+        return None if message is None else bool(message.data)
+
+    def triggers(self) -> list[str]:
+        """Take the names of the events that have been triggered; a flood waits its turn."""
+        names: list[str] = []
+        while len(names) < MAX_TRIGGERS and (message := self._triggers.take()) is not None:
+            names.append(str(message.data))
+        return names
+
+    def stop_request(self) -> tuple[str, str] | None:
+        """Give (vehicle, n) of a violation that asks for a stop, None if there is none."""
+        for vehicle_id, slot in self._drivability.items():
+            while (message := slot.take()) is not None:
+                if from_time(message.header.stamp) < self._clock_offset_ns:
+                    # A verdict on the run before a reset.
+                    continue
+                for status in message.status:
+                    values = read_status(status).values
+                    if status_truth(values, 'stop'):
+                        return vehicle_id, values.get('n', '')
+        return None
+
+    def destroy(self) -> None:
+        """Release the subscriptions, for a game with other vehicles."""
+        slots = [*self.seats.slots, *self._plans.values(),
+                 *self._drivability.values(), *self._perceived.values(), self._frame_skip,
+                 self._triggers, *([] if self._agents is None else [self._agents])]
+        for slot in slots:
+            self._node.destroy_subscription(slot.subscription)
+        for service in self._services:
+            self._node.destroy_service(service)

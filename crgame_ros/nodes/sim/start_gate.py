@@ -1,0 +1,148 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Holding a run at step 0 until everybody who takes part in it is there."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from crgame_ros.nodes.sim.sim_inputs import SimInputs
+from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.ros.heard_topics import HeardTopics
+from crgame_ros.ros.seats import GAME
+from crgame_ros.simulation.engine import Simulation, StepResult
+
+NS_PER_S = 1_000_000_000
+# A planner may be at work on the first request: it is not asked again at once [ns].
+ASK_AGAIN_NS = NS_PER_S // 2
+# A driver's node answers the clock within milliseconds, once it has heard it [ns].
+CLOCK_AGAIN_NS = NS_PER_S // 10
+# For drivers that have no device (yet) the run doesn't wait any longer [ns].
+DRIVER_PATIENCE_NS = 3 * NS_PER_S
+
+
+class StartGate:
+    """
+    Publishes step 0 once all companions are connected, then waits for plans and commands.
+
+    Discovery is not the same on both sides: a subscription that the publisher knows may itself
+    not know the publisher yet, for up to a second. Answers prove that both do; of what companions
+    say to the recorder, it tells itself.
+
+    :param outputs: of the run.
+    :param inputs: of the run.
+    :param simulation: at step 0.
+    :param result: its first result.
+    :param companions: nodes that must be connected, as `SimOutputs.missing` takes them.
+    :param take_plan: offers an AV the plan that has come; tells whether it was accepted.
+    :param say: tells people something in one line.
+    :param traffic_answers: tells whether the agents of the next tick have come; None without any.
+    :param heard: what the recorder has heard; None where none is waited for.
+    """
+
+    def __init__(self, outputs: SimOutputs, inputs: SimInputs, simulation: Simulation,
+                 result: StepResult, companions: Sequence[str],
+                 take_plan: Callable[[str], bool], say: Callable[[str], object],
+                 traffic_answers: Callable[[], bool] | None = None,
+                 heard: HeardTopics | None = None) -> None:
+        self._outputs = outputs
+        self._simulation = simulation
+        self._result = result
+        self._companions = companions
+        self._take_plan = take_plan
+        self._say = say
+        self._connected = False
+        self._planners = set(result.requests)
+        self._traffic_answers = traffic_answers
+        self._seats = {seat.id: seat for seat in inputs.seats.humans
+                       if seat.recording is None
+                       and {'driver_node', f'driver_node_{seat.id}'} & set(companions)}
+        self._heard = heard
+        # Topics of others that are to be in the recording from the start, by vehicle.
+        self._unrecorded: dict[str, str] = {} if heard is None else {
+            **{av_id: f'/{av_id}/plan' for av_id in self._planners},
+            **{seat_id: f'/{seat_id}/driver_command' for seat_id in self._seats}}
+        self._began_ns = 0
+        self._asked_ns = 0
+        self._told_ns = 0
+        self._connected_ns = 0
+
+    def is_open(self, now_ns: int, timeout_s: float) -> bool:
+        """
+        Look who has come since the last call, and tell whether the run can start.
+
+        :param now_ns: steady clock [ns]
+        :param timeout_s: after this long it starts without those who are missing [s]
+        """
+        self._began_ns = self._began_ns or now_ns
+        if not self._connected and not self._outputs.missing(self._companions):
+            self._publish(now_ns)
+        if self._connected:
+            self._listen(now_ns)
+        if now_ns - self._began_ns > timeout_s * NS_PER_S:
+            self._give_up(now_ns, timeout_s)
+        return self._connected and not self._planners and not self._seats \
+            and self._traffic_answers is None and not self._unrecorded
+
+    def _publish(self, now_ns: int) -> None:
+        self._connected = True
+        self._connected_ns = self._asked_ns = self._told_ns = now_ns
+        self._outputs.publish_step(self._simulation, self._result)
+
+    def _listen(self, now_ns: int) -> None:
+        self._planners -= {av_id for av_id in self._planners if self._take_plan(av_id)}
+        for seat in list(self._seats.values()):
+            if seat.source != GAME:
+                self._forget([seat.id])
+            if seat.source != GAME or seat.listen(now_ns):
+                del self._seats[seat.id]
+        if self._traffic_answers is not None and self._traffic_answers():
+            self._traffic_answers = None
+        if self._heard is not None and self._unrecorded:
+            missing = self._heard.missing(set(self._unrecorded.values()))
+            self._unrecorded = {vehicle_id: topic for vehicle_id, topic
+                                in self._unrecorded.items() if topic in missing}
+        if now_ns - self._asked_ns > ASK_AGAIN_NS:
+            self._asked_ns = now_ns
+            if self._traffic_answers is not None:
+                self._outputs.resend_world(self._simulation)
+            for av_id in self._planners | (self._result.requests.keys() & self._unrecorded):
+                self._outputs.resend(av_id, self._result)
+        if (self._seats or self._unrecorded) and now_ns - self._told_ns > CLOCK_AGAIN_NS:
+            self._told_ns = now_ns
+            self._outputs.publish_clock(self._simulation.scheduler.stamp_ns(self._result.n))
+        if self._seats and now_ns - self._connected_ns > DRIVER_PATIENCE_NS:
+            self._say('starting without a command for ' + ', '.join(sorted(self._seats))
+                      + ': nobody drives until one comes')
+            self._forget(self._seats)
+            self._seats.clear()
+
+    def _forget(self, seat_ids: Iterable[str]) -> None:
+        """Wait for no record of commands that may never come."""
+        for seat_id in seat_ids:
+            self._unrecorded.pop(seat_id, None)
+
+    def _give_up(self, now_ns: int, timeout_s: float) -> None:
+        missing = [] if self._connected else sorted(self._outputs.missing(self._companions))
+        missing += [f'the planner of {av_id}' for av_id in sorted(self._planners)]
+        missing += ['the traffic'] if self._traffic_answers is not None else []
+        missing += [f'a record of {topic}' for topic in self._unrecorded.values()
+                    if self._connected and not missing]
+        if missing:
+            self._say(f'starting without {" and ".join(missing)}: no answer in {timeout_s:g} s')
+        if not self._connected:
+            self._publish(now_ns)
+        self._planners.clear()
+        self._seats.clear()
+        self._unrecorded.clear()
+        self._traffic_answers = None

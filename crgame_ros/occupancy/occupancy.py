@@ -1,0 +1,64 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Permanent obstacles as an occupancy grid (FS II-A2)."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class OccupancyGrid:
+    """
+    A rectangular piece of map that is occupied or free, cell by cell.
+
+    :param origin: x, y of the lower left corner of cell [0, 0], frame map [m]
+    :param resolution: edge of a cell [m]
+    :param occupied: (rows, columns); rows grow with y, columns with x
+    """
+
+    origin: tuple[float, float]
+    resolution: float
+    occupied: NDArray[np.bool_]
+
+    def occupied_at(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """
+        Tell which points are in occupied cells; outside the grid nothing is.
+
+        :param points: (..., 2) [m]
+        :return: (...)
+        """
+        cells = np.floor((points - self.origin) / self.resolution)
+        rows, columns = self.occupied.shape
+        inside = np.all((cells >= 0.0) & (cells < (columns, rows)), axis=-1)
+        found = np.zeros(points.shape[:-1], dtype=bool)
+        column, row = cells[inside].astype(np.int64).T
+        found[inside] = self.occupied[row, column]
+        return found
+
+
+class OccupancyMap(Protocol):
+    """A map of any extent that gives the part of it that is wanted."""
+
+    def near(self, points: NDArray[np.float64], reach_m: float) -> OccupancyGrid | None:
+        """
+        Give at least everything within a reach of points.
+
+        :param points: (N, 2), frame map [m]; NaN points are left out.
+        :param reach_m: how far around the points [m]
+        :return: None if nothing is occupied there.
+        """

@@ -1,0 +1,160 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Drawing the permanent obstacles of a scenario as an occupancy grid (FS II-A2).
+
+A cell is occupied if its inside meets a curb or an obstacle: every point of these lies in an
+occupied cell, and the centre of an occupied cell is no more than half a cell away from them, in x
+and in y. Cells that only share an edge with them stay free.
+"""
+
+from collections.abc import Iterator
+import math
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import Role
+from crgame_ros.geometry.outline import placed_polygon
+from crgame_ros.occupancy.occupancy_curbs import curbs
+from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
+from crgame_ros.occupancy.occupancy_sources import MAX_TILES
+from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+# Cells are so much smaller all around [cells]: what merely touches a cell doesn't fill it.
+INSET = 1e-6
+
+
+class Raster:
+    """
+    The permanent obstacles of a scenario, cut into tiles.
+
+    :param loaded: the scenario.
+    :param spec: how to draw.
+    :raises InputError: if there is nothing to draw, or the map is too wide.
+    """
+
+    def __init__(self, loaded: LoadedScenario, spec: RasterSpec) -> None:
+        self.spec = spec
+        # Near the road the numbers are small, also on maps in projected coordinates.
+        near = loaded.scenario.lanelet_network.lanelets[0].center_vertices[0][:2].tolist()
+        shapes = _permanent_shapes(loaded, spec, (near[0], near[1]))
+        if not shapes:
+            raise InputError('has nothing to draw', loaded.source,
+                             'draw curbs too, or give a scenario with static obstacles')
+        low_x, low_y, high_x, high_y = shapely.total_bounds(shapes).tolist()
+        self.origin = (_on_lattice(near[0] + low_x, spec.resolution),
+                       _on_lattice(near[1] + low_y, spec.resolution))
+        shift = (near[0] - self.origin[0], near[1] - self.origin[1])
+        self.columns = max(1, math.ceil((high_x + shift[0]) / spec.tile))
+        self.rows = max(1, math.ceil((high_y + shift[1]) / spec.tile))
+        if self.rows * self.columns > MAX_TILES:
+            raise InputError(
+                f'the map is {high_x - low_x:.0f} m x {high_y - low_y:.0f} m wide, which makes '
+                f'{self.columns} x {self.rows} tiles', loaded.source, 'give a larger --tile')
+        self._shapes = np.array([shapely.transform(shape, lambda points: points + shift)
+                                 for shape in shapes], dtype=object)
+        shapely.prepare(self._shapes)
+        columns, rows = np.meshgrid(np.arange(self.columns), np.arange(self.rows))
+        boxes = shapely.box(columns.ravel() * spec.tile, rows.ravel() * spec.tile,
+                            (columns.ravel() + 1) * spec.tile, (rows.ravel() + 1) * spec.tile)
+        found = shapely.STRtree(self._shapes).query(boxes, predicate='intersects')
+        self._near: dict[int, list[int]] = {}
+        for tile, shape in found.T.tolist():
+            self._near.setdefault(tile, []).append(shape)
+
+    @property
+    def candidates(self) -> int:
+        """How many tiles have to be drawn; some of them may turn out empty."""
+        return len(self._near)
+
+    def tiles(self) -> Iterator[tuple[int, int, NDArray[np.bool_] | None]]:
+        """
+        Draw the tiles, row by row from the lower left.
+
+        :return: row, column and (tile_cells, tile_cells) cells, whose rows grow with y; None in
+            place of the cells if none is occupied.
+        """
+        spec = self.spec
+        for tile in sorted(self._near):
+            row, column = divmod(tile, self.columns)
+            occupied = np.zeros((spec.tile_cells, spec.tile_cells), dtype=bool)
+            for shape in sorted(self._near[tile]):
+                draw(self._shapes[shape], (column * spec.tile, row * spec.tile), spec.resolution,
+                     occupied)
+            yield row, column, occupied if occupied.any() else None
+
+
+def draw(shape: shapely.Geometry, origin: tuple[float, float], resolution: float,
+         occupied: NDArray[np.bool_]) -> None:
+    """
+    Occupy every cell whose inside meets a shape.
+
+    The area is quartered again and again: parts that lie apart from the shape are dropped, parts
+    that lie within it are filled.
+
+    :param shape: prepared, for speed.
+    :param origin: lower left corner of the cells [m]
+    :param resolution: edge of a cell [m]
+    :param occupied: (rows, columns), changed in place; rows grow with y.
+    """
+    inset = INSET * resolution
+    # Columns: first row, row behind the last, first column, column behind the last.
+    parts = np.array([[0, occupied.shape[0], 0, occupied.shape[1]]])
+    while len(parts):
+        low, high, left, right = parts.T * resolution
+        boxes = shapely.box(origin[0] + left + inset, origin[1] + low + inset,
+                            origin[0] + right - inset, origin[1] + high - inset)
+        meets = shapely.intersects(shape, boxes)
+        parts, boxes = parts[meets], boxes[meets]
+        single = (parts[:, 1] - parts[:, 0] == 1) & (parts[:, 3] - parts[:, 2] == 1)
+        occupied[parts[single, 0], parts[single, 2]] = True
+        parts, boxes = parts[~single], boxes[~single]
+        filled = shapely.contains_properly(shape, boxes)
+        for low_row, high_row, first, behind in parts[filled].tolist():
+            occupied[low_row:high_row, first:behind] = True
+        parts = _quartered(parts[~filled])
+
+
+def _quartered(parts: NDArray[np.int64]) -> NDArray[np.int64]:
+    low, high, left, right = parts.T
+    # Rounded up, so that a part one cell wide is not split: its second half is empty.
+    row, column = (low + high + 1) // 2, (left + right + 1) // 2
+    quarters = np.concatenate([
+        np.stack(ends, axis=1) for ends in (
+            (low, row, left, column), (low, row, column, right),
+            (row, high, left, column), (row, high, column, right))])
+    return quarters[(quarters[:, 0] < quarters[:, 1]) & (quarters[:, 2] < quarters[:, 3])]
+
+
+def _permanent_shapes(loaded: LoadedScenario, spec: RasterSpec, origin: tuple[float, float]
+                      ) -> list[shapely.Geometry]:
+    shapes: list[shapely.Geometry] = []
+    if spec.curbs:
+        shapes += curbs(loaded.scenario.lanelet_network, origin, spec)
+    if spec.obstacles:
+        obstacles = ScenarioObstacles(loaded)
+        poses = obstacles.states_at(obstacles.first_k).poses.tolist()
+        shapes += [placed_polygon(item.shape, x - origin[0], y - origin[1], yaw)
+                   for item, (x, y, yaw) in zip(obstacles.descriptions, poses, strict=True)
+                   if item.role is Role.STATIC]
+    return shapes
+
+
+def _on_lattice(coordinate: float, resolution: float) -> float:
+    """Round down to a multiple of the resolution, in decimals that a person can read."""
+    return round(math.floor(coordinate / resolution + INSET) * resolution, 9)

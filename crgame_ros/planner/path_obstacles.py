@@ -1,0 +1,228 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The obstacles of a request, seen along a path: which of them are in the way, and when."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+from crgame_ros.errors import PlanningError
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.polyline import ReferencePath
+from crgame_ros.messages.plan import PlanRequest
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+ANCHORS = 5
+# Who is farther to the side than this at every anchor does not come near between them [m].
+ASIDE = 3.0
+# Of the polygon that stands for a circle: its corners lie on it.
+CIRCLE_CORNERS = 8
+
+
+@dataclass(frozen=True)
+class Corridor:
+    """
+    What the ego sweeps along its path.
+
+    :param s: arc length of the ego's rear axle now [m]
+    :param d: its offset to the left now [m]
+    :param return_length: length over which it moves to the target [m]
+    :param ahead: how far obstacles matter [m]
+    :param half_width: half the ego's width and the margin [m]
+    :param front: distance from the rear axle to the front bumper [m]
+    :param target: offset to which it moves; 0 is the path itself [m]
+    :param behind: how far obstacles behind the ego are looked at [m]
+    """
+
+    s: float
+    d: float
+    return_length: float
+    ahead: float
+    half_width: float
+    front: float
+    target: float = 0.0
+    behind: float = 30.0
+
+    @property
+    def aside(self) -> float:
+        """Greatest distance of the ego from the path [m]."""
+        return max(abs(self.d), abs(self.target))
+
+    def bounds(self, path: ReferencePath, s: Array) -> tuple[Array, Array]:
+        """Give the least and the greatest offset that the ego covers at arc lengths s [m]."""
+        u = np.clip((s - self.front - self.s) / max(self.return_length, 1.0), 0.0, 1.0)
+        offset = self.d + (self.target - self.d) * (u * u * (3.0 - 2.0 * u))
+        # In a curve the front swings out of the rear axle's path.
+        swing = path.pose_at(s - 0.5 * self.front)[..., 3] * (0.5 * self.front ** 2)
+        swing = np.clip(swing, -1.0, 1.0)
+        return (offset - self.half_width - np.maximum(swing, 0.0),
+                offset + self.half_width - np.minimum(swing, 0.0))
+
+
+@dataclass(frozen=True)
+class PathObstacles:
+    """
+    The K obstacles that get into the corridor, over S steps from now.
+
+    :param ids: (K) names.
+    :param rear: (S, K) arc length of the hindmost point [m]
+    :param front: (S, K) arc length of the foremost point [m]
+    :param center: (S, K) arc length of the centre [m]
+    :param speed: (S, K) speed along the path [m/s]
+    :param blocking: (S, K) True while the footprint overlaps the corridor.
+    """
+
+    ids: tuple[str, ...]
+    rear: Array
+    front: Array
+    center: Array
+    speed: Array
+    blocking: NDArray[np.bool_]
+
+
+class ObstacleProjector:
+    """
+    Project the predicted footprints of obstacles on a path.
+
+    :param objects: description of everything that may appear.
+    """
+
+    def __init__(self, objects: Mapping[str, ObjectDescription]) -> None:
+        self._objects = objects
+        self._ids: tuple[str, ...] | None = None
+        self._outlines = np.empty((0, 4, 2))
+        self._radii = np.empty(0)
+
+    def project(self, path: ReferencePath, corridor: Corridor, request: PlanRequest,
+                steps: int) -> PathObstacles:
+        """
+        Find the obstacles that are or get in the way.
+
+        :param request: with poses over P points; beyond them objects keep their velocity.
+        :param steps: number S of points wanted, the first being now.
+        :raises PlanningError: if an obstacle was never described.
+        """
+        self._describe(request.obstacle_ids)
+        poses, velocities = prolong(request, steps)
+        near, s, d = self._tracks(path, corridor, poses)
+        radius = self._radii[near]
+        low, high = corridor.bounds(path, s)
+        with np.errstate(invalid='ignore'):
+            close = ((d - radius < high) & (d + radius > low)
+                     & (s > corridor.s - corridor.behind)
+                     & (s < corridor.s + corridor.ahead + radius))
+        kept = np.flatnonzero(close.any(axis=0))
+        near, s = near[kept], s[:, kept]
+        rear, front, right, left = _extents(path, poses[:, near], s, self._outlines[near])
+        low, high = corridor.bounds(path, rear)
+        with np.errstate(invalid='ignore'):
+            blocking = close[:, kept] & (right < high) & (left > low)
+        hit = np.flatnonzero(blocking.any(axis=0))
+        heading = path.pose_at(s[:, hit])[..., 2]
+        velocity = velocities[:, near[hit]]
+        speed = velocity[..., 0] * np.cos(heading) + velocity[..., 1] * np.sin(heading)
+        return PathObstacles(
+            tuple(request.obstacle_ids[i] for i in near[hit]), rear[:, hit], front[:, hit],
+            s[:, hit], np.nan_to_num(speed), blocking[:, hit])
+
+    def _tracks(self, path: ReferencePath, corridor: Corridor,
+                poses: Array) -> tuple[NDArray[np.intp], Array, Array]:
+        """Choose the obstacles that may come near; their columns and centres (s, d), (S, K)."""
+        near = self._near(path, corridor, poses)
+        anchors = np.unique(np.linspace(0, len(poses) - 1, ANCHORS).astype(np.intp))
+        found, aside = path.project(poses[anchors[:, None], near, :2],
+                                    corridor.s - corridor.behind,
+                                    corridor.s + corridor.ahead + 40.0)
+        limit = self._radii[near] + corridor.half_width + corridor.aside + ASIDE
+        with np.errstate(invalid='ignore'):
+            away = (aside > limit).all(axis=0) | (aside < -limit).all(axis=0)
+        kept = np.flatnonzero(~away)
+        return near[kept], *_project_tracks(path, poses[:, near[kept]], anchors, found[:, kept])
+
+    def _describe(self, ids: tuple[str, ...]) -> None:
+        if ids == self._ids:
+            return
+        unknown = [name for name in ids if name not in self._objects]
+        if unknown:
+            raise PlanningError(f'the request names "{unknown[0]}", which was never described')
+        outlines = [outline(self._objects[name].shape, CIRCLE_CORNERS, False) for name in ids]
+        corners = max((len(points) for points in outlines), default=4)
+        self._outlines = np.array([np.resize(points, (corners, 2)) for points in outlines]
+                                  ).reshape(len(ids), corners, 2)
+        self._radii = np.array([self._objects[name].shape.radius for name in ids])
+        self._ids = ids
+
+    def _near(self, path: ReferencePath, corridor: Corridor, poses: Array) -> NDArray[np.intp]:
+        """Drop the obstacles that cannot reach the corridor: absent, or too far to the side."""
+        present = np.isfinite(poses[..., 0])
+        first = np.argmax(present, axis=0)
+        origin = np.take_along_axis(poses, first[None, :, None], axis=0)[0, :, :2]
+        moved = np.hypot(*np.moveaxis(poses[..., :2] - origin, -1, 0))
+        reach = np.nanmax(np.where(present, moved, 0.0), axis=0, initial=0.0)
+        low = max(0, int((corridor.s - corridor.behind) / path.step))
+        line = path.points[low:int((corridor.s + corridor.ahead) / path.step) + 2:8]
+        distance = np.hypot(origin[:, 0, None] - line[None, :, 0],
+                            origin[:, 1, None] - line[None, :, 1])
+        limit = reach + self._radii + corridor.half_width + corridor.aside + 6.0
+        nearest = np.where(present.any(axis=0), distance.min(axis=1), np.inf)
+        return np.flatnonzero(nearest < limit)
+
+
+def prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
+    """
+    Give predicted poses and velocities (steps, M, 3).
+
+    Beyond the request's P points objects keep their last velocity.
+    """
+    poses, velocities = request.obstacle_poses, request.obstacle_velocities
+    given = len(poses)
+    if given >= steps:
+        return poses[:steps], velocities[:steps]
+    time_s = request.time_step_s * np.arange(1, steps - given + 1)[:, None, None]
+    last = np.nan_to_num(velocities[-1:])
+    return (np.concatenate((poses, poses[-1:] + time_s * last)),
+            np.concatenate((velocities, np.repeat(velocities[-1:], steps - given, axis=0))))
+
+
+def _project_tracks(path: ReferencePath, poses: Array, anchors: NDArray[np.intp],
+                    found: Array) -> tuple[Array, Array]:
+    """Project centres (S, K, 3), whose arc lengths are known at a few steps."""
+    steps, count = poses.shape[:2]
+    # Where an object is absent at an anchor, the neighbouring anchor serves to start from.
+    found = found.copy()
+    for here, there in [*pairwise(range(len(anchors)))] + [*pairwise(range(len(anchors))[::-1])]:
+        found[there] = np.where(np.isnan(found[there]), found[here], found[there])
+    found = np.nan_to_num(found)
+    position = np.interp(np.arange(steps), anchors, np.arange(len(anchors)))
+    index = np.minimum(position.astype(int), max(len(anchors) - 2, 0))
+    fraction = (position - index)[:, None]
+    after = np.minimum(index + 1, len(anchors) - 1)
+    guess = found[index] * (1.0 - fraction) + found[after] * fraction
+    s, d = path.refine(poses[..., :2].reshape(-1, 2), guess.reshape(-1), 1)
+    return s.reshape(steps, count), d.reshape(steps, count)
+
+
+def _extents(path: ReferencePath, poses: Array, s: Array, outlines: Array) -> Array:
+    """Project footprints: least and greatest s, least and greatest d, (4, S, K)."""
+    corners = placed(outlines, poses)
+    shape = corners.shape[:-1]
+    guess = np.broadcast_to(np.nan_to_num(s)[..., None], shape)
+    along, across = path.refine(corners.reshape(-1, 2), guess.ravel(), 2)
+    along, across = along.reshape(shape), across.reshape(shape)
+    return np.stack((along.min(-1), along.max(-1), across.min(-1), across.max(-1)))

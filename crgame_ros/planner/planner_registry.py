@@ -1,0 +1,85 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The planners that a game may name."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.planner.interface import Planner
+from crgame_ros.registry import ModelRegistry
+
+# As a planner's name: a process of the user's own answers (docs/external_planners.md).
+EXTERNAL = 'external'
+BUILT_IN = {
+    'idm': 'crgame_ros.planner.idm:IdmPlanner',
+    'idm-package': 'crgame_ros.planner.idm_package:IdmPackagePlanner',
+    'reactive': 'crgame_ros.planner.reactive:ReactivePlanner',
+    'reactive-package': 'crgame_ros.planner.reactive_package:ReactivePackagePlanner',
+    'constant-velocity': 'crgame_ros.planner.constant_velocity:ConstantVelocityPlanner',
+}
+
+
+class PlannerRegistry(ModelRegistry):
+    """The planners of the package, of entry points, and those that users write."""
+
+    def __init__(self) -> None:
+        super().__init__('planners', 'planner', BUILT_IN, Planner, 'docs/planners.md')
+
+    def find(self, name: str, where: str = '') -> type[Planner]:
+        """
+        Find the class of a planner.
+
+        :param where: the file and key that named it, for messages
+        :raises InputError: if there is none of that name, or it is no `Planner`.
+        """
+        if name == EXTERNAL and name not in self.names():
+            raise InputError('an external planner answers live runs only', where or 'planner',
+                             'start the run with ./run.sh, or name a planner')
+        found = super().find(name, where)
+        if not isinstance(getattr(found, 'name', None), str):
+            raise InputError('has no name', self.label(name, where),
+                             'give the class an attribute `name`')
+        return found
+
+
+PLANNERS = PlannerRegistry()
+
+
+def planner_names() -> tuple[str, ...]:
+    """List the registered names: those of the package first, then those of entry points."""
+    return PLANNERS.names()
+
+
+def create_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner:
+    """
+    Make a planner.
+
+    :param name: a registered name, `module:Class` or `path/to/file.py:Class`.
+    :param options: keyword arguments of its constructor.
+    :raises InputError: if there is no such planner, or an option is unknown, missing or of the
+        wrong type.
+    """
+    made: Planner = PLANNERS.create(name, options)
+    return made
+
+
+def planner_class(name: str) -> type[Planner]:
+    """
+    Find the class of a planner.
+
+    :raises InputError: if there is none of that name, or it is no `Planner`.
+    """
+    return PLANNERS.find(name)

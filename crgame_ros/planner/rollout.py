@@ -1,0 +1,60 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The states of a plan as they come about, each a step of the kinematic single-track model."""
+
+import math
+
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+from crgame_ros.vehicle.stopping import step_to_rest
+import numpy as np
+
+
+class Rollout:
+    """
+    A plan that is driven step by step (CRG 2-4), with the derivatives that its steps had.
+
+    Attributes `x`, `y` [m], `yaw` [rad], `speed` [m/s] and `steering` [rad] are those of the
+    rear axle after the last step, `states` (steps + 1, 8) all states up to there.
+
+    :param ego: state at the start, kept as row 0 in all its columns.
+    :param steps: to be driven.
+    :param dt_s: length of a step [s]
+    :param wheelbase: L [m]
+    """
+
+    def __init__(self, ego: VehicleState, steps: int, dt_s: float, wheelbase: float) -> None:
+        self._dt_s, self._wheelbase = dt_s, wheelbase
+        self._row = 0
+        self.x, self.y, self.yaw, self.speed, self.steering = ego[:5]
+        self.states = np.empty((steps + 1, STATE_WIDTH))
+        self.states[0] = ego
+
+    def step(self, acceleration: float, steering_rate: float, moving_s: float) -> None:
+        """
+        Drive a step.
+
+        :param moving_s: part of the step until it stands [s]
+        """
+        dt_s, row, before = self._dt_s, self._row, self.speed
+        self.x, self.y, self.yaw, self.speed, self.steering = step_to_rest(
+            self.x, self.y, self.yaw, before, self.steering, acceleration, steering_rate,
+            self._wheelbase, moving_s, dt_s)
+        if row:
+            self.states[row, StateColumn.ACCELERATION] = (self.speed - before) / dt_s
+            self.states[row, StateColumn.STEERING_RATE] = steering_rate * moving_s / dt_s
+        self._row = row + 1
+        self.states[row + 1] = (
+            self.x, self.y, self.yaw, self.speed, self.steering, 0.0,
+            self.speed * math.tan(self.steering) / self._wheelbase, 0.0)

@@ -1,0 +1,92 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The first lane change of a route: begun only into a gap, and put off until there is one."""
+
+from dataclasses import replace
+from enum import auto, Enum
+
+from crgame_ros.messages.plan import PlanRequest
+from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.lane_gap import has_gap
+from crgame_ros.planner.path_obstacles import ObstacleProjector
+from crgame_ros.planner.reference_path import CHANGE_MIN, DrivingPath, plan_driving_path
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+
+# Beyond this offset from its lane's centre line a change is under way, and so much nearer to the
+# other lane's it is done [m].
+UNDER_WAY = 0.5
+NEARER = 0.5
+# The gap is looked for from this time before the change begins [s], and at least this way [m].
+NOTICE_S, NOTICE = 1.0, 5.0
+# A lane that ends is kept up to the last place from which the change still fits in [m].
+RESERVE = 5.0
+
+
+class Verdict(Enum):
+    """What is to become of a lane change."""
+
+    FAR = auto()
+    FREE = auto()
+    BLOCKED = auto()
+    UNDER_WAY = auto()
+    DONE = auto()
+
+
+class LaneChange:
+    """
+    Watches over the first lane change of a path.
+
+    :param context: of the planner.
+    :param driving: the path with the change.
+    :param start: where the path was planned from.
+    :param projector: of the obstacles.
+    """
+
+    def __init__(self, context: PlannerContext, driving: DrivingPath, start: VehicleState,
+                 projector: ObstacleProjector) -> None:
+        assert driving.change_to is not None
+        self._vehicle = context.vehicle
+        self._projector = projector
+        self._target = driving.roads.line(driving.change_to)
+        kept = plan_driving_path(context.scenario, context.planning_problem, start,
+                                 context.vehicle, keep_lane=True)
+        if np.isfinite(kept.end_s):
+            # What is left of the lane must do for the change, from rest.
+            last = kept.end_s - CHANGE_MIN - RESERVE
+            kept = replace(kept, end_s=max(last, min(kept.start_s + 2.0 * CHANGE_MIN,
+                                                     kept.end_s - RESERVE)))
+        self.kept = kept
+        self._begin = driving.change_s - driving.start_s + kept.start_s
+        self._s = kept.start_s
+
+    def judge(self, request: PlanRequest) -> Verdict:
+        """Tell what the change may do now."""
+        ego = request.ego
+        here = np.array([[ego.x, ego.y]])
+        path = self.kept.path
+        s, d = (float(value[0]) for value in path.project(here, self._s - 20.0, self._s + 60.0))
+        self._s = s
+        speed = max(ego.speed, 0.0)
+        if s < self._begin - max(NOTICE, NOTICE_S * speed):
+            return Verdict.FAR
+        place = path.pose_at(np.array([s]))[:, :2]
+        offset = -float(self._target.project(place)[1][0])
+        if abs(offset - d) < abs(d) - NEARER:
+            return Verdict.DONE
+        if abs(d) > UNDER_WAY and d * offset > 0.0:
+            return Verdict.UNDER_WAY
+        free = has_gap(self._projector, path, request, s, offset, self._vehicle)
+        return Verdict.FREE if free else Verdict.BLOCKED

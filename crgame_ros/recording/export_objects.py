@@ -1,0 +1,164 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Vehicles and objects of a run as CommonRoad obstacles."""
+
+from collections.abc import Iterator
+from xml.sax.saxutils import escape
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.scenario.export_elements import (
+    dynamic_obstacle,
+    DYNAMIC_TYPES,
+    environment_obstacle,
+    ENVIRONMENT_TYPES,
+    phantom_obstacle,
+    static_obstacle,
+    STATIC_TYPES,
+)
+from crgame_ros.scenario.export_ids import IdPool
+from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+# In the order that the schema asks for.
+_GROUPS = ('static', 'dynamic', 'phantom', 'environment')
+
+
+def named(name: str) -> str:
+    """Write a comment that says what the next element was called in the run."""
+    return f'<!-- {escape(name).replace("--", "- -")} -->\n'
+
+
+class ObjectWriter:
+    """
+    Writes everything that moves or stands.
+
+    Ids are given at construction: those of the original first, so that nothing new takes them.
+
+    :param log: the run.
+    :param ids: the ids of the file.
+    :param notices: told what could not be expressed.
+    :ivar ids: ids in the file, by name.
+    :ivar vehicle_rows: (K, V, 7) x, y, yaw of the centre, speed, acceleration, yaw rate and
+        steering angle of the driven vehicles.
+    :raises InputError: if the state of a vehicle holds no numbers.
+    """
+
+    def __init__(self, log: RunLog, ids: IdPool, notices: list[str]) -> None:
+        self._log = log
+        self._pool = ids
+        self._notices = notices
+        self._parts: dict[str, list[str]] = {group: [] for group in _GROUPS}
+        self.vehicle_rows = _vehicle_rows(log)
+        self.ids: dict[str, int] = {}
+        seen = np.flatnonzero(np.isfinite(log.object_poses).all(axis=2).any(axis=0)).tolist()
+        for item in (log.objects[column] for column in seen):
+            number = item.id.removeprefix('o')
+            self.ids[item.id] = ids.keep(int(number), item.id) if number.isdecimal() \
+                else ids.fresh()
+        if len(seen) < len(log.objects):
+            notices.append(f'{len(log.objects) - len(seen)} objects never appeared in the run and '
+                           'are left out')
+
+    def write(self) -> None:
+        """Write all objects, then the driven vehicles."""
+        for column, item in enumerate(self._log.objects):
+            if item.id in self.ids:
+                poses = self._log.object_poses[:, column].copy()
+                poses[:, 2] = wrap_pi_array(poses[:, 2])
+                if item.role is Role.STATIC and np.isfinite(poses).all():
+                    self._write_static(item, poses[np.isfinite(poses).all(axis=1)][0].tolist())
+                else:
+                    self._write_moving(item, poses, self._log.object_velocities[:, column])
+        for column, item in enumerate(self._log.vehicles):
+            self.ids[item.id] = self._pool.fresh()
+            self._parts['dynamic'].append(named(item.id) + dynamic_obstacle(
+                self.ids[item.id], self._type(item, DYNAMIC_TYPES), item.shape,
+                self.vehicle_rows[:, column].tolist(), True))
+
+    def text(self) -> str:
+        """Give what was written."""
+        return ''.join(part for group in _GROUPS for part in self._parts[group])
+
+    def _type(self, item: ObjectDescription, known: frozenset[str]) -> str:
+        if item.type in known:
+            return item.type
+        self._notices.append(f'{item.id}: the schema knows no {item.type} of this kind; its type '
+                             'is "unknown"')
+        return 'unknown'
+
+    def _write_static(self, item: ObjectDescription, pose: list[float]) -> None:
+        number = self.ids[item.id]
+        if item.type in ENVIRONMENT_TYPES:
+            self._parts['environment'].append(
+                environment_obstacle(number, item.type, item.shape, pose))
+        else:
+            self._parts['static'].append(
+                static_obstacle(number, self._type(item, STATIC_TYPES), item.shape, pose))
+
+    def _write_moving(self, item: ObjectDescription, poses: FloatArray,
+                      velocities: FloatArray) -> None:
+        """Write a dynamic obstacle from step 0 on, and phantom obstacles of what comes later."""
+        pieces = list(_pieces(poses))
+        if pieces[0] == (0, 1):
+            self._notices.append(f'{item.id}: where it was at time step 0 alone is left out')
+            pieces.pop(0)
+        for index, (first, end) in enumerate(pieces):
+            number = self._pool.fresh() if index else self.ids[item.id]
+            if first == 0:
+                rows = np.column_stack((poses, _signed_speeds(poses, velocities)))[:end]
+                self._parts['dynamic'].append(dynamic_obstacle(
+                    number, self._type(item, DYNAMIC_TYPES), item.shape, rows.tolist(), False))
+                continue
+            self._parts['phantom'].append(named(item.id) + phantom_obstacle(
+                number, item.shape, first, poses[first:end].tolist()))
+            self._notices.append(
+                f'{item.id} appears at time step {first}: from then on it is the phantom obstacle '
+                f'{number}, which holds its places, but not its type and speed')
+
+
+def _vehicle_rows(log: RunLog) -> FloatArray:
+    states = log.vehicle_states
+    if not np.isfinite(states).all():
+        step, column, _ = np.argwhere(~np.isfinite(states))[0].tolist()
+        raise InputError(f'its state at scenario step {log.ks[step]} holds no numbers',
+                         log.vehicles[column].id, 'record the run again')
+    offset = np.array([item.rear_to_center for item in log.vehicles])
+    yaw = states[:, :, StateColumn.YAW]
+    rows = states[:, :, (StateColumn.X, StateColumn.Y, StateColumn.YAW, StateColumn.SPEED,
+                         StateColumn.ACCELERATION, StateColumn.YAW_RATE,
+                         StateColumn.STEERING_ANGLE)]
+    rows[:, :, :2] = shifted(rows[:, :, :3], offset)[:, :, :2]
+    rows[:, :, 2] = wrap_pi_array(yaw)
+    return rows
+
+
+def _signed_speeds(poses: FloatArray, velocities: FloatArray) -> FloatArray:
+    """Give the speeds (K) of the centre, negative where it moves backwards."""
+    along = velocities[:, 0] * np.cos(poses[:, 2]) + velocities[:, 1] * np.sin(poses[:, 2])
+    speeds: FloatArray = np.copysign(np.hypot(velocities[:, 0], velocities[:, 1]), along)
+    return np.nan_to_num(speeds)
+
+
+def _pieces(poses: FloatArray) -> Iterator[tuple[int, int]]:
+    """Yield first and end of each run of steps at which something is there."""
+    present = np.isfinite(poses).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], present, [False])))).tolist()
+    yield from zip(edges[::2], edges[1::2], strict=True)

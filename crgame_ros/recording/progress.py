@@ -1,0 +1,45 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Word of work that takes long, now and then."""
+
+from collections.abc import Callable
+import time
+
+# Nobody needs word of what takes less [s].
+PERIOD_S = 2.0
+
+
+class Progress:
+    """
+    Says how far a piece of work is, at most once in `PERIOD_S`.
+
+    :param say: takes one line for people.
+    :param what: the work, as in `reading bag: 40 %`.
+    :param clock: gives the time [s].
+    """
+
+    def __init__(self, say: Callable[[str], object], what: str,
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        self._say = say
+        self._clock = clock
+        self.what = what
+        self._told_s = clock()
+
+    def __call__(self, share: float) -> None:
+        """Take in how much is done, 0 to 1."""
+        now_s = self._clock()
+        if now_s - self._told_s >= PERIOD_S:
+            self._told_s = now_s
+            self._say(f'{self.what}: {100.0 * share:.0f} %')

@@ -1,0 +1,69 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The events of a recorded run: which there were, and which took effect when."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import (
+    EVENTS_TOPIC,
+    GAME_TOPIC,
+    parse_events_document,
+    parse_game_document,
+)
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.recording.reader import BagReader
+
+
+class RecordedEvents(NamedTuple):
+    """
+    The events of a recorded run.
+
+    :param known: names of the events of the recorded game.
+    :param fired: what took effect, in order.
+    """
+
+    known: frozenset[str]
+    fired: tuple[FiredEvent, ...]
+
+
+def read_run_events(path: Path, epoch: int | None = None) -> RecordedEvents:
+    """
+    Read the events of a run from its recording.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if there is no such run in it.
+    """
+    games, fired = {}, {}
+    with BagReader(path) as reader:
+        for topic, _, _, message in reader.readable([GAME_TOPIC, EVENTS_TOPIC]):
+            try:
+                if topic == GAME_TOPIC:
+                    game = parse_game_document(message.data)
+                    games[game.epoch] = game
+                else:
+                    # Each message tells everything since the start of its run.
+                    number, events = parse_events_document(message.data)
+                    fired[number] = events
+            except InputError:
+                # Anybody may have published on these topics.
+                continue
+    chosen = max(games, default=None) if epoch is None else epoch
+    if chosen is None or chosen not in games:
+        raise InputError('no such run in it' if games else f'no {GAME_TOPIC} in it', str(path),
+                         'record all topics, from before the start of the run')
+    return RecordedEvents(frozenset(event.name for event in games[chosen].events),
+                          fired.get(chosen, ()))

@@ -1,0 +1,185 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The cycles of a recorded run: what each measured, and what its drivers did."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import aligned, LITTLE_ENDIAN
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CycleTable
+import numpy as np
+from numpy.typing import NDArray
+
+CYCLE_TOPIC = '/timing/cycle'
+_FEW_CYCLES = 10
+_ARRAY = 'std_msgs/msg/Float64MultiArray'
+
+FloatArray = NDArray[np.float64]
+
+
+class ReplayInputs(NamedTuple):
+    """
+    What `ReplayDriver` and `run_offline` need to repeat a recorded run to the last bit.
+
+    :param commands: (n, 4) throttle, brake, steering, reverse by human, and by AV that somebody
+        took over (NaN while it followed its plan); row i was consumed in the step from i to i + 1.
+    :param dt_eff_s: (n) interval over which that step was integrated [s]
+    """
+
+    commands: dict[str, FloatArray]
+    dt_eff_s: FloatArray
+
+
+def read_cycles(bag: Path | BagReader, epoch: int | None = None) -> CycleTable:
+    """
+    Read the cycles of one run.
+
+    :param bag: a recording, or its reader.
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if there are none, or they are not as the contract has them.
+    """
+    if isinstance(bag, Path):
+        with BagReader(bag, parts=True) as reader:
+            return read_cycles(reader, epoch)
+    tables = cycle_tables(bag)
+    wanted = tables[-1].epoch if epoch is None and tables else epoch
+    return table_of(tables, wanted, bag)
+
+
+def cycle_tables(reader: BagReader) -> list[CycleTable]:
+    """Read the cycles of all runs, in blocks of one epoch."""
+    found = reader.topics.get(CYCLE_TOPIC)
+    if found is None or found.type_name != _ARRAY or not found.message_count:
+        raise InputError(f'no {CYCLE_TOPIC} in it', str(reader.path), 'record this topic too')
+    return [table for table in _readable_tables(reader) if len(table.rows)]
+
+
+def table_of(tables: Sequence[CycleTable], epoch: int | None, reader: BagReader) -> CycleTable:
+    """Put the cycles of one run together."""
+    epochs = [table.epoch for table in tables]
+    tables = [table for table in tables if table.epoch == epoch]
+    if not tables:
+        raise InputError(f'no cycles of epoch {epoch} in it', str(reader.path),
+                         'it has ' + (', '.join(map(str, sorted(set(epochs)))) or 'none'))
+    # Those of most cycles are the run's.
+    widths: Counter[tuple[str, ...]] = Counter()
+    for table in tables:
+        widths[table.columns] += len(table.rows)
+    columns = widths.most_common(1)[0][0]
+    rows = np.concatenate([table.rows for table in tables if table.columns == columns])
+    table = CycleTable(columns, rows)
+    # Where n falls, a restarted simulation began the same epoch anew; a few cycles are none, but
+    # the first of a recording that was played once more.
+    pieces = np.split(rows, np.flatnonzero(np.diff(table.column('n')) <= 0) + 1)
+    runs = [piece for piece in pieces if len(piece) >= _FEW_CYCLES] or pieces
+    return CycleTable(columns, runs[-1])
+
+
+def _readable_tables(reader: BagReader) -> Iterator[CycleTable]:
+    """Give the cycles in blocks of one epoch, in the order in which they were recorded."""
+    refusal, found = None, False
+    block: list[CycleTable] = []
+    shape: _Shape | None = None
+    for message in reader.messages([CYCLE_TOPIC]):
+        try:
+            if shape is not None and shape.fits(message.data):
+                table = CycleTable(shape.columns, shape.rows(message.data))
+            else:
+                decoded = reader.decode(message).message
+                if len(decoded.layout.dim) != 2:
+                    raise InputError(f'{CYCLE_TOPIC} is not labelled', str(reader.path),
+                                     'record with this version')
+                table = CycleTable.from_message(decoded.layout.dim[1].label, decoded.data)
+                shape = _Shape.of(message.data, decoded, table.columns)
+            # The epoch of nothing is none.
+            epoch = table.epoch
+        except (InputError, IndexError, ValueError) as error:
+            reader.foreign[CYCLE_TOPIC] += 1
+            refusal = error if isinstance(error, InputError) else refusal
+            continue
+        if block and (block[0].epoch != epoch or block[0].columns != table.columns):
+            yield _joined(block)
+            block = []
+        block.append(table)
+        found = True
+    if block:
+        yield _joined(block)
+    if refusal is not None and not found:
+        raise refusal
+
+
+def _joined(block: Sequence[CycleTable]) -> CycleTable:
+    return CycleTable(block[0].columns, np.concatenate([table.rows for table in block]))
+
+
+class _Shape(NamedTuple):
+    """
+    What messages have in common that differ in their numbers alone, to read those without more.
+
+    :param head: all that stands before the numbers.
+    :param size: how many numbers there are.
+    :param columns: of their rows.
+    """
+
+    head: bytes
+    size: int
+    columns: tuple[str, ...]
+
+    @classmethod
+    def of(cls, data: bytes, decoded: Any, columns: tuple[str, ...]) -> '_Shape | None':
+        """Find it in a message that has been decoded; None where it is laid out otherwise."""
+        place = 8
+        for dim in decoded.layout.dim:
+            # The label, then size and stride.
+            place = aligned(aligned(place, 4) + 4 + len(dim.label.encode()) + 1, 4) + 8
+        # The offset, then the number of numbers.
+        place = aligned(place, 4) + 8
+        shape = cls(data[:aligned(place, 8)], len(decoded.data), columns)
+        right = shape.fits(data) and data.startswith(LITTLE_ENDIAN) \
+            and np.array_equal(shape.rows(data).ravel(), decoded.data, equal_nan=True)
+        return shape if right else None
+
+    def fits(self, data: bytes) -> bool:
+        """Tell whether a message has this shape."""
+        return data.startswith(self.head) and len(data) >= len(self.head) + 8 * self.size
+
+    def rows(self, data: bytes) -> FloatArray:
+        """Give the rows of a message that has it."""
+        return np.frombuffer(data, '<f8', self.size, len(self.head)).reshape(
+            -1, len(self.columns))
+
+
+def replay_inputs(path: Path, epoch: int | None = None) -> ReplayInputs:
+    """
+    Read what a run's drivers did and over which intervals, cycle by cycle.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if a cycle is missing, for nothing after it could be exact.
+    """
+    table = read_cycles(path, epoch)
+    expected = np.arange(1, len(table.rows) + 1)
+    wrong = np.flatnonzero(table.column('n') != expected)
+    if len(wrong):
+        raise InputError(f'cycle n = {expected[wrong[0]]} was not recorded', str(path),
+                         'a run can be repeated exactly only from a recording without gaps')
+    suffix = f'/{COMMAND_COLUMNS[0]}'
+    vehicles = [name.removesuffix(suffix) for name in table.columns if name.endswith(suffix)]
+    commands = {vehicle: table.commands(vehicle) for vehicle in vehicles}
+    return ReplayInputs({vehicle: rows for vehicle, rows in commands.items()
+                         if np.isfinite(rows).any()}, table.column('dt_eff_s').copy())

@@ -1,0 +1,131 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How a recorded run's vehicles and objects moved, point by point."""
+
+from collections.abc import Mapping, Sequence
+import struct
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import aligned, header_stamp_ns, LITTLE_ENDIAN
+from crgame_ros.messages.world_messages import JointReader, joints_of
+from crgame_ros.recording.epochs import Epoch
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.storage import BagMessage
+import numpy as np
+from numpy.typing import NDArray
+
+TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+# Behind the encapsulation and the stamp.
+_NAMES = 12
+_COUNT = struct.Struct('<I')
+
+FloatArray = NDArray[np.float64]
+
+
+def read_points(reader: BagReader, run: Epoch, ids: Mapping[str, Sequence[str]],
+                ) -> dict[str, dict[int, FloatArray]]:
+    """
+    Read how vehicles and objects moved.
+
+    :param ids: whose joints are wanted, by topic: objects of `OBJECT_STATES_TOPIC`, vehicles of
+        every other.
+    :return: by topic and step n: (3, joints) positions, velocities, accelerations.
+    :raises InputError: if no message of a topic holds them, though it has some.
+    """
+    scheduler = run.game.scheduler
+    points: dict[str, dict[int, FloatArray]] = {topic: {} for topic in ids}
+    readers = {topic: PointReader(joints_of(topic, names), topic, reader)
+               for topic, names in ids.items()}
+    refusals: dict[str, InputError] = {}
+    for message in reader.messages(ids):
+        try:
+            stamp_ns = header_stamp_ns(message.data)
+            n = scheduler.step_of_stamp(stamp_ns)
+            # The first is the run's own: others can only answer it.
+            if not run.holds(stamp_ns, message.log_time_ns) \
+                    or scheduler.stamp_ns(n) != stamp_ns or n in points[message.topic]:
+                continue
+            points[message.topic][n] = readers[message.topic].read(message)
+        except InputError as error:
+            reader.foreign[message.topic] += 1
+            refusals[message.topic] = error
+    for topic, refusal in refusals.items():
+        if ids[topic] and not points[topic]:
+            raise refusal
+    return points
+
+
+class PointReader:
+    """
+    Reads the single points of one topic.
+
+    A run's messages differ in stamp and numbers alone: what stands before the numbers is read
+    once, then compared. That is ten times faster than to decode each.
+
+    :param wanted: names of the joints, in the order in which they are given back.
+    :param topic: for messages.
+    :param reader: of the recording.
+    """
+
+    def __init__(self, wanted: list[str], topic: str, reader: BagReader) -> None:
+        self._joint_reader = JointReader(wanted, f'{reader.path}, {topic}')
+        self._reader = reader
+        self._head = b''
+        self._rows = [0, 0, 0]
+        self._joints = -1
+        self._order: list[int] | slice = []
+
+    def read(self, message: BagMessage) -> FloatArray:
+        """
+        Give the first point of a message: (3, joints) positions, velocities, accelerations.
+
+        :raises InputError: if it is no such message, or a joint is missing.
+        """
+        data = message.data
+        if self._joints >= 0 and self._fits(data):
+            rows = [np.frombuffer(data, '<f8', self._joints, place) for place in self._rows]
+            return np.array(rows)[:, self._order]
+        decoded = self._reader.decode(message).message
+        point = self._joint_reader.read(decoded)
+        if data[:2] == LITTLE_ENDIAN:
+            self._learn(data, decoded)
+        return point
+
+    def _learn(self, data: bytes, decoded: Any) -> None:
+        """Find where the numbers are in a message that has been decoded."""
+        place = _NAMES
+        for text in (decoded.header.frame_id, None, *decoded.joint_names):
+            place = aligned(place, 4) + 4 + (0 if text is None else len(text.encode()) + 1)
+        # The number of points, then the length of the first row.
+        place = aligned(place, 4) + 8
+        self._head = data[_NAMES:place]
+        self._joints = len(decoded.joint_names)
+        for row in range(3):
+            self._rows[row] = aligned(place, 8)
+            place = self._rows[row] + 8 * self._joints + 4
+        order = self._joint_reader.order(decoded.joint_names)
+        self._order = slice(None) if order == list(range(self._joints)) else order
+        # Nothing is aligned without joints, and there is nothing to be fast about.
+        if not self._joints or not self._fits(data):
+            self._joints = -1
+
+    def _fits(self, data: bytes) -> bool:
+        """Tell whether a message has the names and lengths that were learned."""
+        size = 8 * self._joints
+        return (data[:2] == LITTLE_ENDIAN and data.startswith(self._head, _NAMES)
+                and len(data) >= self._rows[2] + size
+                and all(_COUNT.unpack_from(data, place + size)[0] == self._joints
+                        for place in self._rows[:2]))

@@ -1,0 +1,96 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Traffic-light states at a scenario time step."""
+
+from bisect import bisect_right
+from itertools import accumulate
+
+from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.traffic_light import TrafficLight
+import numpy as np
+from numpy.typing import NDArray
+
+INACTIVE = 'inactive'
+
+
+class LightCycle:
+    """
+    One light's cycle: the state that holds until each boundary, in time steps.
+
+    :param light: without a cycle, or switched off, it is always inactive.
+    """
+
+    def __init__(self, light: TrafficLight) -> None:
+        cycle = light.traffic_light_cycle
+        runs = cycle is not None and light.active
+        elements = [e for e in cycle.cycle_elements if e.duration > 0] if runs else []
+        self.states = [e.state.value for e in elements] or [INACTIVE]
+        self.ends = list(accumulate(e.duration for e in elements))
+        self.offset = int(cycle.time_offset or 0) if cycle is not None else 0
+
+    def at(self, k: int) -> tuple[str, int | None]:
+        """Give the state at k and the number of time steps until the next element begins."""
+        if not self.ends:
+            return self.states[0], None
+        phase = (k - self.offset) % self.ends[-1]
+        index = bisect_right(self.ends, phase)
+        return self.states[index], self.ends[index] - phase
+
+    def states_over(self) -> NDArray[np.str_]:
+        """Give the states over one period from time step 0 on; one where nothing ever changes."""
+        if not self.ends:
+            return np.array(self.states)
+        return np.roll(np.repeat(self.states, np.diff(self.ends, prepend=0)), self.offset)
+
+
+class TrafficLights:
+    """
+    The traffic lights of a scenario that have a cycle.
+
+    :param scenario: the CommonRoad scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._cycles = {light.traffic_light_id: LightCycle(light)
+                        for light in scenario.lanelet_network.traffic_lights
+                        if light.traffic_light_cycle is not None}
+        self._states: dict[int, str] = {}
+        self._valid = range(0)
+
+    def states_at(self, k: int) -> dict[int, str]:
+        """
+        Give the state of each light in its XML spelling: red, yellow, redYellow, green, inactive.
+
+        While no light changes, the same dictionary object is returned: comparing it with `is`
+        tells cheaply whether anything may have changed since the previous call.
+        """
+        if k not in self._valid:
+            found = {light: cycle.at(k) for light, cycle in self._cycles.items()}
+            remaining = [steps for _, steps in found.values() if steps is not None]
+            states = {light: state for light, (state, _) in found.items()}
+            if states != self._states or not self._valid:
+                self._states = states
+            # Without a running cycle nothing ever changes: a span beyond every time step.
+            self._valid = range(k, k + min(remaining)) if remaining else range(-2**62, 2**62)
+        return self._states
+
+
+def traffic_light_states(scenario: Scenario, k: int) -> dict[int, str]:
+    """
+    Give the states of all traffic lights with a cycle at scenario time step k.
+
+    :return: by traffic-light id: red, yellow, redYellow, green or inactive
+    """
+    return TrafficLights(scenario).states_at(k)

@@ -1,0 +1,96 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What signs and lights a lanelet has: its own, and those of its stop line."""
+
+from collections.abc import Iterator
+
+from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
+from commonroad.scenario.traffic_light import TrafficLight, TrafficLightDirection
+from commonroad.scenario.traffic_sign import TrafficSignElement
+import numpy as np
+from numpy.typing import NDArray
+
+STOP, MAX_SPEED = 'STOP', 'MAX_SPEED'
+
+
+def sign_elements(lanelet: Lanelet, roads: LaneletNetwork,
+                  at_line: bool = True) -> Iterator[TrafficSignElement]:
+    """
+    Yield what the signs of a lanelet say, in the order of the signs' ids.
+
+    :param at_line: whether the signs of its stop line count.
+    """
+    ids = set(lanelet.traffic_signs)
+    if at_line and lanelet.stop_line is not None:
+        ids |= lanelet.stop_line.traffic_sign_ref or set()
+    for sign_id in sorted(ids):
+        sign = roads.find_traffic_sign_by_id(sign_id)
+        if sign is not None:
+            yield from sign.traffic_sign_elements
+
+
+def sign_names(lanelet: Lanelet, roads: LaneletNetwork) -> set[str]:
+    """Name the kinds of signs, like `STOP` and `YIELD`, that a lanelet has."""
+    return {element.traffic_sign_element_id.name for element in sign_elements(lanelet, roads)}
+
+
+def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
+    """Tell whether one has to halt at a lanelet's stop line because of a sign."""
+    return lanelet.stop_line is not None and STOP in sign_names(lanelet, roads)
+
+
+def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:
+    """List the lights of a lanelet in the order of their ids."""
+    ids = set(lanelet.traffic_lights)
+    if lanelet.stop_line is not None:
+        ids |= lanelet.stop_line.traffic_light_ref or set()
+    found = (roads.find_traffic_light_by_id(light_id) for light_id in sorted(ids))
+    return [light for light in found if light is not None]
+
+
+def has_arrow(light: TrafficLight) -> bool:
+    """Tell whether a light is only for who goes where it points."""
+    return light.direction not in (None, TrafficLightDirection.ALL)
+
+
+def lights_for(lights: list[TrafficLight], arrow: str) -> list[TrafficLight]:
+    """
+    Keep the lights that are for a movement; all where none is.
+
+    :param arrow: straight, left or right.
+    """
+    return [light for light in lights
+            if not has_arrow(light) or arrow in light.direction.value.lower()] or lights
+
+
+def stop_line_ends(lanelet: Lanelet) -> NDArray[np.float64]:
+    """
+    Give the ends of a lanelet's stop line; the lane's end where the file does not say.
+
+    :param lanelet: one with a stop line.
+    :return: (2, 2) left and right end as the file has them [m]
+    """
+    line = lanelet.stop_line
+    if line.start is None or line.end is None:
+        return np.stack((lanelet.left_vertices[-1, :2], lanelet.right_vertices[-1, :2]))
+    return np.stack((np.asarray(line.start)[:2], np.asarray(line.end)[:2]))
+
+
+def stop_line_middle(lanelet: Lanelet) -> NDArray[np.float64] | None:
+    """Give the middle (2) of a lanelet's stop line [m]; None where the file does not say."""
+    line = lanelet.stop_line
+    if line is None or line.start is None or line.end is None:
+        return None
+    return np.asarray(0.5 * (np.asarray(line.start) + np.asarray(line.end))[:2])

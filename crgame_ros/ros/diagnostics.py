@@ -1,0 +1,70 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a node tells of itself and others: every status in one form and one time base."""
+
+from collections.abc import Mapping
+
+from crgame_ros.messages.status_values import status_text
+from crgame_ros.ros.ros_messages import to_time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+
+def printable(text: str) -> str:
+    """Give a text as it may go out in a message: halves of characters cannot be encoded."""
+    return text.encode('utf-8', 'replace').decode('utf-8')
+
+
+class Diagnostics:
+    """
+    The statuses of one node, stamped with simulation time.
+
+    `hardware_id` is the full name of the node that speaks, with its namespace.
+
+    :param node: that speaks.
+    :param publisher: of `/diagnostics`.
+    """
+
+    def __init__(self, node: Node, publisher: Publisher) -> None:
+        self.publisher = publisher
+        self._hardware_id = node.get_fully_qualified_name()
+        # Simulation time that the node has last heard of [ns]; 0, as for ROS: none so far.
+        self.now_ns = 0
+
+    def array(self, name: str, level: bytes, text: str, values: Mapping[str, object],
+              stamp_ns: int | None = None) -> DiagnosticArray:
+        """
+        Make a message of one status.
+
+        :param name: node and subject, `<node>: <subject>`.
+        :param level: OK, WARN or ERROR.
+        :param stamp_ns: simulation time that it is about; the latest that the node has heard of
+            where None [ns]
+        """
+        if stamp_ns is not None:
+            self.now_ns = stamp_ns
+        status = DiagnosticStatus(level=level, name=printable(name), message=printable(text),
+                                  hardware_id=self._hardware_id)
+        status.values = [KeyValue(key=printable(key), value=printable(status_text(value)))
+                         for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = to_time(self.now_ns)
+        return message
+
+    def publish(self, name: str, level: bytes, text: str, values: Mapping[str, object],
+                stamp_ns: int | None = None) -> None:
+        """Publish one status on `/diagnostics`; parameters as of `array`."""
+        self.publisher.publish(self.array(name, level, text, values, stamp_ns))

@@ -1,0 +1,54 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the recorder has heard of a run so far, as it says itself."""
+
+from crgame_ros.messages.status_values import read_status
+from crgame_ros.ros.endpoints import Endpoints
+
+# Subject of the recorder's status, and the value that names the run [ns].
+RECORDED = 'recorded topics'
+OFFSET = 'clock_offset_ns'
+
+
+class HeardTopics:
+    """
+    Listens to the recorder while a run waits for its start.
+
+    Two companions may not know of each other yet, though the simulation knows both: what one says
+    would be missing in the recording.
+
+    :param endpoints: of sim_node.
+    :param clock_offset_ns: of the run [ns]
+    """
+
+    def __init__(self, endpoints: Endpoints, clock_offset_ns: int) -> None:
+        self._endpoints = endpoints
+        self._offset = str(clock_offset_ns)
+        self._slot = endpoints.polled('/diagnostics')
+        self._names: set[str] = set()
+
+    def missing(self, wanted: set[str]) -> set[str]:
+        """Give the topics of which the recorder has no message yet."""
+        while (message := self._slot.take()) is not None:
+            for status in message.status:
+                values = read_status(status).values
+                if status.name == f'recorder_node: {RECORDED}' \
+                        and values.get(OFFSET) == self._offset:
+                    self._names.update(values)
+        return wanted - self._names
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._endpoints.release(self._slot)

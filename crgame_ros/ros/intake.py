@@ -1,0 +1,210 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What comes in on a topic, from whomever: bounded, decoded and checked by the contract."""
+
+from collections.abc import Callable, Mapping
+import importlib
+import math
+import time
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.messages.contract import Topic
+from crgame_ros.ros.diagnostics import Diagnostics, printable
+from diagnostic_msgs.msg import DiagnosticStatus
+import numpy as np
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+
+# No place, speed or acceleration is beyond this [m], [m/s], [m/s^2], no stamp or time below 0.
+LARGEST = 1e9
+# Reports of refusals are so far apart [s], their reasons no longer than this.
+REPORT_S = 1.0
+LONGEST_REASON = 300
+
+
+def message_type(type_name: str) -> Any:
+    """Import a message or service type from its name package/msg/Type."""
+    package, kind, name = type_name.split('/')
+    return getattr(importlib.import_module(f'{package}.{kind}'), name)
+
+
+class Intake:
+    """
+    Reads the messages of one topic.
+
+    :param topic: its row in the contract.
+    :param name: of the topic in this run.
+    """
+
+    def __init__(self, topic: Topic, name: str) -> None:
+        self.name = name
+        self._topic = topic
+        self._type = message_type(topic.type_name)
+        self._check = CHECKS.get(topic.type_name)
+
+    def bound(self, data: bytes) -> bytes:
+        """
+        Check the length of a serialised message, before anything is made of it.
+
+        :raises InputError: if it is longer than the contract allows.
+        """
+        if len(data) > self._topic.max_bytes:
+            raise InputError(f'a message of {len(data)} bytes, at most {self._topic.max_bytes} '
+                             'are read', self.name)
+        return data
+
+    def verify(self, data: bytes) -> bytes:
+        """
+        Check that a serialised message is one of the topic's type.
+
+        :raises InputError: if it is none.
+        """
+        self._decode(data)
+        return data
+
+    def _decode(self, data: bytes) -> Any:
+        self.bound(data)
+        try:
+            return deserialize_message(data, self._type)
+        except Exception as error:
+            # Whatever the middleware makes of bytes that are no such message.
+            raise InputError(f'is no {self._topic.type_name} ({type(error).__name__})',
+                             self.name) from error
+
+    def read(self, data: bytes) -> Any:
+        """
+        Decode a serialised message.
+
+        :raises InputError: if it is none of the topic's type, or is not what the contract says.
+        """
+        message = self._decode(data)
+        if self._check is not None:
+            try:
+                self._check(message, self._topic)
+            except ValueError as error:
+                raise InputError(str(error), self.name) from error
+        return message
+
+
+def _check_trajectory(message: Any, topic: Topic) -> None:
+    least, most = topic.points
+    points, joints = message.points, len(message.joint_names)
+    if not least <= len(points) <= most:
+        raise ValueError(f'has {len(points)} points for {least} to {most}')
+    _check_stamp(message.header.stamp)
+    for index, point in enumerate(points):
+        for values, needed in ((point.positions, True), (point.velocities, True),
+                               (point.accelerations, topic.finite)):
+            if len(values) == joints or not (needed or len(values)):
+                continue
+            raise ValueError(f'point {index} has {len(values)} numbers for {joints} joints')
+        if point.time_from_start.sec < 0:
+            raise ValueError(f'point {index} is before the stamp')
+    # All at once: a look at each row costs more than at their numbers.
+    _check_numbers(np.frombuffer(b''.join(
+        values for point in points for values in (point.positions, point.velocities))),
+        topic.finite)
+    _check_numbers(np.frombuffer(b''.join(point.accelerations for point in points)), False)
+
+
+def _check_numbers(values: Any, finite: bool) -> None:
+    """Refuse what is no magnitude of this world; NaN stands for absence where that may be."""
+    if not len(values):
+        return
+    size = np.abs(values)
+    # Written so that NaN fails the first of them.
+    good = (size <= LARGEST).all() if finite else not (size > LARGEST).any()
+    if not good:
+        worst = values[int(np.argmax(~(size <= LARGEST)))]
+        raise ValueError(f'{worst:g} is no number that can be')
+
+
+def _check_stamp(stamp: Any) -> None:
+    if stamp.sec < 0:
+        raise ValueError(f'the stamp is {stamp.sec} s')
+
+
+def _check_joy(message: Any, _topic: Topic) -> None:
+    if not all(math.isfinite(value) for value in message.axes):
+        raise ValueError('an axis is no finite number')
+    _check_stamp(message.header.stamp)
+
+
+def _check_table(message: Any, _topic: Topic) -> None:
+    sizes = [dim.size for dim in message.layout.dim]
+    if len(sizes) != 2 or sizes[0] * sizes[1] != len(message.data) or not len(message.data):
+        raise ValueError(f'has {len(message.data)} numbers in a layout of {sizes}')
+
+
+def _check_grid(message: Any, _topic: Topic) -> None:
+    info = message.info
+    if info.width * info.height != len(message.data):
+        raise ValueError(f'has {len(message.data)} cells for {info.height} x {info.width}')
+    place = (info.resolution, info.origin.position.x, info.origin.position.y)
+    if len(message.data) and not (info.resolution > 0.0 and all(
+            math.isfinite(value) for value in place)):
+        raise ValueError('has no resolution and origin')
+
+
+def _check_scan(message: Any, _topic: Topic) -> None:
+    _check_stamp(message.header.stamp)
+    if not all(math.isfinite(value) for value in (
+            message.angle_min, message.angle_max, message.angle_increment, message.range_max)):
+        raise ValueError('has no finite angles and horizon')
+
+
+def _check_odometry(message: Any, _topic: Topic) -> None:
+    _check_stamp(message.header.stamp)
+    place, turn = message.pose.pose.position, message.pose.pose.orientation
+    _check_numbers(np.array([place.x, place.y, turn.z, turn.w, message.twist.twist.linear.x]),
+                   False)
+
+
+CHECKS: Mapping[str, Callable[[Any, Topic], None]] = {
+    'trajectory_msgs/msg/JointTrajectory': _check_trajectory,
+    'sensor_msgs/msg/Joy': _check_joy,
+    'sensor_msgs/msg/LaserScan': _check_scan,
+    'std_msgs/msg/Float64MultiArray': _check_table,
+    'nav_msgs/msg/OccupancyGrid': _check_grid,
+    'nav_msgs/msg/Odometry': _check_odometry,
+}
+
+
+class Refusals:
+    """
+    Counts what a node refuses, by topic, and tells of it on /diagnostics.
+
+    :param node: whose.
+    :param diagnostics: of the node; told once a second at most.
+    """
+
+    def __init__(self, node: Node, diagnostics: Diagnostics) -> None:
+        self._node = node
+        self._diagnostics = diagnostics
+        self.counts: dict[str, int] = {}
+        self._told_s = -math.inf
+
+    def note(self, where: str, reason: str) -> None:
+        """Count a refusal; tell of it unless another was told of just now."""
+        self.counts[where] = self.counts.get(where, 0) + 1
+        now_s = time.monotonic()
+        if now_s - self._told_s < REPORT_S:
+            return
+        self._told_s = now_s
+        text = printable(reason)[:LONGEST_REASON]
+        self._node.get_logger().warning(f'refused: {text}')
+        self._diagnostics.publish(f'{self._node.get_name()}: messages refused',
+                                  DiagnosticStatus.WARN, text, self.counts)

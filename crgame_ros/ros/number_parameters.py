@@ -1,0 +1,59 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Parameters that are numbers: a whole number is one, too."""
+
+import math
+from typing import Any
+
+from crgame_ros.errors import InputError
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+
+def declare_number(node: Node, name: str, default: float, description: str,
+                   bounds: tuple[float, float], *, read_only: bool = True) -> float:
+    """
+    Declare a parameter that takes `2` as well as `2.0`, and give its value.
+
+    :param bounds: least and greatest value.
+    :param read_only: whether it is given at the start alone.
+    :raises InputError: if what was given at the start is no number within the bounds.
+    """
+    value = node.declare_parameter(name, default, ParameterDescriptor(
+        description=description, read_only=read_only, dynamic_typing=True,
+        floating_point_range=[FloatingPointRange(from_value=bounds[0], to_value=bounds[1])])).value
+    reason = _reason(value, bounds)
+    if reason is not None:
+        raise InputError(reason, f'parameter {name}', f'give a number from {bounds[0]:g} to '
+                         f'{bounds[1]:g}')
+
+    def check(parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            wrong = _reason(parameter.value, bounds) if parameter.name == name else None
+            if wrong is not None:
+                return SetParametersResult(successful=False, reason=f'{name}: {wrong}')
+        return SetParametersResult(successful=True)
+
+    if not read_only:
+        node.add_on_set_parameters_callback(check)
+    return float(value)
+
+
+def _reason(value: Any, bounds: tuple[float, float]) -> str | None:
+    """Say why a value cannot be used, None if it can."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
+        return f'{str(value)[:40]!r} is no number'
+    return None if bounds[0] <= value <= bounds[1] else f'{value:g} is out of its range'

@@ -1,0 +1,118 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A node that looks on at a run, and tells what it sees."""
+
+from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.node_main import StopFlag
+from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
+from crgame_ros.ros.spinning import poll
+from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.simulation.observer import ObservedRun, RunObserver
+from crgame_ros.vehicle.state import STATE_WIDTH
+import numpy as np
+from rclpy.node import Node
+
+PERIOD_S = 0.005
+
+Observer = TypeVar('Observer', bound=RunObserver)
+
+
+class ObserverNode(Node, ABC, Generic[Observer]):
+    """
+    Gives each published state to an observer, a new one for each run.
+
+    :param name: of the node.
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.endpoints = Endpoints(self)
+        self._documents = ScenarioDocuments(self.endpoints)
+        self._world = WorldFollower(self.endpoints, '/vehicles/state', self._begin_anew)
+        self._scenario: ScenarioSet | None = None
+        self._observer: Observer | None = None
+
+    @abstractmethod
+    def make(self, run: ObservedRun) -> Observer:
+        """
+        Make the observer of a run.
+
+        :raises CrgameError: if the run cannot be observed; the node then waits for the next one.
+        """
+
+    @abstractmethod
+    def tell(self, observer: Observer, stamp_ns: int) -> None:
+        """
+        Publish what there is to say of a state, which has just been observed.
+
+        :param stamp_ns: of the state [ns]
+        """
+
+    def run(self, stop: StopFlag) -> None:
+        """Observe until asked to stop."""
+        poll(self, stop, PERIOD_S, self._work)
+
+    def _work(self) -> None:
+        try:
+            scenario = self._documents.poll()
+            if scenario is not None:
+                self._begin(scenario)
+            if self._scenario is None:
+                self._world.drop()
+            for step in self._world.steps():
+                self._observe(step)
+        except CrgameError as error:
+            # Documents that cannot be used, or a map that breaks while it is read.
+            self._observer = None
+            self.get_logger().error(f'{error}; nothing is checked until the next game')
+
+    def _begin(self, scenario: ScenarioSet) -> None:
+        self._scenario, self._observer = scenario, None
+        self._world.begin(scenario)
+        self._observer = self.make(observed_run(scenario))
+
+    def _begin_anew(self) -> None:
+        """Observe the same run from its start: a recording is played once more."""
+        if self._scenario is not None:
+            self._begin(self._scenario)
+
+    def _observe(self, step: WorldStep) -> None:
+        if self._observer is None or self._scenario is None:
+            return
+        scheduler = self._scenario.game.scheduler
+        stamp_ns = self.endpoints.diagnostics.now_ns = scheduler.stamp_ns(step.n)
+        self._observer.observe(step.n, scheduler.since_tick_s(step.n), step.states,
+                               step.objects if step.tick else None)
+        self.tell(self._observer, stamp_ns)
+
+
+def observed_run(scenario: ScenarioSet) -> ObservedRun:
+    """
+    Give what an observer knows of a run before it begins.
+
+    :raises InputError: if its map of permanent obstacles cannot be used.
+    """
+    game = scenario.game
+    states = [item.state for item in game.vehicles]
+    return ObservedRun(
+        scenario.driven, scenario.others, scenario.loaded, game.scheduler, game.drivability,
+        None if game.occupancy is None else TiledOccupancy(game.occupancy),
+        tuple(av.transform for av in game.avs),
+        np.array(states).reshape(-1, STATE_WIDTH))

@@ -1,0 +1,95 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where the frames of the messages are: map to <v>/base_link, and from there to the sensors."""
+
+from collections.abc import Iterable, Sequence
+import math
+
+from crgame_ros.game.driven_vehicle import DrivenAv
+from crgame_ros.messages.contract import load_contract
+from crgame_ros.messages.joint_messages import MAP
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.ros_messages import to_time
+from geometry_msgs.msg import TransformStamped
+
+
+def transform(parent: str, child: str, pose: Iterable[float], stamp_ns: int) -> TransformStamped:
+    """
+    Give the pose of a frame in another one.
+
+    :param pose: x, y [m] and yaw [rad] of `child` in `parent`
+    """
+    x, y, yaw = pose
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id = parent
+    message.header.stamp = to_time(stamp_ns)
+    message.transform.translation.x, message.transform.translation.y = x, y
+    message.transform.rotation.z = math.sin(0.5 * yaw)
+    message.transform.rotation.w = math.cos(0.5 * yaw)
+    return message
+
+
+def vehicle_transforms(vehicle_ids: Sequence[str], poses: Iterable[Iterable[float]],
+                       stamp_ns: int) -> list[TransformStamped]:
+    """Place each vehicle's rear axle, `<v>/base_link`, by its x, y [m] and yaw [rad] in map."""
+    return [transform(MAP, f'{vehicle}/base_link', pose, stamp_ns)
+            for vehicle, pose in zip(vehicle_ids, poses, strict=True)]
+
+
+def sensor_transforms(avs: Iterable[DrivenAv], stamp_ns: int) -> list[TransformStamped]:
+    """
+    Place the sensors of each AV, `<av>/<sensor>`, on its `base_link`.
+
+    :param avs: of the game document.
+    """
+    return [transform(f'{av.id}/base_link', f'{av.id}/{sensor.name}',
+                      sensor.mount(av.vehicle.rear_to_center, av.vehicle.length), stamp_ns)
+            for av in avs if av.perception is not None for sensor in av.perception.sensors]
+
+
+class Transforms:
+    """
+    The topics `/tf` and `/tf_static`, where `tf2_msgs` is installed.
+
+    It is in every ROS installation, but not among the wheels.
+
+    :param endpoints: of the node.
+    """
+
+    def __init__(self, endpoints: Endpoints) -> None:
+        topics = load_contract().topics
+        self.available = topics['/tf'].available
+        if self.available:
+            from tf2_msgs.msg import TFMessage
+            self._message = TFMessage
+            self._moving = endpoints.publisher('/tf')
+            self._fixed = endpoints.publisher('/tf_static')
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody listens."""
+        return self.available and self._moving.get_subscription_count() > 0
+
+    def place_sensors(self, avs: Iterable[DrivenAv], stamp_ns: int) -> None:
+        """Publish where the sensors of a game are mounted; late joiners get it, too."""
+        if self.available:
+            self._fixed.publish(self._message(transforms=sensor_transforms(avs, stamp_ns)))
+
+    def place_vehicles(self, vehicle_ids: Sequence[str], poses: Iterable[Iterable[float]],
+                       stamp_ns: int) -> None:
+        """Publish where the vehicles are, if anybody listens; see `vehicle_transforms`."""
+        if self.wanted:
+            self._moving.publish(self._message(
+                transforms=vehicle_transforms(vehicle_ids, poses, stamp_ns)))

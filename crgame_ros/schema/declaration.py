@@ -1,0 +1,253 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a dataclass declares of the mapping that a user writes for it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, MISSING
+import functools
+import inspect
+import re
+import types
+from typing import (
+    Annotated,
+    Any,
+    get_args,
+    get_origin,
+    get_type_hints,
+    Literal,
+    TypeVar,
+    Union,
+)
+
+from crgame_ros.schema.marks import (
+    Advice,
+    Called,
+    Folder,
+    Keyed,
+    Meaning,
+    Parts,
+    Special,
+    Within,
+    Wording,
+)
+
+T = TypeVar('T')
+_PARAM = re.compile(r'^:param (\w+):(.*?)(?=^:|\Z)', re.MULTILINE | re.DOTALL)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Form:
+    """
+    How a dataclass stands in a file; its class attribute `FORM`, where it is not plainly so.
+
+    What no type says a method `check` may look at: it raises an InputError that names no place.
+
+    :param remedy: what to do about a value that is no mapping.
+    :param short: key that a bare text stands for.
+    :param rest: field that takes all keys that are no fields.
+    :param moved: keys that may stand here though they are another's: key, section.
+    :param first: keys that are written first.
+    :param written: `given` leaves out what is None, `changed` what is as by default, `all`
+        nothing.
+    :param by: key whose value says which keys there are.
+    :param one_of: of these keys exactly one stands beside each value of `by`.
+    :param choices: values of a key, beside each value of `by`.
+    """
+
+    remedy: str = ''
+    short: str | None = None
+    rest: str | None = None
+    moved: tuple[tuple[str, str], ...] = ()
+    first: tuple[str, ...] = ()
+    written: Literal['given', 'changed', 'all'] = 'given'
+    by: str = ''
+    one_of: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    choices: Mapping[str, Mapping[str, tuple[str, ...]]] = field(default_factory=dict)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Name all keys of which exactly one is given."""
+        return tuple(dict.fromkeys(key for keys in self.one_of.values() for key in keys))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Key:
+    """
+    One field of a declaration.
+
+    :param name: in files.
+    :param field: of the dataclass.
+    :param hint: its type, without marks.
+    :param marks: what its `Annotated` says besides.
+    :param default: `MISSING` if it has to be given.
+    """
+
+    name: str
+    field: str
+    hint: Any
+    marks: tuple[Any, ...]
+    default: Any
+
+    @property
+    def required(self) -> bool:
+        """Tell whether it has to be given."""
+        return self.default is MISSING
+
+    def mark(self, kind: type[T]) -> T | None:
+        """Find a mark of a kind."""
+        return mark_of(self.marks, kind)
+
+
+def mark_of(marks: tuple[Any, ...], kind: type[T]) -> T | None:
+    """Find a mark of a kind among others."""
+    for mark in marks:
+        if isinstance(mark, kind):
+            return mark
+    return None
+
+
+def form_of(kind: type[Any]) -> Form:
+    """Give how a dataclass stands in a file."""
+    form: Form = getattr(kind, 'FORM', _PLAIN)
+    return form
+
+
+_PLAIN = Form()
+# Looked up once.
+_KEYS: dict[Any, tuple[Key, ...]] = {}
+
+
+def keys_of(kind: Any) -> tuple[Key, ...]:
+    """Give the fields of a dataclass in their order."""
+    if kind not in _KEYS:
+        _KEYS[kind] = _keys(kind)
+    return _KEYS[kind]
+
+
+def _keys(kind: Any) -> tuple[Key, ...]:
+    hints = get_type_hints(kind, include_extras=True)
+    keys = []
+    for item in fields(kind):
+        if not item.init:
+            continue
+        hint, marks = split(hints[item.name])
+        called = mark_of(marks, Called)
+        default = item.default
+        if item.default_factory is not MISSING:
+            default = item.default_factory()
+        keys.append(Key(called.name if called else item.name, item.name, hint, marks, default))
+    return tuple(keys)
+
+
+def known_keys(kind: type[Any]) -> tuple[str, ...]:
+    """Name every key that a mapping may have, but for what goes into its `rest`."""
+    form = form_of(kind)
+    names: list[str] = []
+    for key in keys_of(kind):
+        keyed = key.mark(Keyed)
+        if keyed is not None:
+            names += keyed.kinds
+        elif key.mark(Folder) is None and key.field != form.rest:
+            names.append(key.name)
+    return (*names, *(key for key, _ in form.moved))
+
+
+def sentences_of(kind: type[Any]) -> dict[str, str]:
+    """Give what the docstring of a class says of each of its fields, in one line each."""
+    text = inspect.cleandoc(kind.__doc__ or '')
+    return {name: ' '.join(words.split()).rstrip('.') for name, words in _PARAM.findall(text)}
+
+
+@functools.cache
+def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Take the marks off a type, those of the one type beside None included."""
+    marks: tuple[Any, ...] = ()
+    if get_origin(hint) is Annotated:
+        hint, marks = hint.__origin__, hint.__metadata__
+    choices = choices_of(hint)
+    if len(choices) == 2 and types.NoneType in choices:
+        inner, more = split(next(choice for choice in choices if choice is not types.NoneType))
+        if more:
+            return Union[inner, None], (*marks, *more)  # noqa: UP007
+    return hint, marks
+
+
+def choices_of(hint: Any) -> tuple[Any, ...]:
+    """Give the members of a union; another type alone."""
+    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+
+
+def is_composite(hint: Any) -> bool:
+    """Tell whether a value has places of its own: a mapping, a list of lists or of mappings."""
+    plain, _ = split(hint)
+    return any(is_dataclass(choice) or get_origin(choice) is tuple for choice in choices_of(plain))
+
+
+def wanted(hint: Any, marks: tuple[Any, ...] = ()) -> str:
+    """Say what kind of value is meant, to stand behind "give"."""
+    hint, own = split(hint)
+    marks = (*marks, *own)
+    special = mark_of(marks, Special)
+    if special is not None:
+        return str(special)
+    wording = mark_of(marks, Wording)
+    words = [_wanted(choice, marks) for choice in choices_of(hint) if choice is not types.NoneType]
+    text = wording.remedy.removeprefix('give ') if wording else ' or '.join(dict.fromkeys(words))
+    others = [str(mark.written) for mark in marks
+              if isinstance(mark, Meaning) and isinstance(mark.written, str)]
+    return ', or '.join([text, *others])
+
+
+def _wanted(hint: Any, marks: tuple[Any, ...]) -> str:
+    origin = get_origin(hint)
+    if origin is Literal:
+        return 'one of ' + ', '.join(map(str, get_args(hint)))
+    if hint is float or hint is int:
+        noun = 'a number' if hint is float else 'a whole number'
+        return f'{noun}{mark_of(marks, Within) or ""}'
+    if is_dataclass(hint):
+        needed = [key.name for key in keys_of(hint) if key.required]
+        return '{' + ', '.join(f'{name}:' for name in needed) + '}' if needed else 'a mapping'
+    if origin is tuple:
+        return _wanted_list(get_args(hint), marks)
+    return {bool: 'true or false', str: 'a text', Any: 'any value'}.get(
+        hint, 'a mapping' if (origin or hint) in (dict, Mapping) else
+        'a file name' if getattr(hint, '__name__', '') == 'Path' else
+        'None' if hint is types.NoneType else getattr(hint, '__name__', str(hint)))
+
+
+def _wanted_list(items: tuple[Any, ...], marks: tuple[Any, ...]) -> str:
+    if items[-1] is Ellipsis:
+        return f'a list of {_plural(items[0], marks)}'
+    parts = mark_of(marks, Parts)
+    shown = ', '.join(parts.names) if parts else f'{len(items)} values'
+    return f'[{shown}], {_plural(items[0], marks)}'
+
+
+def _plural(hint: Any, marks: tuple[Any, ...]) -> str:
+    return re.sub(r'^a (whole number|number|text|mapping|list)', r'\1s',
+                  wanted(hint, marks)).removeprefix('one of ')
+
+
+def advice(hint: Any, marks: tuple[Any, ...]) -> str:
+    """Say what to do about a wrong value."""
+    given = mark_of(marks, Advice)
+    if given is not None:
+        return given.remedy
+    wording = mark_of(marks, Wording)
+    if wording is not None:
+        return wording.remedy
+    text = wanted(hint, marks)
+    return f'use {text}' if text.startswith('one of') else f'give {text}'

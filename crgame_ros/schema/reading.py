@@ -1,0 +1,339 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Reading what a user wrote by its declaration: a checked dataclass, or one clear refusal."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import is_dataclass
+import math
+from pathlib import Path
+import re
+import sys
+import types
+from typing import Any, get_args, get_origin, Literal, NoReturn, TypeVar, Union
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.schema.declaration import (
+    advice,
+    choices_of,
+    Form,
+    form_of,
+    is_composite,
+    Key,
+    keys_of,
+    mark_of,
+    split,
+    wanted,
+)
+from crgame_ros.schema.known import known_beside, moved, refuse_unknown
+from crgame_ros.schema.marks import (
+    Advice,
+    Folder,
+    Keyed,
+    Listed,
+    Meaning,
+    Named,
+    Numbered,
+    OnlyWith,
+    Parts,
+    Special,
+    Within,
+    Wording,
+)
+from crgame_ros.yaml_text import UNPRINTABLE
+
+T = TypeVar('T')
+_HERE = Path()
+_EXPONENT = re.compile(r'[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+')
+
+
+def read(kind: type[T], values: Any, where: str, base: Path = _HERE) -> T:
+    """
+    Build a dataclass from what YAML or JSON gave, checking every key and value.
+
+    :param kind: a frozen dataclass whose types and marks declare what there is, or the type of
+        another value.
+    :param where: file and key for messages.
+    :param base: directory against which file names are resolved.
+    :raises InputError: about the first thing that is wrong, saying how many more are.
+    """
+    try:
+        made: T = _Reader(base).value(kind, (), values, '', where)
+        return made
+    except _SeveralError as error:
+        others = len(error.wrong) - 1
+        more = f'{others} more {"is" if others == 1 else "are"} wrong'
+        first = error.wrong[0]
+        remedy = '; '.join(filter(None, (first.remedy, more))) if others else first.remedy
+        raise InputError(first.what, first.where, remedy) from error
+
+
+class _SeveralError(InputError):
+    """Everything that is wrong with one value, in the order in which it was found."""
+
+    def __init__(self, wrong: Sequence[InputError]) -> None:
+        super().__init__(wrong[0].what, wrong[0].where, wrong[0].remedy)
+        self.wrong = tuple(wrong)
+
+
+class _Wrong:
+    """Collects what is wrong with the parts of a value."""
+
+    def __init__(self) -> None:
+        self.found: list[InputError] = []
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> bool:
+        if not isinstance(error, InputError):
+            return False
+        self.found += error.wrong if isinstance(error, _SeveralError) else [error]
+        return True
+
+    def report(self) -> None:
+        if self.found:
+            raise _SeveralError(self.found)
+
+
+class _Reader:
+    """Reads values whose file names are relative to one folder."""
+
+    def __init__(self, base: Path) -> None:
+        self._base = base
+
+    def value(self, hint: Any, marks: tuple[Any, ...], given: Any, key: str, where: str,
+              index: int | None = None) -> Any:
+        hint, own = split(hint)
+        marks = (*marks, *own)
+        for mark in marks:
+            if isinstance(mark, Meaning) and given == mark.written \
+                    and type(given) is type(mark.written):
+                return mark.meant
+            if isinstance(mark, Special) and (given is not None or choices_of(hint) == (hint,)):
+                return mark.read(given, where, key, self._base)
+        choices = choices_of(hint)
+        if given is None and types.NoneType in choices:
+            return None
+        choices = tuple(choice for choice in choices if choice is not types.NoneType)
+        kinds = [choice for choice in choices if is_dataclass(choice)]
+        if isinstance(given, Mapping) and len(kinds) > 1:
+            choices = (self._kind(kinds, given, _inside(where, key)),)
+        if len(choices) > 1:
+            return self._one_of(choices, marks, given, key, where)
+        hint = choices[0]
+        if is_dataclass(hint):
+            return self.mapping(hint, marks, given, _inside(where, key), index)
+        if get_origin(hint) is tuple:
+            return self._list(hint, marks, given, key, where)
+        return self._plain(hint, marks, given, key, where)
+
+    def mapping(self, kind: Any, marks: tuple[Any, ...], given: Any, where: str,
+                index: int | None = None) -> Any:
+        form = form_of(kind)
+        if form.short is not None and isinstance(given, str):
+            given = {form.short: given}
+        if not isinstance(given, Mapping):
+            asked = mark_of(marks, Advice)
+            raise InputError('is no mapping', where, asked.remedy if asked else form.remedy)
+        values = moved(form, given)
+        wrong = _Wrong()
+        with wrong:
+            known, beside = known_beside(kind, values, where)
+            for name in values:
+                if name not in known and form.rest is None:
+                    with wrong:
+                        refuse_unknown(name, known, where, beside)
+        # What is not known beside what is given needs no other complaint.
+        checked: dict[str, Any] = {}
+        for key in () if wrong.found and form.by else keys_of(kind):
+            with wrong:
+                checked |= self._field(key, form, values, known, where, index)
+        wrong.report()
+        made = kind(**checked)
+        check = getattr(made, 'check', None)
+        if check is not None:
+            try:
+                check()
+            except InputError as error:
+                raise InputError(error.what, _inside(where, error.where), error.remedy) from error
+        return made
+
+    def _field(self, key: Key, form: Form, values: Mapping[Any, Any], known: tuple[str, ...],
+               where: str, index: int | None) -> dict[str, Any]:
+        """Read a field, nothing if its default is to be taken."""
+        if key.mark(Folder):
+            return {key.field: self._base}
+        keyed = key.mark(Keyed)
+        if keyed is not None:
+            return {key.field: self._keyed(keyed, values, where)}
+        if form.rest == key.field:
+            rest = {name: value for name, value in values.items() if name not in known}
+            if is_dataclass(key.hint):
+                return {key.field: self.mapping(key.hint, key.marks, rest, where)} if rest else {}
+            return {key.field: rest}
+        beside = key.mark(OnlyWith)
+        needed = key.name in known and beside is not None and (
+            beside.needed or key.name in beside.keys)
+        if needed and values.get(key.name) is None:
+            raise InputError(f'"{key.name}" is missing', where, advice(key.hint, key.marks))
+        if key.name in values and key.name in known:
+            given = values[key.name]
+            return {key.field: self.value(key.hint, key.marks, given, key.name, where)}
+        numbered = key.mark(Numbered)
+        if numbered is not None and index is not None:
+            return {key.field: f'{numbered.prefix}{index}'}
+        if key.required:
+            raise InputError(f'"{key.name}" is missing', where, advice(key.hint, key.marks))
+        return {}
+
+    def _keyed(self, keyed: Keyed, values: Mapping[Any, Any], where: str) -> Any:
+        given = [name for name in keyed.kinds if name in values]
+        if len(given) != 1:
+            found = f'{len(given)} {keyed.noun}s ({", ".join(given)})' if given \
+                else f'no {keyed.noun}'
+            raise InputError(f'has {found}', where,
+                             'give exactly one of ' + ', '.join(keyed.kinds))
+        return self.value(keyed.kinds[given[0]], (), values[given[0]], given[0], where)
+
+    def _kind(self, kinds: Sequence[Any], given: Mapping[Any, Any], where: str) -> Any:
+        """Choose by the first key of each kind."""
+        fitting = [kind for kind in kinds if keys_of(kind)[0].name in given]
+        if len(fitting) != 1:
+            names = ', '.join(f'"{keys_of(kind)[0].name}"' for kind in fitting or kinds)
+            raise InputError(f'has {names} at once' if fitting else f'has none of {names}', where,
+                             'give ' + ' or '.join(map(wanted, kinds)))
+        return fitting[0]
+
+    def _one_of(self, choices: tuple[Any, ...], marks: tuple[Any, ...], given: Any, key: str,
+                where: str) -> Any:
+        for choice in choices:
+            try:
+                return self.value(choice, marks, given, key, where)
+            except InputError:
+                continue
+        _refuse(given, key, where, advice(Union[choices], marks))  # noqa: UP007
+
+    def _list(self, hint: Any, marks: tuple[Any, ...], given: Any, key: str,
+              where: str) -> tuple[Any, ...]:
+        items = get_args(hint)
+        if not isinstance(given, list | tuple):
+            entries = mark_of(marks, Listed)
+            if entries is None or not is_composite(items[0]):
+                _refuse(given, key, where, advice(hint, marks))
+            raise InputError(f'"{key}" is no list' if key else 'is no list', where,
+                             f'give one entry for each {entries.noun}')
+        if items[-1] is Ellipsis:
+            return self._entries(hint, marks, given, key, where)
+        parts = mark_of(marks, Parts)
+        missing = len(items) - len(given)
+        if not 0 <= missing <= (parts.optional if parts else 0):
+            _refuse(given, key, where, advice(hint, marks))
+        inner = tuple(mark for mark in marks if isinstance(mark, Within))
+        read = [self._part(item, inner, part, (hint, marks), key, where)
+                for item, part in zip(items, given, strict=False)]
+        return (*read, *(0.0,) * missing)
+
+    def _part(self, item: Any, marks: tuple[Any, ...], given: Any, whole: tuple[Any, Any],
+              key: str, where: str) -> Any:
+        """Read a plain value in a list; advice is about the list, of which type and marks."""
+        try:
+            return self.value(item, marks, given, key, where)
+        except InputError as error:
+            what = f'"{key}" holds' if key else 'holds'
+            raise InputError(f'{what} {short(given)}', where,
+                             advice(*whole) + _as_yaml(given)) from error
+
+    def _entries(self, hint: Any, marks: tuple[Any, ...], given: Sequence[Any], key: str,
+                 where: str) -> tuple[Any, ...]:
+        item, entries = get_args(hint)[0], mark_of(marks, Listed) or Listed()
+        if len(given) < entries.least or len(given) > (entries.most or sys.maxsize):
+            allowed = f'{entries.least} or more' if entries.most is None else \
+                f'{entries.least} to {entries.most}' if entries.least else \
+                f'{entries.most} at most'
+            raise InputError(f'has {len(given)} entries', _inside(where, key), f'give {allowed}')
+        if not is_composite(item):
+            inner = tuple(mark for mark in marks if isinstance(mark, Within | Special))
+            return tuple(self._part(item, inner, part, (hint, marks), key, where)
+                         for part in given)
+        own = None if entries.own is None else next(
+            name for name in keys_of(split(item)[0]) if name.name == entries.own)
+        wrong = _Wrong()
+        read: list[Any] = []
+        seen = set()
+        for index, part in enumerate(given):
+            place = f'{_inside(where, key)}[{index}]'
+            with wrong:
+                entry = self.value(item, (), part, '', place + self._label(own, part), index)
+                read.append(entry)
+                if own is None:
+                    continue
+                name = getattr(entry, own.field)
+                if name in seen:
+                    raise InputError(f'"{name}" is there already', place,
+                                     f'give each {entries.noun} its own {own.name}')
+                seen.add(name)
+        wrong.report()
+        return tuple(read)
+
+    def _label(self, own: Key | None, entry: Any) -> str:
+        """Name the entry by its own key behind its place, if it has a good one."""
+        if own is None or not isinstance(entry, Mapping) or own.name not in entry:
+            return ''
+        try:
+            return f' ({self.value(own.hint, own.marks, entry[own.name], own.name, "")})'
+        except InputError:
+            return ''
+
+    def _plain(self, hint: Any, marks: tuple[Any, ...], given: Any, key: str,
+               where: str) -> Any:
+        plain = get_origin(hint) or hint
+        if hint is Any:
+            return given
+        if plain is Literal:
+            if isinstance(given, str) and given in get_args(hint):
+                return given
+        elif plain in (int, float):
+            if isinstance(given, int | (float if plain is float else int)) \
+                    and not isinstance(given, bool) and given == given \
+                    and abs(given) <= (math.inf if isinstance(given, float)
+                                       else sys.float_info.max) \
+                    and (mark_of(marks, Within) or Within()).holds(given):
+                return plain(given)
+        elif plain in (str, Path):
+            wording = mark_of(marks, Wording)
+            if isinstance(given, str) and not UNPRINTABLE.search(given) \
+                    and (wording is None or wording.fits(given)) and (given or plain is str):
+                if plain is Path:
+                    return self._base / given
+                named = mark_of(marks, Named)
+                return given if named is None else named.resolved(given, self._base)
+        elif isinstance(plain, type) and isinstance(given, plain):
+            return given
+        _refuse(given, key, where, advice(hint, marks))
+
+
+def _inside(where: str, key: str) -> str:
+    return f'{where}: {key}' if where and key else key or where
+
+
+def _refuse(given: Any, key: str, where: str, remedy: str) -> NoReturn:
+    what = f'"{key}" is {short(given)}' if key else f'is {short(given)}'
+    raise InputError(what, where, remedy + _as_yaml(given))
+
+
+def _as_yaml(given: Any) -> str:
+    """Say how YAML writes a number that it has taken for a text."""
+    number = isinstance(given, str) and _EXPONENT.fullmatch(given)
+    return ' (YAML: 1.0e-3, not 1e-3)' if number else ''

@@ -1,0 +1,74 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Writing a value as the file says it from which it could have been read."""
+
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.schema.declaration import Form, form_of, Key, keys_of
+from crgame_ros.schema.marks import Folder, Keyed, LeftOut, Named, OnlyWith
+
+_HERE = Path()
+
+
+def write(value: Any, base: Path = _HERE) -> Any:
+    """
+    Give the YAML values from which `read` makes the same again, from any folder.
+
+    :param value: a dataclass that `read` gave, or could have given.
+    :param base: directory against which its relative file names were meant.
+    :return: mappings, lists, text, numbers, truth values and None, shared with nothing.
+    """
+    if is_dataclass(value):
+        return _mapping(value, base)
+    if isinstance(value, Mapping):
+        return {key: write(item, base) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [write(item, base) for item in value]
+    return str(value.resolve()) if isinstance(value, Path) else value
+
+
+def _mapping(value: Any, base: Path) -> dict[str, Any]:
+    form = form_of(type(value))
+    entries: dict[str, Any] = {}
+    for key in keys_of(type(value)):
+        item = getattr(value, key.field)
+        if _is_left_out(key, item, form, value):
+            continue
+        named, keyed = key.mark(Named), key.mark(Keyed)
+        written: Any = named.written(item, base) if named is not None and item is not None \
+            else write(item, base)
+        if keyed is not None:
+            entries[next(name for name, kind in keyed.kinds.items() if type(item) is kind)] = \
+                written
+        elif form.rest == key.field:
+            entries.update(written)
+        else:
+            entries[key.name] = written
+    return {name: entries[name] for name in (*form.first, *entries) if name in entries}
+
+
+def _is_left_out(key: Key, item: Any, form: Form, value: Any) -> bool:
+    if key.mark(Folder) or key.mark(LeftOut) and item == key.default:
+        return True
+    beside = key.mark(OnlyWith)
+    if beside is not None and all(
+            getattr(value, name) in (None, ()) for name in beside.keys):
+        return True
+    if form.written == 'all' or key.field == form.rest:
+        return False
+    return bool(item == key.default) if form.written == 'changed' else item is None

@@ -1,0 +1,78 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The command `crgame schema`: JSON Schema of the files that users write."""
+
+import argparse
+import importlib
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import InputError
+
+DESCRIPTION = """\
+Write the JSON Schema (draft 2020-12) of a kind of file, with which editors complete and check it.
+
+  crgame schema game --out game.schema.json
+
+A YAML file names its schema in its first line, for editors with the YAML language server:
+
+  # yaml-language-server: $schema=game.schema.json"""
+
+
+# Module and class that declare each kind of file, and the file's title.
+KINDS = {
+    'game': ('crgame_ros.game.game', 'Game', 'Game file'),
+    'vehicle': ('crgame_ros.vehicle.parameters', 'VehicleParameters', 'Vehicle'),
+    'steering': ('crgame_ros.vehicle.steering', 'SteeringRatioTable', 'Table of steering ratios'),
+    'device': ('crgame_ros.driver.device_file', 'DeviceFile', 'Device map'),
+    'timeline': ('crgame_ros.driver.timeline_file', 'TimelineFile', 'Scripted driver'),
+    'occupancy': ('crgame_ros.occupancy.occupancy_map_file', 'MapEntry', 'Occupancy map'),
+    'control': ('crgame_ros.vehicle.control_settings', 'ControlSettings', 'Gains and lags')}
+
+
+def schema_of(kind: str) -> dict[str, Any]:
+    """Give the JSON Schema of a kind of file."""
+    from crgame_ros.schema.json_schema import json_schema
+    module, name, title = KINDS[kind]
+    return json_schema(getattr(importlib.import_module(module), name), title)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument('kind', nargs='?', default='game', choices=tuple(KINDS),
+                        help='kind of file (default: game)')
+    parser.add_argument('--out', type=Path, metavar='FILE', help='write it there, not to stdout')
+    parser.set_defaults(command=run)
+
+
+def run(values: argparse.Namespace) -> int:
+    """
+    Write a schema.
+
+    :raises InputError: if the file cannot be written.
+    """
+    text = json.dumps(schema_of(values.kind), indent=2, ensure_ascii=False) + '\n'
+    if values.out is None:
+        print(text, end='')
+        return 0
+    try:
+        values.out.write_text(text, encoding='utf-8')
+    except OSError as error:
+        raise InputError(f'cannot be written ({error.strerror})', str(values.out),
+                         'choose another file with --out') from error
+    return 0

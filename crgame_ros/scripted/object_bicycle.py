@@ -1,0 +1,178 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The kinematic bicycle that follows a path (FS II-A3)."""
+
+from collections.abc import Sequence
+import math
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.object_spec import MoverType, ObjectSpec
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.outline import half_extents
+from crgame_ros.scripted.object_motion import ABSENT, Integrated
+from crgame_ros.scripted.object_path import ObjectPath
+from crgame_ros.scripted.object_surroundings import ObjectSurroundings
+from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
+from crgame_ros.vehicle.speed_envelope import SpeedEnvelope
+from crgame_ros.vehicle.standstill import STANDING
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Distance to the side below which something is in the way, besides both half widths [m].
+SIDE_MARGIN = 0.3
+# A reactive object looks as far as it takes to stop comfortably, and this much farther [m].
+_LOOK = 30.0
+_ARRIVED = 0.01
+# What `idm` of traffic adds to the model (traffic.car_following, which is compiled: too much to
+# load into every node): the guard begins at this share of the hardest deceleration and leaves this
+# share of the gap at standstill; who stands stays until the model wants START.
+_GUARD_SHARE, _GUARD_GAP, _LEAST_ROOM = 0.8, 0.5, 0.01
+_START = 0.2
+
+
+def follow(model: IdmParameters, speed: float, desired: float, gap: float,
+           leader_speed: float) -> float:
+    """
+    Give the acceleration behind a leader that may brake its hardest at any moment [m/s^2].
+
+    The same as `idm` of traffic has, to the last bit.
+
+    :param desired: speed on a free road, `STANDING` or above [m/s]
+    :param gap: bumper to bumper [m]
+    """
+    # Arrays, and products for squares: powers of Python's own numbers are rounded otherwise.
+    v, v0, s, v_l = np.array([[speed], [desired], [gap], [leader_speed]])
+    wanted = float((free_acceleration(v, v0, model, np.maximum)
+                    + interaction(v, s, v_l, model, np.maximum))[0])
+    leader_speed = max(leader_speed, 0.0)
+    stopping = gap - _GUARD_GAP * model.s0 + leader_speed * leader_speed / (2.0 * model.b_max)
+    share = speed * speed / (2.0 * model.b_max * max(stopping, _LEAST_ROOM))
+    if share > _GUARD_SHARE:
+        wanted = min(wanted, -model.b_max * ((share - _GUARD_SHARE) / (1.0 - _GUARD_SHARE)))
+    if speed < STANDING and wanted < _START:
+        wanted = min(wanted, -_START)
+    return min(max(wanted, -model.b_max), model.a)
+
+
+class BicycleMotion(Integrated):
+    """
+    Moves the rear axle along a path: x' = v cos psi, y' = v sin psi, psi' = v tan(delta) / L.
+
+    The heading is the path's at the rear axle and delta = atan(L kappa), so that nothing slips;
+    the centre is as far ahead of the axle as the type has it, on the path where that is straight.
+    The speed tends to the wanted one within acceleration a and deceleration b, slow enough for
+    bends (sqrt(a_lat / kappa)) and speed limits, and for the end where it stays. A reactive one
+    follows what is ahead on its path by the IDM; others to the side, and crossing ones before
+    they are in the way, it does not mind.
+
+    :param spec: of the object.
+    :param path: of the rear axle.
+    :param start: arc length of the centre at the beginning [m]
+    :param wanted: (n,) wanted speed at each arc length of the path [m/s]
+    """
+
+    def __init__(self, spec: ObjectSpec, path: ObjectPath, start: float,
+                 wanted: FloatArray) -> None:
+        super().__init__(spec.start)
+        self._spec, self._path, self._type = spec, path, spec.mover
+        self._s = start
+        # The bend that counts is that at the rear axle, behind the centre.
+        curvature = np.interp(path.s - self._type.rear_to_center, path.s, np.abs(path.curvature))
+        bend = np.sqrt(self._type.lateral / np.maximum(curvature, 1e-9))
+        limit = np.minimum(np.minimum(wanted, bend), path.speed_limit)
+        if spec.end == 'stay':
+            limit[-1] = 0.0
+        self._profile = SpeedEnvelope(path.s, limit, self._type.deceleration)
+        self._model = IdmParameters(
+            self._type.headway, self._type.distance, self._type.acceleration,
+            self._type.deceleration, self._type.hardest)
+        self._speed = self._profile.at(start) if spec.start == 0.0 else 0.0
+        # Until the first decision nothing is in the way.
+        self._following = math.inf
+
+    def decide(self, time_s: float, others: ObjectSurroundings) -> None:
+        """Find what is ahead on the path, and the acceleration behind it."""
+        if self._gone:
+            return
+        gap, speed = self._leader(others)
+        if math.isinf(gap):
+            self._following = math.inf
+            return
+        wanted = max(self._profile.at(self._s), STANDING)
+        self._following = follow(self._model, self._speed, wanted, gap, speed)
+
+    def _leader(self, others: ObjectSurroundings) -> tuple[float, float]:
+        """Give gap and speed along the path of the nearest one ahead; infinite without one."""
+        shape = self._type.shape
+        front = self._s + 0.5 * shape.length
+        look = self._speed**2 / (2.0 * self._type.deceleration) + _LOOK
+        if not len(others.poses):
+            return math.inf, 0.0
+        seen = self._path.meet(others.poses[:, :2], self._s, front + look)
+        long, wide = half_extents(others.lengths, others.widths, others.poses[:, 2] - seen.yaw)
+        gaps = seen.s - long - front
+        ahead = (seen.s > self._s) & (gaps < look) \
+            & (np.abs(seen.d) < wide + 0.5 * shape.width + SIDE_MARGIN)
+        if not ahead.any():
+            return math.inf, 0.0
+        first = int(np.argmin(np.where(ahead, gaps, np.inf)))
+        vx, vy, _ = others.velocities[first].tolist()
+        yaw = float(seen.yaw[first])
+        return max(float(gaps[first]), 0.0), vx * math.cos(yaw) + vy * math.sin(yaw)
+
+    def _advance(self, step: float) -> None:
+        allowed = self._profile.at(self._s + self._speed * step)
+        acceleration = (allowed - self._speed) / step
+        acceleration = min(max(acceleration, -self._type.hardest), self._type.acceleration)
+        acceleration = min(acceleration, self._following)
+        speed = max(self._speed + acceleration * step, 0.0)
+        self._s += 0.5 * (self._speed + speed) * step
+        self._speed = speed
+        end = self._path.length
+        if self._spec.end == 'vanish':
+            self._gone = self._s >= end
+        elif self._s > end - _ARRIVED:
+            self._s, self._speed = min(self._s, end), 0.0
+
+    def state(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Give the centre, ahead of the rear axle."""
+        if self._gone:
+            return ABSENT, ABSENT
+        ahead = self._type.rear_to_center
+        x, y, yaw, curvature = self._path.pose(self._s - ahead)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        turning = self._speed * curvature
+        return ((x + ahead * cos, y + ahead * sin, wrap_pi(yaw)),
+                (self._speed * cos - turning * ahead * sin,
+                 self._speed * sin + turning * ahead * cos, turning))
+
+
+def check_bends(path: ObjectPath, mover: MoverType, name: str, where: str) -> None:
+    """
+    Refuse a path that a vehicle cannot steer along.
+
+    :param name: type of the vehicle.
+    :raises InputError: naming the place and the radius.
+    """
+    sharpest = int(np.argmax(np.abs(path.curvature)))
+    curvature = abs(float(path.curvature[sharpest]))
+    if curvature > mover.sharpest:
+        x, y = path.points[sharpest].tolist()
+        raise InputError(
+            f'the path turns with a radius of {1.0 / curvature:.2g} m at ({x:.1f}, {y:.1f})',
+            where, f'a {name} needs {1.0 / mover.sharpest:.2g} m: make the bend wider, or round '
+                   'it with more way-points')

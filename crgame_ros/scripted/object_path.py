@@ -1,0 +1,110 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The path of an object with its arc length."""
+
+import math
+from typing import NamedTuple
+
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.waypoints.waypoints import WaypointLane
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Distance of the samples between which station and arc length are linear [m].
+_SPACING = 0.25
+# Gauss-Legendre points of the integral of |X'| between two samples.
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+class Encounters(NamedTuple):
+    """
+    Bodies seen from a path, each (O,).
+
+    :param s: arc length of the nearest sample of the path, moved along it to the centre [m]
+    :param d: offset to the left [m]
+    :param yaw: of the path there [rad]
+    """
+
+    s: FloatArray
+    d: FloatArray
+    yaw: FloatArray
+
+
+class ObjectPath:
+    """
+    A way-point lane by its arc length, straight beyond both ends.
+
+    :param lane: whose station is not its arc length.
+    """
+
+    def __init__(self, lane: WaypointLane) -> None:
+        self._lane = lane
+        count = max(2, math.ceil(lane.length / _SPACING) + 1)
+        # Way-points are among the samples: between them everything is smooth.
+        self._u: FloatArray = np.union1d(np.linspace(0.0, lane.length, count), lane.s)
+        step = np.diff(self._u)
+        nodes = self._u[:-1, None] + 0.5 * step[:, None] * (_GAUSS + 1.0)
+        arcs = 0.5 * step * (self._speeds(nodes) @ _WEIGHTS)
+        self.s: FloatArray = np.concatenate(([0.0], np.cumsum(arcs)))
+        here = lane.at(self._u)
+        self.curvature: FloatArray = here.curvature
+        self.speed_limit: FloatArray = here.speed_limit
+        self.points: FloatArray = np.stack((here.x, here.y), axis=-1)
+        self._yaw: FloatArray = here.yaw
+
+    def _speeds(self, u: FloatArray) -> FloatArray:
+        """Give |X'| at stations of any shape."""
+        first = self._lane.tangents(u.reshape(-1))
+        return np.hypot(first[:, 0], first[:, 1]).reshape(u.shape)
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return float(self.s[-1])
+
+    def arc_lengths(self, stations: FloatArray) -> FloatArray:
+        """Give the arc lengths [m] of stations of the lane [m]."""
+        return np.interp(stations, self._u, self.s)
+
+    def pose(self, s: float) -> tuple[float, float, float, float]:
+        """Give x [m], y [m], yaw [rad] and curvature [1/m] at an arc length [m]."""
+        here = self._lane.at(np.interp([s], self.s, self._u))
+        x, y, yaw, curvature = (float(column[0]) for column in here[:4])
+        beyond = s - min(max(s, 0.0), self.length)
+        if beyond:
+            x, y, curvature = x + beyond * math.cos(yaw), y + beyond * math.sin(yaw), 0.0
+        return x, y, yaw, curvature
+
+    def meet(self, points: FloatArray, low: float, high: float) -> Encounters:
+        """
+        See bodies from a part of the path: a path may come back to where it was.
+
+        :param points: (O, 2) centres [m]
+        :param low: arc length at which the part begins [m]
+        :param high: and ends [m]
+        """
+        first, last = np.searchsorted(self.s, (low, high)).tolist()
+        first, last = max(first - 1, 0), min(last + 1, len(self.s))
+        delta = points[:, None, :] - self.points[None, first:last]
+        nearest = first + np.argmin(np.einsum('ijk,ijk->ij', delta, delta), axis=1)
+        delta = points - self.points[nearest]
+        yaw = self._yaw[nearest]
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        along = delta[:, 0] * cos + delta[:, 1] * sin
+        d = delta[:, 1] * cos - delta[:, 0] * sin
+        return Encounters(self.s[nearest] + along, d,
+                          wrap_pi_array(yaw + self.curvature[nearest] * along))

@@ -1,0 +1,76 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The resolved game written as JSON text: `/scenario/game`."""
+
+from dataclasses import asdict
+import json
+import math
+from typing import Any
+
+from crgame_ros.game.event_file import document_entry
+from crgame_ros.game.game_file import dump_game
+from crgame_ros.schema.writing import write
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+# How an AV executes its plans and perceives the world.
+_EXECUTION = ('tracker', 'dynamics', 'perception')
+
+
+def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
+                  real_time_factor: float) -> str:
+    """
+    Write the resolved game (fields as in the contract, `/scenario/game`).
+
+    :param epoch: counts resets.
+    :param clock_offset_ns: simulation time of n = 0 [ns]
+    :param real_time_factor: simulated seconds per wall second.
+    """
+    scheduler, game = setup.scheduler, setup.game
+    duration = game.duration if math.isfinite(game.duration) else None
+    document = {
+        'epoch': epoch, 'title': game.title, 'benchmark_id': setup.loaded.benchmark_id,
+        'scenario_sha256': setup.loaded.sha256, 'dt_ns': round(scheduler.dt_s * 1e9),
+        'dt_c_ns': scheduler.time_step_ns, 'steps_per_tick': scheduler.steps_per_tick,
+        'k0': scheduler.k0, 'clock_offset_ns': clock_offset_ns,
+        'real_time_factor': real_time_factor, 'seed': game.seed, 'duration': duration,
+        'humans': [
+            {'id': human.id, 'vehicle': _vehicle_entry(human.vehicle),
+             'state': list(human.state), 'driver': human.driver, 'timeline': human.timeline,
+             'dynamics': write(human.dynamics)}
+            for human in setup.humans],
+        'avs': [
+            {'id': av.id, 'vehicle': _vehicle_entry(av.vehicle),
+             'state': list(av.state), 'planner': av.spec.planner, 'options': av.spec.options,
+             'planning_problem': av.planning_problem.planning_problem_id,
+             'transform': [av.transform.yaw_offset, av.transform.offset_x,
+                           av.transform.offset_y],
+             'execution': av.spec.execution,
+             **{key: value for key, value in write(av.spec).items() if key in _EXECUTION}}
+            for av in setup.avs],
+        'prediction': write(game.prediction), 'drivability': write(game.drivability),
+        'timing': write(game.timing),
+        'events': [document_entry(event) for event in game.events],
+        'objects': write(game.objects),
+        'traffic': write(game.traffic),
+        'occupancy': write(game.occupancy),
+        'file': dump_game(game)}
+    return json.dumps(document, allow_nan=False)
+
+
+def _vehicle_entry(vehicle: VehicleParameters) -> dict[str, Any]:
+    """Write a vehicle; JSON has no infinity, so a limit that is none becomes null."""
+    values = asdict(vehicle) | {'steering_ratio': ''}
+    return {key: None if value == math.inf else value for key, value in values.items()}

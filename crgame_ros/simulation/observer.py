@@ -1,0 +1,86 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Whoever looks on at a run: at every published state, live in a node, offline in lockstep."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from crgame_ros.drivability.monitor import DrivabilityMonitor, road_transforms
+from crgame_ros.game.game import DrivabilitySpec
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.occupancy.occupancy import OccupancyMap
+from crgame_ros.scenario.loading import LoadedScenario
+import numpy as np
+from numpy.typing import NDArray
+
+
+class RunObserver(Protocol):
+    """
+    Measures or judges a run without a part in it.
+
+    Offline `run_offline` is given the observers; live each is a node of its own
+    (`ros/observer_node.py`), so that none of them can hold the simulation up.
+    """
+
+    def observe(self, n: int, since_tick_s: float, vehicle_states: NDArray[np.float64],
+                objects: ObjectStates | None) -> None:
+        """
+        Take a published state, in the order of time; a live one may follow after a gap.
+
+        :param n: simulation step.
+        :param since_tick_s: simulated time since the last scenario tick [s]
+        :param vehicle_states: (V, 8) rear-axle states of humans, then AVs, as in `StateColumn`.
+        :param objects: (M) states of everything else where n is a tick; they hold until the next.
+        """
+
+    def report(self) -> object:
+        """Sum up what has been observed so far."""
+
+
+@dataclass(frozen=True)
+class ObservedRun:
+    """
+    What an observer knows of a run before it begins, from a setup or from a run's documents.
+
+    :param vehicles: (V) the driven vehicles: humans, then AVs.
+    :param others: (M) everything else that can appear, in the order of its states.
+    :param loaded: the scenario.
+    :param scheduler: relates simulation steps, scenario ticks and time.
+    :param drivability: which violations are looked for, and whether one ends the run.
+    :param occupancy: the map of permanent obstacles; None if the game has none.
+    :param av_transforms: of the AVs, from simulation to scenario coordinates (CRG 6-8)
+    :param initial_states: (V, 8) rear-axle states.
+    """
+
+    vehicles: tuple[ObjectDescription, ...]
+    others: tuple[ObjectDescription, ...]
+    loaded: LoadedScenario
+    scheduler: ScenarioScheduler
+    drivability: DrivabilitySpec
+    occupancy: OccupancyMap | None
+    av_transforms: tuple[RigidTransform, ...]
+    initial_states: NDArray[np.float64]
+
+
+def drivability_monitor(run: ObservedRun) -> DrivabilityMonitor:
+    """Make the observer of contacts and the road, ready for the vehicles where they begin."""
+    humans = sum(item.role is Role.HUMAN for item in run.vehicles)
+    monitor = DrivabilityMonitor(
+        run.vehicles, run.others, run.loaded.scenario.lanelet_network, run.drivability,
+        run.occupancy, road_transforms(humans, run.av_transforms))
+    monitor.prepare(run.initial_states)
+    return monitor

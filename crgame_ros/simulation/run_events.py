@@ -1,0 +1,184 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The events of one run: which are due at a tick, and what they do to the objects."""
+
+from collections.abc import Callable, Sequence
+import math
+
+from crgame_ros.game.events import (
+    Action,
+    ALL_AGENTS,
+    AtStep,
+    AtTime,
+    Brake,
+    Condition,
+    EventSpec,
+    FiredEvent,
+    Near,
+    PutObstacle,
+    Release,
+    TrafficChange,
+)
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.scenario.courses import ObstacleCourses
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.vehicle.state import VehicleState
+
+Point = tuple[float, float]
+# Ticks are counted from decimal fractions of a second.
+ROUNDING = 1e-9
+
+
+class RunEvents:
+    """
+    Decides at every tick which events take effect, and changes the objects.
+
+    Each event takes effect once at most, and several at one tick in the order of the game. One
+    that changes an object waits while that object is not there.
+
+    :param setup: the run.
+    :ivar obstacles: the objects, as events have changed them.
+    :ivar fired: what has taken effect so far.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self.obstacles = ObstacleCourses(setup.obstacles)
+        self.fired: tuple[FiredEvent, ...] = ()
+        self._waiting = {event.name: event for event in setup.game.events}
+        self._actions = {event.name: event.action for event in setup.game.events}
+        self._triggered: set[str] = set()
+        self._columns = {item.id: column
+                         for column, item in enumerate(setup.obstacles.descriptions)}
+        self._k = setup.scheduler.k0
+        self._objects: ObjectStates | None = None
+
+    def trigger(self, name: str) -> str | None:
+        """
+        Let an event take effect at the next tick.
+
+        :return: None if it will, else the reason why not.
+        """
+        event = self._waiting.get(name)
+        if event is None:
+            if name in self._actions:
+                return f'"{name}" has taken effect already'
+            return f'there is no event "{name[:40]}"; the game has {", ".join(self._actions)}'
+        reason = self._hindrance(event, self._k)
+        if reason is None:
+            self._triggered.add(name)
+        return reason
+
+    def actions(self, fired: Sequence[FiredEvent]) -> list[Action]:
+        """Give what events do, in their order."""
+        return [self._actions[event.name] for event in fired]
+
+    def at_tick(self, n: int, k: int, states: Sequence[VehicleState],
+                objects: ObjectStates) -> tuple[FiredEvent, ...]:
+        """
+        Let take effect what is due, before the objects and requests of a tick are made.
+
+        :param states: of the driven vehicles at n.
+        :param objects: at k, as earlier events have left them.
+        :return: what took effect now.
+        """
+        self._k, self._objects = k, objects
+        if not self._waiting:
+            return ()
+        where = _Places(self._setup, states, self._columns, objects)
+        due = [event for event in self._waiting.values()
+               if (event.name in self._triggered
+                   or (event.when is not None and self._holds(event.when, k, where.of)))
+               and self._hindrance(event, k) is None]
+        fired = []
+        for event in due:
+            # Two events may be about one object, of which the first leaves nothing to the second.
+            if self._hindrance(event, k) is None:
+                self._change(event, k)
+                del self._waiting[event.name]
+                fired.append(FiredEvent(
+                    event.name, n, k,
+                    'trigger' if event.name in self._triggered else 'condition'))
+        self.fired += tuple(fired)
+        return tuple(fired)
+
+    def _hindrance(self, event: EventSpec, k: int) -> str | None:
+        """Say why an event cannot take effect now, if it cannot."""
+        action = event.action
+        if isinstance(action, TrafficChange):
+            return self._absence(action.agent)
+        if not isinstance(action, Release | Brake):
+            return None
+        object_id = f'o{action.object}'
+        held = self.obstacles.is_held(self._columns[object_id])
+        if isinstance(action, Release):
+            return None if held else f'{object_id} has been released already'
+        if held:
+            return f'{object_id} stands until it is released'
+        present = self.obstacles.is_present(self._columns[object_id], k)
+        return None if present else f'{object_id} is not there'
+
+    def _absence(self, agent: str) -> str | None:
+        """Say that an agent is not on the road, if so."""
+        if agent == ALL_AGENTS or self._objects is None:
+            return None
+        present = math.isfinite(self._objects.poses[self._columns[agent], 0])
+        return None if present else f'{agent} is not on the road'
+
+    def _holds(self, condition: Condition, k: int, place: Callable[[str], Point]) -> bool:
+        """Tell whether a condition holds at k; NaN, somebody who is absent, makes it false."""
+        if isinstance(condition, AtStep):
+            return k >= condition.step
+        if isinstance(condition, AtTime):
+            elapsed_s = (k - self._setup.scheduler.k0) * self._setup.scheduler.time_step_s
+            return elapsed_s >= condition.time - ROUNDING
+        if isinstance(condition, Near):
+            return math.dist(place(condition.vehicle), (condition.x, condition.y)) \
+                <= condition.radius
+        first, second = condition.between
+        return math.dist(place(first), place(second)) <= condition.distance
+
+    def _change(self, event: EventSpec, k: int) -> None:
+        """Change the object that the event is about, if it is about one."""
+        action, object_id = event.action, event.object_id
+        if object_id is None:
+            return
+        column = self._columns[object_id]
+        if isinstance(action, Release):
+            self.obstacles.release(column, k)
+        elif isinstance(action, Brake):
+            self.obstacles.brake(column, k, action.deceleration, action.speed)
+        elif isinstance(action, PutObstacle):
+            self.obstacles.put(column, (action.x, action.y, action.yaw))
+
+
+class _Places:
+    """Finds the centre of a vehicle or object at a tick."""
+
+    def __init__(self, setup: Setup, states: Sequence[VehicleState], columns: dict[str, int],
+                 objects: ObjectStates) -> None:
+        self._setup = setup
+        self._states = states
+        self._columns = columns
+        self._objects = objects
+
+    def of(self, object_id: str) -> Point:
+        column = self._columns.get(object_id)
+        if column is not None:
+            x, y = self._objects.poses[column, :2].tolist()
+            return x, y
+        index = self._setup.vehicle_ids.index(object_id)
+        center = self._states[index].center(self._setup.vehicles[index].vehicle.rear_to_center)
+        return center[0], center[1]

@@ -1,0 +1,98 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Room behind junctions: who queues there, and to whom it is promised."""
+
+import math
+from typing import NamedTuple
+
+from crgame_ros.traffic.agents import AgentTable
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.junctions import Passages
+from crgame_ros.traffic.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.leaders import Pairs, Ways
+from crgame_ros.traffic.meetings import CrossingRules, Situation
+from crgame_ros.traffic.placement import Entries
+import numpy as np
+
+# A leader that is faster drives on [m/s].
+DRIVES_ON = 3.0
+# Between those who queue [m].
+QUEUE_GAP = 2.0
+
+
+@compiled
+def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
+           passage: Passages) -> tuple[FloatArray, FloatArray]:
+    """
+    Look at who is ahead of agents (A), before a junction or behind it.
+
+    Whoever drives on makes room, but no farther than to where it waits before its next junction,
+    and those in between queue behind it.
+
+    :return: `Situation.rear_stop` and `Situation.queued`
+    """
+    rear_stop, queued = np.full(len(slots), math.inf), np.full(len(slots), math.inf)
+    between = np.zeros(len(slots))
+    row = np.full(len(agents.x), -1, np.int64)
+    for i, slot in enumerate(slots):
+        row[slot] = i
+    for p in range(len(pairs.agent)):
+        i, n = pairs.agent[p], pairs.entry[p]
+        speed, owner = max(entries.speed[n], 0.0), entries.owner[n]
+        stops = pairs.distance[p] + speed**2 / 6.0 if speed <= DRIVES_ON else math.inf
+        if owner >= 0 and not entries.crosses[n]:
+            stops = min(stops, pairs.distance[p] + max(passage.hold[row[owner]], 0.0))
+        rear_stop[i] = min(rear_stop[i], stops - between[i])
+        if not entries.crosses[n]:
+            between[i] += entries.front[n] - entries.rear[n] + QUEUE_GAP
+            if agents.grant[owner] < 0 if owner >= 0 else speed < DRIVES_ON:
+                queued[i] = min(queued[i], pairs.gap[p])
+    return rear_stop, queued
+
+
+class Promises(NamedTuple):
+    """
+    Room promised to those let into junctions who have not left them yet.
+
+    :param behind: (L) at the beginning of each lane behind a junction [m]
+    :param through: (L) of that, to those who get there through each lane [m]
+    """
+
+    behind: FloatArray
+    through: FloatArray
+
+
+@compiled
+def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, passage: Passages,
+            i: int) -> None:
+    """Keep room behind its junction for an agent that was let in."""
+    step = passage.granted[i]
+    if 0 <= step < way.depth[i] - 1:
+        room = agents.length[slot] + QUEUE_GAP
+        promised.behind[way.lane[i, step + 1]] += room
+        promised.through[way.lane[i, step]] += room
+
+
+@compiled
+def is_full(rules: CrossingRules, promised: Promises, agents: AgentTable, slot: int, way: Ways,
+            passage: Passages, at: Situation, i: int) -> bool:
+    """Tell whether there is no room for an agent behind its next junction."""
+    step = passage.last[i]
+    # Whoever goes there through the same lane is ahead, and was counted there.
+    taken = 0.0
+    if 0 <= step < way.depth[i] - 1:
+        taken = promised.behind[way.lane[i, step + 1]] - promised.through[way.lane[i, step]]
+    return bool(at.rear_stop[i] - taken
+                < passage.end[i] + agents.length[slot] + rules.room)

@@ -1,0 +1,165 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What agents see: everybody and everything that is no agent."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.traffic.agents import AgentTable, NOBODY, write_centers
+from crgame_ros.traffic.compiled import compiled
+from crgame_ros.traffic.lane_graph import FloatArray
+from crgame_ros.traffic.placement import Bodies, Entries, VEHICLE_TIME, WALKER_TIME
+from crgame_ros.vehicle.standstill import STANDING
+import numpy as np
+from numpy.typing import NDArray
+
+VEHICLES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'priorityVehicle', 'taxi',
+                      'train', 'unknown'})
+PARKED = frozenset({'parkedVehicle', 'constructionZone', 'roadBoundary', 'building', 'pillar',
+                    'median_strip'})
+# Longer bodies are looked at in pieces: a lane may bend along them [m].
+PIECE = 6.0
+# Others that have stood this long are swerved around [s].
+STANDING_TIME = 10.0
+# Recorded speeds jump; nobody brakes or accelerates by more than this [m/s^2].
+BELIEVED = 8.0
+
+
+@dataclass(frozen=True)
+class WorldView:
+    """
+    The world at one scenario time step, without the agents.
+
+    :param k: scenario time step.
+    :param poses: (O, 3) centres x [m], y [m], yaw [rad] in frame map; NaN where absent.
+    :param velocities: (O, 3) [m/s, m/s, rad/s]; NaN where absent.
+    :param signals: states of the traffic lights by their ids.
+    """
+
+    k: int
+    poses: FloatArray
+    velocities: FloatArray
+    signals: Mapping[int, str] = field(default_factory=dict)
+
+
+_NONE, _NOWHERE = np.zeros(0), np.zeros((0, 3))
+NOTHING = Bodies(_NOWHERE, _NOWHERE, _NONE, _NONE, _NONE, _NONE.astype(np.int64), _NONE,
+                 _NONE.astype(np.int64))
+
+
+class Others:
+    """
+    The others (O) as bodies on the road.
+
+    :param descriptions: what they look like, in the order of every `WorldView`.
+    :param time_step_s: Delta t_c [s]
+
+    Attributes `drives` (O): which are vehicles that go where lanes lead; `widths` (O) [m].
+    """
+
+    def __init__(self, descriptions: Sequence[ObjectDescription], time_step_s: float) -> None:
+        self._descriptions = tuple(descriptions)
+        self.drives: NDArray[np.bool_] = np.array(
+            [x.role is not Role.STATIC and x.type in VEHICLES for x in descriptions], dtype=bool)
+        self.widths: FloatArray = np.array([x.shape.width for x in descriptions], dtype=float)
+        self._parked = np.array([x.role is Role.STATIC or x.type in PARKED
+                                 for x in descriptions], dtype=bool)
+        self._still = np.zeros(len(self._descriptions), dtype=np.int64)
+        self._time_step_s, self._seen_k = time_step_s, -2**62
+        self._speed = self._acceleration = np.zeros(len(self._descriptions))
+        self._long_enough = round(STANDING_TIME / time_step_s)
+        of, shift, length = [], [], []
+        for number, x in enumerate(descriptions):
+            pieces = max(1, int(np.ceil(x.shape.length / PIECE)))
+            size = x.shape.length / pieces
+            for i in range(pieces):
+                of.append(number)
+                shift.append((i - 0.5 * (pieces - 1)) * size)
+                length.append(size)
+        self._of = np.array(of, dtype=np.int64)
+        self._shift, self._length = np.array(shift, dtype=float), np.array(length, dtype=float)
+        self._width = np.array([descriptions[i].shape.width for i in of], dtype=float)
+        self._time = np.where(self.drives, VEHICLE_TIME, WALKER_TIME)[self._of] if of else \
+            np.zeros(0)
+
+    def __len__(self) -> int:
+        return len(self._descriptions)
+
+    def bodies(self, world: WorldView) -> Bodies:
+        """Give the pieces of all who are there."""
+        if not len(self):
+            return NOTHING
+        present = np.isfinite(world.poses[self._of]).all(axis=1) & np.isfinite(
+            world.velocities[self._of]).all(axis=1)
+        piece = np.flatnonzero(present)
+        of = self._of[piece]
+        poses = shifted(world.poses[of], self._shift[piece])
+        return Bodies(poses, world.velocities[of], self._accelerations(world)[of],
+                      self._length[piece], self._width[piece], -1 - of, self._time[piece],
+                      np.full(len(of), NOBODY))
+
+    def _accelerations(self, world: WorldView) -> FloatArray:
+        """Give how the others (O) speed up along their headings, from one tick to the next."""
+        yaw = world.poses[:, 2]
+        speed = world.velocities[:, 0] * np.cos(yaw) + world.velocities[:, 1] * np.sin(yaw)
+        if world.k == self._seen_k + 1:
+            change = (speed - self._speed) / self._time_step_s
+            self._acceleration = np.where(
+                np.isfinite(change), np.clip(change, -BELIEVED, BELIEVED), 0.0)
+        elif world.k != self._seen_k:
+            self._acceleration = np.zeros(len(speed))
+        self._seen_k, self._speed = world.k, speed
+        return self._acceleration
+
+    def standing(self, world: WorldView) -> NDArray[np.bool_]:
+        """Tell which others (O) are there and stand for good, as far as one can tell."""
+        speed = np.hypot(world.velocities[:, 0], world.velocities[:, 1])
+        still = speed < STANDING
+        self._still = np.where(still, self._still + 1, 0)
+        return np.asarray(still & (self._parked | (self._still > self._long_enough)))
+
+
+@compiled
+def with_agents(others: Bodies, agents: AgentTable) -> Bodies:
+    """Join the agents on the road to the others; those changing lanes claim the new one."""
+    slots = np.flatnonzero(agents.active)
+    first = len(others.owner)
+    count = first + len(slots)
+    result = Bodies(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.empty(count),
+                    np.empty(count), np.empty(count, np.int64), np.empty(count),
+                    np.empty(count, np.int64))
+    result.poses[:first], result.velocities[:first] = others.poses, others.velocities
+    result.acceleration[:first], result.length[:first] = others.acceleration, others.length
+    result.width[:first], result.owner[:first] = others.width, others.owner
+    result.time[:first], result.claim[:first] = others.time, others.claim
+    write_centers(agents, slots, result.poses[first:], result.velocities[first:])
+    for i, slot in enumerate(slots):
+        n = first + i
+        result.acceleration[n], result.owner[n] = agents.acceleration[slot], slot
+        result.length[n], result.width[n] = agents.length[slot], agents.width[slot]
+        result.time[n] = 0.0
+        result.claim[n] = agents.lane[slot] if agents.source[slot] != NOBODY else NOBODY
+    return result
+
+
+def standing_entries(entries: Entries,
+                     standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which entries (E) belong to others that stand for good."""
+    result = np.zeros(len(entries.owner), dtype=bool)
+    other = entries.owner < 0
+    result[other] = standing[-1 - entries.owner[other]]
+    return result

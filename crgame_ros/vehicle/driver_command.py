@@ -1,0 +1,55 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The normalised command of a driver, the same from whatever device (CRG III-C1)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class DriverCommand(NamedTuple):
+    """
+    What a seat asks of its vehicle.
+
+    :param throttle: normalised throttle pedal p_th in [0, 1]
+    :param brake: normalised brake pedal p_br in [0, 1]
+    :param steering: normalised steering wheel s in [-1, 1], positive to the left
+    :param reverse: True while the reverse gear is selected
+    """
+
+    throttle: float = 0.0
+    brake: float = 0.0
+    steering: float = 0.0
+    reverse: bool = False
+
+    def rounded(self) -> 'DriverCommand':
+        """
+        Clip to the allowed ranges and round to float32, the precision of sensor_msgs/Joy.
+
+        The engine does this to every command at its entrance, so that live, recorded and
+        replayed commands are the same bits. A value that is no number counts as released.
+        """
+        return DriverCommand(
+            _clip_float32(self.throttle, 0.0), _clip_float32(self.brake, 0.0),
+            _clip_float32(self.steering, -1.0), bool(self.reverse))
+
+
+RELEASED = DriverCommand()
+
+
+def _clip_float32(value: float, lower: float) -> float:
+    if not value == value:
+        return 0.0
+    return float(np.float32(min(1.0, max(lower, value))))

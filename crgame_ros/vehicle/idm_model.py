@@ -1,0 +1,72 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The equation of the Intelligent Driver Model (CRG reference 10), for numbers and for arrays."""
+
+from collections.abc import Callable
+import math
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+# One call takes numbers only or arrays only.
+Number = TypeVar('Number', float, NDArray[np.float64])
+
+EXPONENT = 4
+CLOSEST = 0.1
+
+
+class IdmParameters(NamedTuple):
+    """
+    Parameters of the model, in the notation of CRG reference 10.
+
+    :param time_headway: T [s]
+    :param s0: gap at standstill [m]
+    :param a: maximum acceleration [m/s^2]
+    :param b: comfortable deceleration [m/s^2]
+    :param b_max: hardest deceleration [m/s^2]
+    """
+
+    time_headway: float
+    s0: float
+    a: float
+    b: float
+    b_max: float
+
+
+def free_acceleration(speed: Number, desired: Number, model: IdmParameters,
+                      larger: Callable[[Any, Any], Any] = max) -> Number:
+    """
+    Accelerate on a free road, a (1 - (v / v0)^4); not below -b where v exceeds v0 [m/s^2].
+
+    :param desired: v0, above 0 [m/s]
+    :param larger: `max` for numbers, `numpy.maximum` for arrays
+    """
+    return larger(model.a * (1.0 - (speed / desired) ** EXPONENT), -model.b)
+
+
+def interaction(speed: Number, gap: Number, leader_speed: Number, model: IdmParameters,
+                larger: Callable[[Any, Any], Any] = max) -> Number:
+    """
+    Give the interaction term -a (s* / s)^2 of the IDM (CRG reference 10) [m/s^2].
+
+    The desired gap is s* = s0 + max(0, v T + v dv / (2 sqrt(a b))) with dv = v - v_leader.
+
+    :param gap: s, bumper to bumper [m]
+    :param larger: `max` for numbers, `numpy.maximum` for arrays
+    """
+    closing = speed * (speed - leader_speed) / (2.0 * math.sqrt(model.a * model.b))
+    wanted = model.s0 + larger(0.0, speed * model.time_headway + closing)
+    return -model.a * (wanted / larger(gap, CLOSEST)) ** 2

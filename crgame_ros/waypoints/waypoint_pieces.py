@@ -1,0 +1,151 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Way-point lanes cut into pieces of one speed limit each, with links from piece to piece."""
+
+from bisect import bisect_right, insort
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+import itertools
+
+from crgame_ros.errors import InputError
+from crgame_ros.waypoints.waypoint_roads import LaneLinks, WaypointRoads
+import numpy as np
+
+# A neighbour with a cut so close by has its counterpart there already [m].
+SNAP = 2.0
+# Ids above this are left to those who gave them.
+_MANY = 10**15
+
+
+@dataclass(frozen=True)
+class Piece:
+    """
+    A part of a lane that becomes a lanelet.
+
+    :param number: its id.
+    :param lane: id of the lane.
+    :param start: station at which it begins [m]
+    :param end: station at which it ends [m]
+    :param speed_limit: [m/s]; infinite without one.
+    :param successors: ids of pieces.
+    :param predecessors: ids of pieces.
+    :param left: id of the piece beside it and whether that has the same direction; None without.
+    :param right: likewise.
+    """
+
+    number: int
+    lane: int
+    start: float
+    end: float
+    speed_limit: float
+    successors: tuple[int, ...]
+    predecessors: tuple[int, ...]
+    left: tuple[int, bool] | None
+    right: tuple[int, bool] | None
+
+
+def free_ids(taken: tuple[int, ...]) -> Iterator[int]:
+    """Yield ids that nothing has: those above the others, unless these are huge."""
+    known = set(taken)
+    first = max(known) + 1 if max(known) < _MANY else 1
+    return (number for number in itertools.count(max(first, 1)) if number not in known)
+
+
+def cut_lanes(roads: WaypointRoads, links: Mapping[int, LaneLinks], ids: Iterator[int],
+              where: str) -> list[Piece]:
+    """
+    Cut every lane where its speed limit changes, and where a neighbour is cut.
+
+    The first piece of a lane has the lane's id (but 0, which no lanelet may have). A lane that
+    follows itself is cut in the middle: no lanelet may.
+
+    :param links: as `completed_links` gives them.
+    :param ids: for the other pieces.
+    :param where: what to name in messages, before the lane.
+    :raises InputError: if a speed limit is no step.
+    """
+    cuts = _cuts(roads, links, where)
+    numbers = {lane: [lane or next(ids), *itertools.islice(ids, len(cuts[lane]))]
+               for lane in links}
+    pieces = []
+    for lane, near in links.items():
+        road, own = roads.lane(lane), numbers[lane]
+        stations = [0.0, *cuts[lane], road.length]
+        limits = road.at(np.array(stations[:-1])).speed_limit.tolist()
+        for index, number in enumerate(own):
+            after = own[index + 1:index + 2] or [numbers[x][0] for x in near.successors]
+            before = own[index - 1:index] or [numbers[x][-1] for x in near.predecessors]
+            sides = [_piece_beside(roads, cuts, numbers, lane, index, same, oncoming)
+                     for same, oncoming in ((near.left, near.oncoming_left),
+                                            (near.right, near.oncoming_right))]
+            pieces.append(Piece(number, lane, stations[index], stations[index + 1],
+                                limits[index], tuple(after), tuple(before), *sides))
+    return pieces
+
+
+def _cuts(roads: WaypointRoads, links: Mapping[int, LaneLinks],
+          where: str) -> dict[int, list[float]]:
+    cuts: dict[int, list[float]] = {}
+    for lane, near in links.items():
+        road = roads.lane(lane)
+        if road.kinds['speed_limit'] != 'step':
+            raise InputError('the speed limit changes gradually', f'{where}, lane {lane}',
+                             'interpolate it as steps: a lanelet has one limit')
+        changes = np.flatnonzero(road.speed_limit[1:-1] != road.speed_limit[:-2]) + 1
+        cuts[lane] = road.s[changes].tolist()
+        if lane in near.successors and not cuts[lane]:
+            cuts[lane] = [0.5 * road.length]
+    waiting = [(lane, s) for lane, own in cuts.items() for s in own]
+    for lane, s in waiting:
+        for other in _beside(links[lane]):
+            station = _across(roads, lane, s, other)
+            near_end = min(station, roads.lane(other).length - station) < SNAP
+            if not near_end and all(abs(station - cut) >= SNAP for cut in cuts[other]):
+                insort(cuts[other], station)
+                waiting.append((other, station))
+    return cuts
+
+
+def _beside(near: LaneLinks) -> list[int]:
+    return [other for other in (near.left, near.right, near.oncoming_left, near.oncoming_right)
+            if other is not None]
+
+
+def _across(roads: WaypointRoads, lane: int, s: float, other: int) -> float:
+    """Find the station of another lane beside a station of a lane."""
+    here = roads.lane(lane).at(np.array([s]))
+    return float(roads.lane(other).project(np.stack((here.x, here.y), axis=-1)).s[0])
+
+
+def _piece_beside(roads: WaypointRoads, cuts: Mapping[int, list[float]],
+                  numbers: Mapping[int, list[int]], lane: int, index: int, same: int | None,
+                  oncoming: int | None) -> tuple[int, bool] | None:
+    """Name the piece beside a piece: the one whose middle is beside it, and the other way."""
+    other = oncoming if same is None else same
+    if other is None:
+        return None
+    if not (cuts[lane] or cuts[other]):
+        return numbers[other][0], same is not None
+    beside = bisect_right(cuts[other], _across(roads, lane, _middle(roads, cuts, lane, index),
+                                               other))
+    back = bisect_right(cuts[lane], _across(roads, other, _middle(roads, cuts, other, beside),
+                                            lane))
+    return (numbers[other][beside], same is not None) if back == index else None
+
+
+def _middle(roads: WaypointRoads, cuts: Mapping[int, list[float]], lane: int,
+            index: int) -> float:
+    stations = [0.0, *cuts[lane], roads.lane(lane).length]
+    return 0.5 * (stations[index] + stations[index + 1])

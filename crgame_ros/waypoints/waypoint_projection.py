@@ -1,0 +1,166 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The nearest points of plane curves made of cubic pieces, found in logarithmic time."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Distance of the samples among which the tree finds the place to search [m].
+_SAMPLING = 0.5
+# Samples of one piece and of all pieces at most: way-points far apart must not fill the memory.
+_MAX_PER_PIECE = 64
+_MAX_SAMPLES = 4_000_000
+# Places per point that are refined: curves that cross have their samples side by side, and on one
+# curve the nearest sample is next to the nearest point, but where it comes back to itself.
+ALONE, SEVERAL = 3, 8
+_TOLERANCE = 1e-10
+# Halving alone would reach the tolerance from any sampling after as many steps.
+_MAX_STEPS = 60
+
+
+class CurvePieces(NamedTuple):
+    """
+    The cubic pieces of one or several curves, those of one curve in order and next to each other.
+
+    :param coefficients: (4, P, 2) of x and y in powers 3, 2, 1, 0 of the distance from the start
+        of the piece.
+    :param start: (P,) station at which a piece starts [m]
+    :param length: (P,) of the stations that it covers [m]
+    :param curve: (P,) number of the curve that it belongs to.
+    """
+
+    coefficients: FloatArray
+    start: FloatArray
+    length: FloatArray
+    curve: IntArray
+
+
+class Nearest(NamedTuple):
+    """The nearest points of N points: curve (N,), station s [m], offset d and distance [m]."""
+
+    curve: IntArray
+    s: FloatArray
+    d: FloatArray
+    distance: FloatArray
+
+
+class CurveIndex:
+    """
+    Finds the points of curves that are nearest to given points.
+
+    A k-d tree over samples of the curves gives the places to search, in O(log P) for each point;
+    Newton steps on the squared distance, kept between the neighbouring samples by halving, find
+    the point there. The best of several places counts. Where more curves than that lie within half
+    a sampling distance (0.25 m) of each other, it may take one of them that is not the nearest.
+
+    :param pieces: of the curves; they may not be changed afterwards.
+    """
+
+    def __init__(self, pieces: CurvePieces) -> None:
+        self._pieces = pieces
+        most = int(np.clip(_MAX_SAMPLES // len(pieces.start), 1, _MAX_PER_PIECE))
+        counts = np.clip(np.ceil(pieces.length / _SAMPLING), 1, most).astype(np.int64)
+        self._piece: IntArray = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(len(self._piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+        step = (pieces.length / counts)[self._piece]
+        self._low: FloatArray = number * step
+        self._high: FloatArray = np.where(number + 1 == counts[self._piece],
+                                          pieces.length[self._piece], self._low + step)
+        # Every interval has a sample at its start; the last one of a curve at its end as well.
+        curve = pieces.curve[self._piece]
+        last = np.flatnonzero(np.append(curve[1:] != curve[:-1], True))
+        first = np.flatnonzero(np.insert(curve[1:] != curve[:-1], 0, True))
+        before = np.arange(len(curve)) - 1
+        before[first] = -1
+        self._before: IntArray = np.concatenate((before, last))
+        self._after: IntArray = np.concatenate((np.arange(len(curve)), np.full(len(last), -1)))
+        starts = self._at(self._piece, self._low)[0]
+        ends = self._at(self._piece[last], self._high[last])[0]
+        self._tree = cKDTree(np.concatenate((starts, ends)))
+
+    def nearest(self, points: FloatArray, candidates: int = SEVERAL) -> Nearest:
+        """
+        Find the nearest point of any curve for each of many points.
+
+        :param points: (N, 2) finite x, y [m]
+        :param candidates: places for each point among which to choose; `ALONE` do for one curve.
+        :return: s within its curve; d is the offset along the normal there, positive to the left,
+            and |d| the distance unless the nearest point is an end.
+        """
+        count = min(candidates, self._tree.n)
+        _, samples = self._tree.query(points, k=list(range(1, count + 1)))
+        rows = np.repeat(np.arange(len(points)), count)
+        piece, u = self._refine(points[rows], samples.reshape(-1))
+        position, tangent, _ = self._at(piece, u)
+        offset = points[rows] - position
+        distance = np.hypot(*offset.T).reshape(-1, count)
+        best = np.argmin(distance, axis=1)
+        chosen = np.arange(len(points)) * count + best
+        offset, tangent, piece = offset[chosen], tangent[chosen], piece[chosen]
+        across = tangent[:, 0] * offset[:, 1] - tangent[:, 1] * offset[:, 0]
+        return Nearest(self._pieces.curve[piece], self._pieces.start[piece] + u[chosen],
+                       across / np.maximum(np.hypot(*tangent.T), 1e-12),
+                       distance[np.arange(len(points)), best])
+
+    def _refine(self, points: FloatArray, samples: IntArray) -> tuple[IntArray, FloatArray]:
+        """Find the piece and the place on it nearest to each point beside its sample."""
+        before, after = self._before[samples], self._after[samples]
+        here = np.where(after < 0, before, after)
+        u = np.where(after < 0, self._high[here], self._low[here])
+        slope, _ = self._slopes(self._piece[here], u, points)
+        # The squared distance falls to one side of the sample; at an end there is but one.
+        backwards = (slope > 0.0) & (before >= 0)
+        fixed = (slope > 0.0) & (before < 0) | (slope <= 0.0) & (after < 0)
+        interval = np.where(backwards, before, here)
+        u = np.where(backwards, self._high[interval], u)
+        low = np.where(fixed, u, self._low[interval])
+        high = np.where(fixed, u, self._high[interval])
+        piece = self._piece[interval]
+        open_rows = np.flatnonzero(~fixed)
+        for _ in range(_MAX_STEPS):
+            if not len(open_rows):
+                break
+            at = open_rows
+            slope, bend = self._slopes(piece[at], u[at], points[at])
+            low[at] = np.where(slope <= 0.0, u[at], low[at])
+            high[at] = np.where(slope > 0.0, u[at], high[at])
+            trial = u[at] - slope / np.where(bend > 0.0, bend, 1.0)
+            useful = (bend > 0.0) & (trial >= low[at]) & (trial <= high[at])
+            trial = np.where(useful, trial, 0.5 * (low[at] + high[at]))
+            moved = np.abs(trial - u[at])
+            u[at] = trial
+            open_rows = at[moved > _TOLERANCE]
+        return piece, u
+
+    def _slopes(self, piece: IntArray, u: FloatArray,
+                points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Give the first and second derivative of half the squared distance."""
+        position, first, second = self._at(piece, u)
+        offset = position - points
+        return (np.einsum('ij,ij->i', offset, first),
+                np.einsum('ij,ij->i', first, first) + np.einsum('ij,ij->i', offset, second))
+
+    def _at(self, piece: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Give position and derivatives (n, 2) on pieces."""
+        c3, c2, c1, c0 = self._pieces.coefficients[:, piece]
+        t = u[:, None]
+        return (((c3 * t + c2) * t + c1) * t + c0, (3.0 * c3 * t + 2.0 * c2) * t + c1,
+                6.0 * c3 * t + 2.0 * c2)

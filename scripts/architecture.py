@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Draw the package's folders and their imports into docs/architecture.md and its picture.
+
+    python3 scripts/architecture.py            write both
+    python3 scripts/architecture.py --check    say whether they are up to date, and change nothing
+
+FOLDERS is the order of the house: a folder imports from those above it in the list only. That it
+does is tested; the sentence beside each folder is its own docstring.
+"""
+
+import argparse
+import ast
+from collections import Counter
+from pathlib import Path
+import re
+import sys
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / 'crgame_ros'
+DOCUMENT = ROOT / 'docs' / 'architecture.md'
+PICTURE = ROOT / 'docs' / 'images' / 'architecture.svg'
+# Files of the package's own folder that everybody may import, and those that use everybody.
+LOWEST, HIGHEST = 'errors, paths, …', 'cli, doctor'
+AT_THE_TOP = {'cli', 'doctor', 'requirements', 'schema_command'}
+FOLDERS = (
+    LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints', 'occupancy',
+    'scripted', 'messages', 'driver', 'timing', 'drivability', 'control', 'planner', 'perception',
+    'traffic', 'simulation', 'recording', 'analysis', 'cockpit', 'ros', 'nodes/sim',
+    'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher', HIGHEST)
+BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
+# Of the picture [px].
+CELL, NAMES, TOP = 22, 150, 120
+
+
+def modules() -> dict[str, Path]:
+    """Give every module of the package, by its dotted name."""
+    return {'.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
+            for path in sorted(PACKAGE.rglob('*.py'))}
+
+
+def folder_of(path: Path) -> str:
+    """Give the folder that a file belongs to."""
+    folder = path.parent.relative_to(PACKAGE).as_posix()
+    if folder != '.':
+        return folder
+    return HIGHEST if path.stem in AT_THE_TOP else LOWEST
+
+
+def imports() -> dict[tuple[str, str], list[str]]:
+    """Give what folders import from other folders, as `file imports module`; by both folders."""
+    known = modules()
+    found: dict[tuple[str, str], list[str]] = {}
+    for path in known.values():
+        for name in sorted(_imported(path, known)):
+            pair = folder_of(path), folder_of(known[name])
+            if pair[0] != pair[1]:
+                found.setdefault(pair, []).append(
+                    f'{path.relative_to(ROOT).as_posix()} imports {name}')
+    return found
+
+
+def _imported(path: Path, known: dict[str, Path]) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Import):
+            found |= {item.name for item in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            # A name may be a module of the folder.
+            found |= {name if (name := f'{node.module}.{item.name}') in known else node.module
+                      for item in node.names}
+    return found & set(known)
+
+
+def sentence(folder: str) -> str:
+    """Give the sentence that a folder says of itself."""
+    if folder == LOWEST:
+        return 'What everybody uses: errors, paths, the registry, guarded YAML.'
+    if folder == HIGHEST:
+        return 'The command `crgame`, and what it finds wrong with an installation.'
+    text = ast.get_docstring(ast.parse((PACKAGE / folder / '__init__.py').read_text('utf-8')))
+    assert text is not None, folder
+    return text.splitlines()[0]
+
+
+def table(counts: Counter[tuple[str, str]]) -> str:
+    """Give the list of the folders as Markdown."""
+    rows = ['| folder | files | what it is | imports from |', '|---|---|---|---|']
+    for folder in FOLDERS:
+        files = sum(folder_of(path) == folder and path.stem != '__init__'
+                    for path in modules().values())
+        below = [name for name in FOLDERS[:FOLDERS.index(folder)]
+                 if counts[folder, name] and name != LOWEST]
+        rows.append(f'| `{folder}` | {files} | {sentence(folder)} | {", ".join(below)} |')
+    return '\n'.join(rows)
+
+
+def picture(counts: Counter[tuple[str, str]]) -> str:
+    """Give the folders as a matrix: a row's folder imports from the columns' (SVG)."""
+    size = len(FOLDERS) * CELL
+    most = max(counts.values())
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{NAMES + size + 20}" '
+        f'height="{TOP + size + 20}" font-family="sans-serif" font-size="12">',
+        '<rect width="100%" height="100%" fill="#ffffff"/>']
+    for i, folder in enumerate(FOLDERS):
+        place = TOP + i * CELL
+        if i % 2:
+            parts.append(f'<rect x="0" y="{place}" width="{NAMES + size}" height="{CELL}" '
+                         'fill="#f4f6f8"/>')
+        parts.append(f'<text x="{NAMES - 8}" y="{place + 15}" text-anchor="end">{folder}</text>')
+        across = NAMES + i * CELL + 15
+        parts.append(f'<text transform="translate({across},{TOP - 8}) rotate(-60)">'
+                     f'{folder}</text>')
+        parts.append(f'<rect x="{NAMES + i * CELL}" y="{place}" width="{CELL}" height="{CELL}" '
+                     'fill="#c8cfd6"/>')
+    for (row, column), count in sorted(counts.items()):
+        x = NAMES + FOLDERS.index(column) * CELL
+        y = TOP + FOLDERS.index(row) * CELL
+        below = FOLDERS.index(column) < FOLDERS.index(row)
+        color = '#0b62a8' if below else '#c0262d'
+        shade = 0.25 + 0.75 * (count / most) ** 0.5
+        parts.append(
+            f'<rect x="{x + 1}" y="{y + 1}" width="{CELL - 2}" height="{CELL - 2}" rx="3" '
+            f'fill="{color}" fill-opacity="{shade:.2f}"><title>{row} imports from {column}: '
+            f'{count}</title></rect>')
+        parts.append(f'<text x="{x + CELL / 2:g}" y="{y + 15}" text-anchor="middle" '
+                     f'font-size="10" fill="{"#ffffff" if shade > 0.55 else "#10202c"}">'
+                     f'{count}</text>')
+    return '\n'.join([*parts, '</svg>', ''])
+
+
+def main() -> int:
+    """Write or check both files."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--check', action='store_true')
+    check = parser.parse_args().check
+    counts = Counter({pair: len(found) for pair, found in imports().items()})
+    text = DOCUMENT.read_text(encoding='utf-8')
+    listed = re.sub(f'{BEGIN}.*{END}', lambda _: f'{BEGIN}\n{table(counts)}\n{END}', text,
+                    flags=re.DOTALL)
+    for file, wanted in ((DOCUMENT, listed), (PICTURE, picture(counts))):
+        if check and (not file.exists() or file.read_text(encoding='utf-8') != wanted):
+            print(f'{file.relative_to(ROOT)} is out of date: run scripts/architecture.py')
+            return 1
+        if not check:
+            file.write_text(wanted, encoding='utf-8')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

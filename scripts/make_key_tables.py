@@ -1,0 +1,198 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Write the tables of keys in the documentation from the declarations in the code.
+
+    python3 scripts/make_key_tables.py            write docs/keys.md, and the tables in other pages
+    python3 scripts/make_key_tables.py --check    say whether they are up to date, change nothing
+
+A table in another page stands between two comments: <!-- keys: game.object_spec:ObjectSpec --> and
+<!-- keys: end -->.
+"""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import is_dataclass, MISSING
+import importlib
+import inspect
+import math
+from pathlib import Path
+import re
+import sys
+from typing import Any, get_args, get_origin
+
+from crgame_ros.schema.declaration import (
+    choices_of,
+    form_of,
+    Key,
+    keys_of,
+    sentences_of,
+    split,
+    wanted,
+)
+from crgame_ros.schema.marks import Folder, Keyed, Meaning, Numbered, OnlyWith
+from crgame_ros.schema.writing import write
+from crgame_ros.schema_command import KINDS
+
+DOCS = Path(__file__).resolve().parent.parent / 'docs'
+REFERENCE = DOCS / 'keys.md'
+NOTICE = (
+    '# Every key\n\nOf every file that users write; made from the declarations in the code by '
+    '`scripts/make_key_tables.py`.\n`crgame schema` gives the same as JSON Schema. What the keys '
+    'are for stands in the pages about [games](games.md),\n[objects](objects.md), '
+    '[perception](perception.md), [traffic](traffic.md), [control](control.md), '
+    '[drivers and devices](driving.md)\nand [maps](occupancy.md).')
+_TABLE = re.compile(r'(<!-- keys: ([\w.]+):(\w+) -->\n).*?(<!-- keys: end -->)', re.DOTALL)
+
+
+def reference() -> str:
+    """Give the page of every key."""
+    parts, done = [NOTICE], set[Any]()
+    for module, name, title in KINDS.values():
+        top = getattr(importlib.import_module(module), name)
+        for label, kind in sections(title, top):
+            if kind not in done:
+                done.add(kind)
+                parts += [f'{"##" if kind is top else "###"} {label}', summary(kind), table(kind)]
+    return '\n\n'.join(parts) + '\n'
+
+
+def sections(label: str, kind: Any) -> Iterator[tuple[str, Any]]:
+    """Give a dataclass and all that it holds, by the keys that lead there."""
+    yield label, kind
+    for key in keys_of(kind):
+        keyed = key.mark(Keyed)
+        several = list(held(key.hint))
+        inner = [(f'{keyed.noun} `{name}`', one) for name, hint in keyed.kinds.items()
+                 for one in held(hint)] if keyed \
+            else [(f'`{key.name}`' + (f' with `{keys_of(one)[0].name}`' if several[1:] else ''),
+                   one) for one in several]
+        for name, one in inner:
+            yield from sections(name, one)
+
+
+def held(hint: Any) -> Iterator[Any]:
+    """Give the dataclasses that a type is made of."""
+    for choice in choices_of(split(hint)[0]):
+        if is_dataclass(choice):
+            yield choice
+        else:
+            for inner in get_args(choice):
+                yield from held(inner)
+
+
+def summary(kind: Any) -> str:
+    """Give the first sentence of a docstring, and what a bare text stands for."""
+    text = inspect.cleandoc(kind.__doc__ or '').split('\n')[0]
+    form = form_of(kind)
+    if form.short:
+        text += f' A bare text is short for `{{{form.short}: …}}`.'
+    return escaped(text)
+
+
+def table(kind: Any) -> str:
+    """Give the keys of a dataclass as a table."""
+    rows = [['key', 'value', 'default', 'meaning'], ['---'] * 4]
+    form, sentences = form_of(kind), sentences_of(kind)
+    for key in keys_of(kind):
+        keyed = key.mark(Keyed)
+        if key.mark(Folder):
+            continue
+        name = 'one of ' + ', '.join(f'`{item}`' for item in keyed.kinds) if keyed \
+            else 'all other keys' if key.field == form.rest else f'`{key.name}`'
+        rows.append([name, value(key, kind), default(key), meaning(key, sentences)])
+    for name, section in form.moved:
+        rows.append([f'`{name}`', f'as in `{section}`', '',
+                     f'short for `{section}: {{{name}: …}}`'])
+    return '\n'.join(f'| {" | ".join(row)} |' for row in rows)
+
+
+def value(key: Key, kind: Any) -> str:
+    """Say what may stand there."""
+    if key.mark(Keyed):
+        return 'a mapping'
+    choices = form_of(kind).choices.get(key.name)
+    if choices:
+        return '; '.join(f'{by}: {", ".join(words)}' for by, words in choices.items())
+    if len(list(held(key.hint))) == 1:
+        lists = any(get_origin(choice) is tuple for choice in choices_of(key.hint))
+        return 'a list of mappings' if lists else 'a mapping'
+    text = wanted(key.hint, tuple(mark for mark in key.marks if not isinstance(mark, Meaning)))
+    words = [str(mark.written) for mark in key.marks if isinstance(mark, Meaning)
+             and isinstance(mark.written, str)]
+    return escaped(', or '.join([text.removeprefix('use ').removeprefix('one of '), *words]))
+
+
+def default(key: Key) -> str:
+    """Say what holds without the key."""
+    numbered = key.mark(Numbered)
+    if numbered is not None:
+        return f'{numbered.prefix}0, …'
+    if key.default is MISSING:
+        return 'needed'
+    given = write(key.default) if key.default not in (None, math.inf) else key.default
+    if given in (None, '', math.inf) or isinstance(given, dict | list) and not (
+            isinstance(given, list) and given and isinstance(given[0], float)):
+        return '–' if given != math.inf else 'inf'
+    return f'{given:.4g}' if isinstance(given, float) else str(given).lower() \
+        if isinstance(given, bool) else f'{given}'
+
+
+def meaning(key: Key, sentences: dict[str, str]) -> str:
+    """Give its sentence, and beside which keys alone it stands."""
+    beside = key.mark(OnlyWith)
+    only = '' if beside is None or key.name in beside.keys \
+        else f'(with {", ".join(f"`{name}`" for name in beside.keys)}) '
+    return escaped(re.sub(r'\bNone\b', 'null', only + sentences.get(key.field, '')))
+
+
+def escaped(text: str) -> str:
+    """Keep bars and placeholders from being read as markup."""
+    return text.replace('|', '\\|').replace('<', '&lt;')
+
+
+def pages() -> dict[Path, str]:
+    """Give every page with tables of keys, as it has to be."""
+    found = {REFERENCE: reference()}
+    for page in sorted(DOCS.glob('*.md')):
+        text = page.read_text(encoding='utf-8') if page != REFERENCE else ''
+        if '<!-- keys: ' in text:
+            found[page] = _TABLE.sub(lambda match: match[1] + table(getattr(
+                importlib.import_module(f'crgame_ros.{match[2]}'), match[3])) + '\n' + match[4],
+                text)
+    return found
+
+
+def main() -> int:
+    """
+    Write the tables, or check them.
+
+    :return: exit code: 0 if all is written or up to date.
+    """
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--check', action='store_true')
+    check = parser.parse_args().check
+    old = [page for page, text in pages().items()
+           if not page.exists() or page.read_text(encoding='utf-8') != text]
+    for page in old:
+        print(f'{page}: {"old: run scripts/make_key_tables.py" if check else "written"}')
+        if not check:
+            page.write_text(pages()[page], encoding='utf-8')
+    return 1 if check and old else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,413 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Recordings as the page gets them: every state to the last bit, in pieces, with what happened."""
+
+import asyncio
+from collections.abc import Iterator
+import json
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+from typing import Any
+from urllib.request import urlopen
+
+import aiohttp
+from crgame_ros.cockpit import replay_chunks
+from crgame_ros.cockpit.access import Access
+from crgame_ros.cockpit.replay_backend import CHUNKS_KEPT, open_replay, ReplayBackend
+from crgame_ros.cockpit.server import create_app, listen
+from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import stamp_of
+from crgame_ros.messages.joints import vehicles_from_joints
+from crgame_ros.recording.mcap_file import McapFile
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.simulation.offline import OfflineResult
+import numpy as np
+import pytest
+from replay_support import (
+    CUT_IN,
+    drive,
+    happenings,
+    LATENCY,
+    N,
+    PARKED,
+    plans,
+    read_frames,
+    record,
+    recorder,
+    START,
+    TRAJECTORY,
+)
+from rosbags.rosbag2 import StoragePlugin
+
+DURATION_S, STEPS = 12.0, 1200
+
+
+@pytest.fixture(scope='module')
+def parked() -> OfflineResult:
+    """Drive past parked cars for 12 s: three chunks."""
+    return drive(PARKED, DURATION_S)
+
+
+@pytest.fixture(scope='module')
+def bag(parked: OfflineResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Record the run with all that happens in it."""
+    return record(tmp_path_factory.mktemp('replay') / 'bag',
+                  [*recorder.messages(parked), *plans(parked), *happenings()])
+
+
+@pytest.fixture(scope='module')
+def backend(bag: Path) -> Iterator[ReplayBackend]:
+    """Open the recording."""
+    opened = ReplayBackend(bag)
+    yield opened
+    opened.close()
+
+
+def _states(bag: Path) -> dict[int, Any]:
+    """Read the raw messages of /vehicles/state by n, without the code under test."""
+    with BagReader(bag) as reader:
+        return {stamp_of(item.message) // 10_000_000: item.message.points[0]
+                for item in reader.decoded(['/vehicles/state'])}
+
+
+def test_every_state_is_that_of_the_message(bag: Path, backend: ReplayBackend,
+                                            parked: OfflineResult) -> None:
+    """Positions to the last bit, at each of the 1201 steps; commands are those consumed."""
+    info = backend.info()
+    assert (info['chunks'], info['chunk_s'], info['duration_s']) == (3, 5.0, DURATION_S)
+    frames = read_frames(*map(backend.chunk, range(3)))
+    raw = _states(bag)
+    assert [int(head[2]) for _, head, _ in frames.states] == list(range(STEPS + 1)) == sorted(raw)
+    for _, head, body in frames.states:
+        n = int(head[2])
+        assert head.tolist() == [1, 0, n, n // N, n * 0.01]
+        rows = body[1:].reshape(2, 12)
+        joints = [np.array(values).reshape(2, 4) for values in (
+            raw[n].positions, raw[n].velocities, raw[n].accelerations)]
+        np.testing.assert_array_equal(rows[:, :3], joints[0][:, :3])
+        np.testing.assert_array_equal(rows[:, :8], vehicles_from_joints(*joints))
+    commands = np.array([body[1:].reshape(2, 12)[:, 8:] for _, _, body in frames.states])
+    assert np.isnan(commands[0]).all() and np.isnan(commands[:, 1]).all()
+    np.testing.assert_array_equal(commands[1:, 0], parked.commands[1:, 0])
+
+
+def test_ticks_are_those_of_the_run_log(bag: Path, backend: ReplayBackend) -> None:
+    """Vehicles and objects at each scenario step agree with the reader of conversions."""
+    log = read_run_log(bag)
+    frames = read_frames(*map(backend.chunk, range(3)))
+    at_ticks = np.array([body[1:].reshape(2, 12)[:, :8] for _, head, body in frames.states
+                         if head[2] % N == 0])
+    np.testing.assert_array_equal(at_ticks, log.vehicle_states)
+    objects = {int(head[3]): body[1:].reshape(-1, 6) for _, head, body in frames.objects}
+    assert sorted(objects) == log.ks.tolist() == list(range(121))
+    for k, rows in objects.items():
+        np.testing.assert_array_equal(rows[:, :3], log.object_poses[k])
+        np.testing.assert_array_equal(rows[:, 3:], log.object_velocities[k])
+
+
+def test_plans_come_when_they_arrived(backend: ReplayBackend, parked: OfflineResult) -> None:
+    """A plan made for tick n is behind the state n + 3, and has the poses that were sent."""
+    frames = read_frames(backend.chunk(0))
+    steps = {place: int(head[2]) for place, head, _ in frames.states}
+    assert len(frames.plans) == 50
+    for place, head, body in frames.plans:
+        before = max(n for at, n in steps.items() if at < place)
+        assert before == head[2] + LATENCY
+        assert body[:2].tolist() == [1, 4]
+        points = body[2:].reshape(4, 5)
+        av = parked.vehicle_states[int(head[2]), 1]
+        np.testing.assert_allclose(points[0, :3], av[:3], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(points[:, 3], 10.0, rtol=1e-12)
+        np.testing.assert_allclose(points[:, 4], [0.0, 0.1, 0.2, 0.3], rtol=0, atol=1e-15)
+
+
+def test_predictions_are_of_the_others(backend: ReplayBackend, parked: OfflineResult) -> None:
+    """Everybody who is there but the AV that asked, by the columns of the scene."""
+    _, head, body = read_frames(backend.chunk(0)).predictions[7]
+    assert head[2] == 70
+    asking, length, count = body[:3].astype(int)
+    entries = body[3:].reshape(count, 1 + 3 * length)
+    assert (asking, length) == (1, 3)
+    poses = parked.setup.obstacles.states_at(7).poses
+    there = [0, *(2 + index for index in np.flatnonzero(np.isfinite(poses[:, 0])))]
+    assert entries[:, 0].astype(int).tolist() == there
+    np.testing.assert_array_equal(entries[1:, 1:4], poses[np.isfinite(poses[:, 0])])
+
+
+def test_a_chunk_can_be_shown_alone(backend: ReplayBackend) -> None:
+    """It begins with the objects, the prediction and the plan of before, then the first state."""
+    frames = read_frames(backend.chunk(1))
+    assert frames.states[0][1][2] == 500
+    first = frames.states[0][0]
+    assert [int(head[2]) for place, head, _ in frames.objects if place < first] == [490, 500]
+    assert [int(head[2]) for place, head, _ in frames.predictions if place < first] == [490, 500]
+    assert [int(head[2]) for place, head, _ in frames.plans if place < first] == [490]
+
+
+def test_chunks_are_built_when_asked_for(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few are kept, each comes out the same again, and only its part of the file is read."""
+    monkeypatch.setattr(replay_chunks, 'CHUNK_S', 0.5)
+    backend = ReplayBackend(bag)
+    try:
+        info = backend.info()
+        assert (info['chunks'], info['chunk_s']) == (25, 0.5)
+        run = backend._runs[0]
+        first = [backend.chunk(i) for i in range(25)]
+        assert run.chunks_held == CHUNKS_KEPT
+        read: list[int] = []
+        content = McapFile._content
+        monkeypatch.setattr(McapFile, '_content', lambda self, segment: read.append(
+            segment.offset) or content(self, segment))
+        assert backend.chunk(3) == first[3]
+        # Segments hold 100 messages, a third of a second; there are some 40 of them.
+        assert 0 < len(set(read)) <= 8
+        read.clear()
+        assert backend.chunk(3) == first[3]
+        assert read == []
+        assert [int(head[2]) for _, head, _ in read_frames(first[24]).states] == [1200]
+    finally:
+        backend.close()
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_recordings_of_ros2_bag(tmp_path: Path, parked: OfflineResult, backend: ReplayBackend,
+                                storage: str) -> None:
+    """What `ros2 bag record` writes gives the same frames."""
+    messages = [*recorder.messages(parked), *plans(parked), *happenings()]
+    messages.sort(key=lambda message: message[2])
+    other = ReplayBackend(recorder.rosbag2(tmp_path / 'bag', messages,
+                                           StoragePlugin[storage.upper()]))
+    try:
+        assert [other.chunk(i) for i in range(3)] == [backend.chunk(i) for i in range(3)]
+        assert other.info()['events'] == backend.info()['events']
+    finally:
+        other.close()
+
+
+def test_recording_that_was_cut_off(tmp_path: Path, parked: OfflineResult, bag: Path) -> None:
+    """What is whole is shown, up to the last state in it, and a notice says so."""
+    folder = record(tmp_path / 'bag', [*recorder.messages(parked), *plans(parked)])
+    (folder / 'metadata.yaml').unlink()
+    file = folder / 'bag_0.mcap'
+    file.write_bytes(file.read_bytes()[:-file.stat().st_size // 3])
+    with BagReader(folder) as reader:
+        last = [stamp_of(item.message) for item in reader.decoded(['/vehicles/state'])][-1]
+    for path in (folder, file):
+        backend = ReplayBackend(path)
+        try:
+            info = backend.info()
+            assert 300 < info['last_n'] == last // 10_000_000 < STEPS
+            assert any('was not finished' in notice for notice in info['notices'])
+            frames = read_frames(*map(backend.chunk, range(info['chunks'])))
+            assert [int(head[2]) for _, head, _ in frames.states] == list(
+                range(info['last_n'] + 1))
+        finally:
+            backend.close()
+
+
+def test_each_run_of_a_recording(tmp_path: Path, parked: OfflineResult) -> None:
+    """Two runs between resets, each with its own scene, times and states; the last is first."""
+    second = drive(CUT_IN, 1.5, seed=2)
+    offset_ns = 50_000_000_000
+    folder = record(tmp_path / 'bag', [
+        *recorder.messages(parked), *happenings(),
+        *recorder.messages(second, epoch=1, offset_ns=offset_ns, log_ns=START + offset_ns),
+        *plans(second, offset_ns, START + offset_ns)])
+    backend = ReplayBackend(folder)
+    try:
+        assert backend.epochs == (0, 1)
+        infos = [backend.info(epoch) for epoch in (None, 0, 1)]
+        assert [info['epoch'] for info in infos] == [1, 0, 1]
+        assert [info['duration_s'] for info in infos] == [1.5, DURATION_S, 1.5]
+        assert [info['scene']['benchmark_id'] for info in infos[1:]] == [
+            'ZAM_ParkedCars-1_1_T-1', 'ZAM_CutIn-1_1_T-1']
+        assert [len(info['events']) for info in infos[1:]] == [4, 0]
+        for epoch, result in ((0, parked), (1, second)):
+            frames = read_frames(backend.chunk(0, epoch))
+            poses = np.array([body[1:].reshape(2, 12)[:, :3] for _, _, body in frames.states])
+            assert [head[1] for _, head, _ in frames.states] == [epoch] * len(poses)
+            np.testing.assert_array_equal(poses, result.vehicle_states[:500, :, :3])
+        assert len(read_frames(backend.chunk(0, 1)).plans) == 16
+    finally:
+        backend.close()
+    with pytest.raises(InputError, match='no epoch 5 in it; it has 0, 1'):
+        ReplayBackend(folder, 5)
+
+
+def test_what_happened(backend: ReplayBackend) -> None:
+    """Marks at the steps that the messages name; a flood of refusals is one."""
+    events = [(e['n'], e['k'], e['kind'], e['subject'], e['count'])
+              for e in backend.info()['events']]
+    assert events == [(453, 45, 'collision', 'hv0', 1), (610, 61, 'trigger', 'barrier', 1),
+                      (700, 70, 'refused_plan', 'av0', 3), (800, 80, 'stale_plan', 'av0', 1)]
+    refused = backend.info()['events'][2]
+    assert (refused['t'], refused['until_t']) == (7.0, 7.4)
+    assert 'speed 99 m/s' in refused['text']
+
+
+def test_documents_hold_from_their_step_on(backend: ReplayBackend) -> None:
+    """The page can take any time by itself: each entry is whole."""
+    documents = backend.info()['documents']
+    assert documents['signals'] == [[0.0, {'k': 0, 'states': {'7': 'red'}}],
+                                    [3.0, {'k': 30, 'states': {'7': 'green'}}]]
+    assert [t for t, _ in documents['events']] == [0.0, 610 * 0.01]
+    assert documents['events'][1][1]['fired'][0]['name'] == 'barrier'
+    alarms = [(t, [alarm['id'] for alarm in content['active']])
+              for t, content in documents['alarms']]
+    assert alarms == [(4.53, ['collision:hv0']), (5.2, []), (8.0, ['stale_plan:av0']), (9.0, [])]
+    assert [(t, content['hv0']['hit']) for t, content in documents['drivability']] == [
+        (2.0, []), (4.53, ['o1']), (5.2, [])]
+    assert [(t, content['av0']['stale']) for t, content in documents['planners']] == [
+        (8.0, True), (9.0, False)]
+    assert documents['seats'][0][1] == {'seats': {'hv0': {'source': 'game', 'driver': 'idle'}}}
+
+
+def test_outline_is_every_fifth_state(backend: ReplayBackend) -> None:
+    """Plots get the whole run at once, 0.05 s apart, with the same values."""
+    outline = read_frames(backend.outline()).states
+    assert [int(head[2]) for _, head, _ in outline] == list(range(0, STEPS + 1, 5))
+    states = {int(head[2]): body for _, head, body in read_frames(
+        *map(backend.chunk, range(3))).states}
+    for _, head, body in outline:
+        np.testing.assert_array_equal(body, states[int(head[2])])
+
+
+def test_lost_states_are_marked(tmp_path: Path, parked: OfflineResult) -> None:
+    """Nothing is invented for a gap, and the time line shows it."""
+    lost = range(START + 3_001_000_000, START + 3_401_000_000)
+    folder = record(tmp_path / 'bag', [
+        m for m in recorder.messages(parked) if m[0] != '/vehicles/state' or m[2] not in lost])
+    backend = ReplayBackend(folder)
+    try:
+        gaps = [e for e in backend.info()['events'] if e['kind'] == 'gap']
+        assert [(e['n'], e['text']) for e in gaps] == [(299, '40 states were not recorded')]
+        steps = [int(head[2]) for _, head, _ in read_frames(backend.chunk(0)).states]
+        assert steps == [*range(300), *range(340, 500)]
+    finally:
+        backend.close()
+
+
+def test_plans_that_are_none_are_passed_over(tmp_path: Path, parked: OfflineResult) -> None:
+    """A planner may have sent anything; the run can be shown all the same."""
+    broken = [('/av0/plan', TRAJECTORY, START + 205_000_000, recorder.joints(
+        200_000_000, ['x'], [1.0], [1.0], [1.0]))]
+    backend = ReplayBackend(record(tmp_path / 'bag', [
+        *recorder.messages(parked), *plans(parked)[:2], *broken]))
+    try:
+        assert [int(head[2]) for _, head, _ in read_frames(backend.chunk(0)).plans] == [0]
+    finally:
+        backend.close()
+
+
+def test_progress_is_told_when_it_takes_long(bag: Path) -> None:
+    """A clock that goes a second at each look: a line every third look, with the share done."""
+    times = iter(range(1000))
+    said: list[str] = []
+    backend = open_replay(bag, None, said.append, lambda: float(next(times)))
+    backend.close()
+    assert said and all(line.startswith(f'reading {bag}: ') for line in said)
+    quiet: list[str] = []
+    open_replay(bag, None, quiet.append, lambda: 0.0).close()
+    assert quiet == []
+
+
+@pytest.mark.parametrize(('name', 'message'), [
+    ('nowhere', 'no such file or folder'), ('text.mcap', 'no MCAP file'),
+    ('empty', 'no recording in this folder')])
+def test_what_is_no_recording(tmp_path: Path, name: str, message: str) -> None:
+    """One line, exit code 2, nothing started."""
+    (tmp_path / 'text.mcap').write_text('hello')
+    (tmp_path / 'empty').mkdir()
+    done = subprocess.run(
+        [sys.executable, '-m', 'crgame_ros.launcher.main', '--replay', str(tmp_path / name)],
+        capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stdout == ''
+    assert message in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_replay_goes_with_no_game() -> None:
+    """What would be ignored is refused."""
+    done = subprocess.run([sys.executable, '-m', 'crgame_ros.launcher.main', '--replay', 'bag',
+                           '--duration', '3'], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.startswith('error: --replay: shows a recording')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['int', 'term'])
+def test_command_serves_until_it_is_told_to_stop(bag: Path, tmp_path: Path,
+                                                 number: signal.Signals) -> None:
+    """The folder of a run will do; it prints an address that works, and ends with 0."""
+    (tmp_path / 'run').mkdir()
+    (tmp_path / 'run' / 'bag').symlink_to(bag)
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'crgame_ros.launcher.main', '--replay', str(tmp_path / 'run'),
+         '--port', '18466'], stdout=subprocess.PIPE, text=True, env=os.environ)
+    try:
+        assert process.stdout is not None
+        address = next(word for word in process.stdout.readline().split()
+                       if word.startswith('http://'))
+        with urlopen(f'{address}api/replay/info', timeout=30) as answer:
+            assert json.load(answer)['chunks'] == 3
+        process.send_signal(number)
+        assert process.wait(20) == 0
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_requests(bag: Path) -> None:
+    """What is not there is 404; a page cannot steer a recording."""
+    async def ask() -> None:
+        access = Access('127.0.0.1', 0)
+        runner, port = await listen(create_app(ReplayBackend(bag), access, None), '127.0.0.1', 0)
+        base = f'http://127.0.0.1:{port}'
+        try:
+            async with aiohttp.ClientSession() as session:
+                for query in ('i=3', 'i=-1', 'i=', 'i=x', 'i=1e0', 'i=%C2%B2', f'i={10**30}',
+                              'j=0', 'i=0&epoch=1', 'i=0&epoch=x'):
+                    async with session.get(f'{base}/api/replay/chunk?{query}') as answer:
+                        assert answer.status == 404, query
+                        assert 'error' in await answer.json()
+                async with session.get(f'{base}/api/replay/info?epoch=9') as answer:
+                    assert answer.status == 404
+                async with session.get(f'{base}/api/replay/chunk?i=2&epoch=0') as answer:
+                    frames = read_frames(await answer.read())
+                    assert frames.states[-1][1][2] == STEPS
+                async with session.ws_connect(f'{base}/ws') as socket:
+                    assert (await socket.receive_json())['mode'] == 'replay'
+                    scene = await socket.receive_json()
+                    assert (scene['type'], scene['benchmark_id']) == (
+                        'scene', 'ZAM_ParkedCars-1_1_T-1')
+                    await socket.send_json({'type': 'control', 'action': 'reset', 'id': 4})
+                    reply = await socket.receive_json()
+                    assert (reply['to'], reply['ok']) == (4, False)
+                    assert 'recording' in reply['text']
+        finally:
+            await runner.cleanup()
+
+    asyncio.run(ask())
+
+
+def test_recording_without_states(tmp_path: Path, parked: OfflineResult) -> None:
+    """There is nothing to show, and the message says what is missing."""
+    folder = record(tmp_path / 'bag', [m for m in recorder.messages(parked)
+                                       if m[0] != '/vehicles/state'])
+    with pytest.raises(InputError, match='no state of the run is in it'):
+        ReplayBackend(folder)

@@ -1,0 +1,211 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Seats in the browser: who holds them, and what hands, silence and absence become."""
+
+from crgame_ros.cockpit.seat_orders import AGAIN_S, GIVE_UP_S, SeatOrders
+from crgame_ros.cockpit.seat_table import HeldSeat, SeatTable, SILENCE_S
+from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import parse_seats_document
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+import pytest
+
+NAMES = {'c1': 'Ada', 'c2': 'Bob', 'c3': 'Cleo'}
+DT = 0.01
+THROTTLE = {'keys': [True, False, False, False], 'reverse': False}
+
+
+@pytest.fixture
+def table() -> SeatTable:
+    """Seats as /seats has them at the start of a game with one human and one AV."""
+    table = SeatTable()
+    table.update({'hv0': {'source': 'game', 'driver': 'keys:/home/me/games/cut_in.keys.yaml'},
+                  'av0': {'source': 'planner', 'driver': 'idm'}})
+    return table
+
+
+def test_a_seat_is_held_by_one(table: SeatTable) -> None:
+    """Who comes second is told by whom it is held, and may ask."""
+    table.claim('c1', 'hv0', NAMES)
+    assert table.claim('c1', 'hv0', NAMES).holder == 'c1'
+    with pytest.raises(InputError, match='hv0: Ada has the seat; ask for it'):
+        table.claim('c2', 'hv0', NAMES)
+    table.ask('c2', 'hv0')
+    table.ask('c2', 'hv0')
+    seat = table.document(NAMES, {})['seats']['hv0']
+    assert (seat['holder'], seat['holder_name']) == ('c1', 'Ada')
+    assert seat['requests'] == [{'client': 'c2', 'name': 'Bob'}]
+    assert seat['others'] == [{'client': 'c3', 'name': 'Cleo'}]
+    assert table.document(NAMES, {})['seats']['av0']['holder'] is None
+
+
+def test_hand_over(table: SeatTable) -> None:
+    """Only the holder hands over; the new one has it with the other requests, hands off."""
+    first = table.claim('c1', 'hv0', NAMES)
+    first.take(THROTTLE, 0.0)
+    table.ask('c2', 'hv0')
+    table.ask('c3', 'hv0')
+    with pytest.raises(InputError, match='hv0: you do not have the seat; claim it first'):
+        table.hand_over('c2', 'hv0', 'c3')
+    second = table.hand_over('c1', 'hv0', 'c2')
+    assert table.held['hv0'] is second and second.holder == 'c2'
+    assert second.requests == ['c3']
+    assert second.command(0, DT) == RELEASED
+
+
+def test_release_gives_back(table: SeatTable) -> None:
+    """By the holder; of a seat that was left, by anybody; never of somebody else's."""
+    table.claim('c1', 'hv0', NAMES)
+    with pytest.raises(InputError, match='somebody else has the seat'):
+        table.release('c2', 'hv0')
+    assert table.release('c1', 'hv0').id == 'hv0'  # type: ignore[union-attr]
+    with pytest.raises(InputError, match='nobody here has the seat'):
+        table.release('c1', 'hv0')
+    table.update({'hv0': {'source': 'cockpit', 'driver': 'idle'}})
+    assert table.release('c2', 'hv0') is None
+
+
+def test_a_client_that_is_gone_leaves_nothing(table: SeatTable) -> None:
+    """Its seat is free and its requests are forgotten."""
+    table.claim('c1', 'hv0', NAMES)
+    table.claim('c2', 'av0', NAMES)
+    table.ask('c2', 'hv0')
+    assert table.left('c2').id == 'av0'  # type: ignore[union-attr]
+    assert 'av0' not in table.held and table.held['hv0'].requests == []
+    assert table.left('c3') is None
+
+
+def test_unknown_seat_lists_what_there_is(table: SeatTable) -> None:
+    """As everywhere: what was wrong and what would be right."""
+    for act in (lambda: table.claim('c1', 'hv7', NAMES), lambda: table.release('c1', 'hv7'),
+                lambda: table.ask('c1', 'hv7'), lambda: table.hand_over('c1', 'hv7', 'c2')):
+        with pytest.raises(InputError, match='hv7: there is no such seat; it has hv0, av0'):
+            act()
+
+
+def test_vehicles_of_another_game_lose_their_holders(table: SeatTable) -> None:
+    """A seat that is no more is nobody's."""
+    table.claim('c1', 'av0', NAMES)
+    assert [seat.id for seat in table.update({'hv0': {'source': 'game', 'driver': 'idle'}})] \
+        == ['av0']
+    assert table.held == {}
+
+
+def test_the_driver_is_named_without_the_way_to_its_file(table: SeatTable) -> None:
+    """Who watches from elsewhere learns nothing of this machine's folders."""
+    assert table.document(NAMES, {})['seats']['hv0']['driver'] == 'keys:cut_in.keys.yaml'
+
+
+def test_keys_go_through_the_papers_filter() -> None:
+    """CRG 18-19 in simulation time: the same as a keyboard at the same cycles."""
+    seat, keyboard = HeldSeat('hv0', 'c1'), KeyboardCycles()
+    seat.take({'keys': [True, False, True, False], 'reverse': False}, 0.0)
+    for n in range(40):
+        assert seat.command(n, DT) == keyboard.command(n, KeyState(True, False, True), DT)
+    # r_th+ = 1.8 / s over 40 cycles of 10 ms, s_max = 0.65.
+    assert seat.command(39, DT).throttle == pytest.approx(1.8 * 0.4)
+    assert seat.command(39, DT).steering == pytest.approx(0.65)
+
+
+def test_axes_pass_as_they_are() -> None:
+    """The page has calibrated them."""
+    seat = HeldSeat('hv0', 'c1')
+    seat.take({'axes': [0.25, 0.0, -0.5], 'reverse': True}, 0.0)
+    assert seat.command(3, DT) == DriverCommand(0.25, 0.0, -0.5, True)
+
+
+def test_hands_off_means_released_at_once() -> None:
+    """No ramp: the next command is released, and the filter begins anew after the return."""
+    seat = HeldSeat('hv0', 'c1')
+    seat.take(THROTTLE, 0.0)
+    for n in range(50):
+        seat.command(n, DT)
+    seat.take({'away': True}, 0.5)
+    assert seat.away and seat.command(50, DT) == RELEASED
+    seat.take(THROTTLE, 0.6)
+    assert seat.command(60, DT).throttle == pytest.approx(1.8 * DT)
+
+
+def test_silence_is_noticed() -> None:
+    """A page that hangs sends nothing, not even that it is gone."""
+    seat = HeldSeat('hv0', 'c1')
+    assert not seat.is_silent(100.0)
+    seat.take(THROTTLE, 100.0)
+    assert not seat.is_silent(100.0 + 0.9 * SILENCE_S)
+    assert seat.is_silent(100.0 + 1.1 * SILENCE_S)
+    seat.let_go()
+    assert not seat.is_silent(200.0)
+
+
+def test_a_new_run_begins_at_cycle_0() -> None:
+    """After a reset the step counter falls: the filter follows instead of refusing."""
+    seat = HeldSeat('hv0', 'c1')
+    seat.take(THROTTLE, 0.0)
+    for n in range(500, 550):
+        seat.command(n, DT)
+    assert seat.command(0, DT).throttle == pytest.approx(1.8 * DT)
+
+
+def _seats(source: str, driver: str = 'idle') -> dict[str, dict[str, str]]:
+    return {'hv0': {'source': source, 'driver': driver}}
+
+
+def test_what_was_said_before_an_order_arrived_takes_nothing_away(table: SeatTable) -> None:
+    """While the answer is awaited the seat stays held; with it, /seats has the last word."""
+    orders = SeatOrders()
+    table.claim('c1', 'hv0', NAMES)
+    orders.note('hv0', 'cockpit', table.seats, 0.0)
+    for source, awaited, held in (('game', True, True), ('cockpit', False, True),
+                                  ('game', False, False)):
+        orders.answered(_seats(source))
+        table.update(_seats(source), orders)
+        assert ('hv0' in orders, 'hv0' in table.held) == (awaited, held)
+
+
+def test_orders_are_repeated_and_given_up(table: SeatTable) -> None:
+    """Every half second for ten: a reset that loads a big map hears nothing for seconds."""
+    orders = SeatOrders()
+    orders.note('hv0', 'cockpit', table.seats, 100.0)
+    assert orders.due(100.0 + 0.9 * AGAIN_S) == []
+    assert orders.due(100.0 + AGAIN_S) == [('hv0', 'cockpit')]
+    assert orders.due(100.0 + 1.9 * AGAIN_S) == []
+    # The later order is the one that counts.
+    orders.note('hv0', 'game', table.seats, 101.0)
+    assert orders.due(101.0 + AGAIN_S) == [('hv0', 'game')]
+    assert orders.due(101.0 + GIVE_UP_S) == [] and 'hv0' not in orders
+
+
+@pytest.mark.parametrize(('ordered', 'source', 'driver'), [
+    ('cockpit', 'cockpit', 'idle'), ('game', 'game', 'idle'), ('game', 'other', 'idle'),
+    ('game', 'cockpit', 'cockpit')], ids=['taken', 'given back', 'to another', 'at home'])
+def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: str) -> None:
+    """For the simulation says nothing when nothing changes."""
+    orders = SeatOrders()
+    orders.note('hv0', ordered, _seats(source, driver), 0.0)
+    assert 'hv0' not in orders
+    orders.note('hv0', ordered, {}, 0.0)
+    assert 'hv0' in orders
+    orders.answered(_seats(source, driver))
+    assert 'hv0' not in orders
+
+
+@pytest.mark.parametrize('text', [
+    '', '[]', '7', '[' * 100_000, '{"hv0": 3}', '{"hv0": {"source": "game"}}',
+    '{"hv0": {"source": 1, "driver": "idle"}}', '{"a b": {"source": "game", "driver": "idle"}}',
+    '{"hv0000": {"source": "game", "driver": "idle"}}'])
+def test_seats_that_are_none_are_refused(text: str) -> None:
+    """A name would become a topic, and a missing source an error in the midst of driving."""
+    with pytest.raises(InputError, match='/seats: is not what the contract says'):
+        parse_seats_document(text)

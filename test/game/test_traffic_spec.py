@@ -1,0 +1,56 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a game file may say about traffic."""
+
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.schema.reading import read
+from crgame_ros.schema.writing import write
+import pytest
+
+
+def test_the_word_reactive_is_enough() -> None:
+    assert read(TrafficSpec, 'reactive', 'game') == TrafficSpec(recorded='reactive')
+    assert read(TrafficSpec, {}, 'game') == TrafficSpec()
+    assert not TrafficSpec().is_reactive
+
+
+def test_what_is_written_reads_as_the_same() -> None:
+    spec = TrafficSpec('reactive', 12, 300.0, 40, 'idm', {'time_gap': 1.2}, False, True, False, 7,
+                       0.9, 0.05)
+    assert read(TrafficSpec, write(spec), 'game') == spec
+    assert write(TrafficSpec()) == {}
+
+
+def test_a_model_of_the_users_own_is_relative_to_the_game_file() -> None:
+    assert read(TrafficSpec, {'model': 'mine.py:Model'}, 'game',
+                Path('/games')).model == '/games/mine.py:Model'
+
+
+@pytest.mark.parametrize(('values', 'message'), [
+    ({'agnets': 3}, '"agnets" is unknown'),
+    ({'agents': -1}, 'give a whole number from 0 to 20000'),
+    ({'agents': 2.5}, '"agents" is 2.5'),
+    ({'flow': float('inf')}, '"flow" is inf'),
+    ({'speed_spread': 2.0}, 'from 0 to 0.5'),
+    ('replay', 'use one of replayed, reactive'),
+    ([1], 'is no mapping'),
+], ids=['unknown key', 'negative', 'half an agent', 'endless', 'too wide', 'wrong word', 'list'])
+def test_refuses_what_makes_no_sense(values: object, message: str) -> None:
+    with pytest.raises(InputError, match=message) as raised:
+        read(TrafficSpec, values, 'my.yaml, traffic')
+    assert raised.value.where == 'my.yaml, traffic'

@@ -1,0 +1,99 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""However a run ends, its files are there and nobody is left behind."""
+
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+from crgame_ros.launcher.interruption import writing
+from live_peer import Peer
+from live_support import CUT_IN, is_node, Launcher, ROOT, wait_until
+import pytest
+from worker_roles import own_domain_id
+
+
+def _files(folder: Path) -> None:
+    assert len(list(folder.glob('*.xml'))) == 1
+    assert (folder / 'timing.json').is_file() and (folder / 'game.yaml').is_file()
+    assert list((folder / 'bag').glob('*.mcap'))
+
+
+def test_a_closed_terminal_is_an_end_in_good_order(tmp_path: Path) -> None:
+    with Launcher([CUT_IN], tmp_path / 'run') as launcher:
+        launcher.wait_for('recording into')
+        wait_until(lambda: (tmp_path / 'run' / 'bag').is_dir(), 'the bag')
+        launcher.wait_for('planner idm is ready')
+        # Some steps, so that there is something to export.
+        wait_until(lambda: any(path.stat().st_size > 100_000 for path in (
+            tmp_path / 'run' / 'bag').glob('*.mcap')), 'a recording')
+        launcher.signal(signal.SIGHUP)
+        assert launcher.wait() == 0
+        _files(launcher.out)
+        assert 'again: ./run.sh' in launcher.lines[-1]
+
+
+def test_a_pipe_that_nobody_reads_any_more_ends_it_without_a_traceback(tmp_path: Path) -> None:
+    """`./run.sh | head`: the first line is read, then the pipe is closed."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'crgame_ros.launcher.main', str(CUT_IN), '--headless', '--out',
+         str(tmp_path / 'run')], cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True,
+        env=os.environ | {'ROS_DOMAIN_ID': str(own_domain_id())})
+    assert process.stdout is not None and process.stderr is not None
+    assert process.stdout.readline()
+    process.stdout.close()
+    errors = process.stderr.read()
+    process.wait(60.0)
+    assert 'Traceback' not in errors and 'Exception' not in errors
+    process.stderr.close()
+
+
+def test_a_stopped_node_does_not_outlive_a_killed_launcher(tmp_path: Path) -> None:
+    with Launcher([CUT_IN], tmp_path / 'run') as launcher:
+        launcher.wait_for('planner idm is ready')
+        launcher.wait_for('recording into')
+        for name in ('planner_node_av0', 'recorder_node', 'sim_node'):
+            launcher.freeze(name)
+        launcher.signal(signal.SIGKILL)
+        wait_until(lambda: not any(is_node(pid) for _, pid in launcher.started),
+                   'the end of every node', 20.0)
+
+
+def test_files_are_written_through_one_signal_and_left_at_a_second() -> None:
+    said: list[str] = []
+    before = signal.getsignal(signal.SIGHUP)
+    with writing(said.append):
+        os.kill(os.getpid(), signal.SIGTERM)
+    assert len(said) == 1 and 'crgame recover' in said[0]
+    with pytest.raises(KeyboardInterrupt), writing(said.append):
+        os.kill(os.getpid(), signal.SIGHUP)
+        os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGHUP) == before
+
+
+def test_runs_that_a_reset_ended_at_once_are_no_failure(tmp_path: Path) -> None:
+    """Two resets in a row, then a stop: the first run has its files, the others a line."""
+    with Launcher([CUT_IN], tmp_path / 'run') as launcher, \
+            Peer(launcher.domain, '/clock', '/scenario/game') as peer:
+        peer.wait_until(lambda: peer.games and peer.n > 50, 'some steps')
+        for service in ('/sim/reset', '/sim/reset', '/sim/stop'):
+            assert peer.call(service).success
+        assert launcher.wait() == 0, launcher.text
+    _files(launcher.out)
+    assert not launcher.says('error|record this topic')
+    assert launcher.says('run ended before its first step|run [23] ended before it began')

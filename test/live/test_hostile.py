@@ -1,0 +1,214 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""No message of anybody ends a process, owns a run, or costs its files."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+import json
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+from commonroad.common.file_reader import CommonRoadFileReader
+from hostile import code, games, messages
+from live_peer import Peer
+from live_support import is_node, Launcher, SCENARIOS
+import numpy as np
+import pytest
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.publisher import Publisher
+from std_msgs.msg import String
+from steady_game import Run
+
+TOPICS = ('/clock', '/scenario/xml', '/scenario/objects', '/scenario/game', '/timing/cycle',
+          '/vehicles/state', '/traffic/objects', '/traffic/agents', '/seats', '/diagnostics',
+          ('/<av>/plan', 'av0'),
+          ('/<v>/driver_command', 'hv0'))
+# Every node that reads anything: perception, traffic, a driver, and the rest.
+GAME = f"""
+scenario: {SCENARIOS / 'ZAM_DenseMerge-1_1_T-1.xml'}
+duration: 3600
+humans:
+  - id: hv0
+    driver: joy:steady.joy.yaml
+    spawn: {{lanelet: 51, s: 255.0, d: 0.0, speed: 12.0}}
+avs:
+  - id: av0
+    planning_problem: 100
+    planner: idm
+    perception:
+      sensors: [{{name: front, field_of_view: 2.0, horizon: 60.0, rays: 91, rate: 10.0}}]
+traffic: {{agents: 6, flow: 200, seed: 17}}
+"""
+THROTTLE = 0.1
+TIMELINE = f"""
+joy:
+  axes: [throttle, brake, steering]
+  points: [[0.0, {THROTTLE}, 0.0, 0.0], [3600.0, {THROTTLE}, 0.0, 0.0]]
+"""
+PROOF = 'import pathlib\npathlib.Path({path!r}).write_text("run")\n'
+
+
+@pytest.fixture(scope='module')
+def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
+    """Keep one graph: whatever is sent, it must be whole for the next test."""
+    folder = tmp_path_factory.mktemp('hostile')
+    (folder / 'steady.joy.yaml').write_text(TIMELINE)
+    (folder / 'hostile.yaml').write_text(GAME)
+    with Launcher([folder / 'hostile.yaml'], folder / 'run', headless=False) as launcher, \
+            Peer(launcher.domain, *TOPICS) as peer:
+        peer.wait_until(lambda: peer.n > 100, 'the first second')
+        for topic in ('/traffic/agents', '/traffic/objects', '/<av>/plan', '/scenario/xml'):
+            peer.wait_until(lambda topic=topic: peer.messages[topic], topic)
+        yield Run(launcher, peer)
+
+
+class Sender:
+    """Sends on any topic; its publishers stay."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self._publishers: dict[tuple[str, str], Publisher] = {}
+
+    def send(self, topic: str, vehicle: str, message: object) -> None:
+        """Send a message, or bytes that claim to be one."""
+        if (topic, vehicle) not in self._publishers:
+            self._publishers[topic, vehicle] = self._peer.publisher(topic, vehicle)
+            # The first who listens may be the test itself: the others are to hear it, too.
+            self._peer.listen_for(0.5)
+        # The middleware itself sends no bytes that cannot be a message of a fixed size.
+        with suppress(RCLError):
+            self._publishers[topic, vehicle].publish(message)
+
+    def close(self) -> None:
+        """Take the publishers away: what they latched is gone."""
+        for publisher in self._publishers.values():
+            self._peer.node.destroy_publisher(publisher)
+
+
+def _whole(run: Run, pids: dict[str, int]) -> None:
+    """Check that the nodes that were there are there, and that the run goes on."""
+    launcher, peer = run
+    assert dict(launcher.started) == pids, 'a node was started again'
+    assert [name for name, pid in pids.items() if not is_node(pid)] == []
+    peer.forget()
+    run.wait_for_steps(300)
+    peer.wait_until(lambda: peer.messages['/<av>/plan'] and peer.messages['/traffic/agents'],
+                    'plans and agents')
+    assert not launcher.says('Traceback')
+    assert [line for line in launcher.errors if 'Traceback' in line] == []
+
+
+def test_no_message_ends_a_node_or_the_run(run: Run) -> None:
+    """More than 300 of them on 24 topics: refused and counted, and everybody drives on."""
+    launcher, peer = run
+    pids, sender, sent = dict(launcher.started), Sender(peer), 0
+    names = [list(peer.messages[topic][-1].joint_names) for topic in (
+        '/vehicles/state', '/traffic/objects', '/traffic/agents')]
+    for topic, vehicle, message in messages(peer.messages['/clock'][-1].clock, *names):
+        sender.send(topic, vehicle, message)
+        sent += 1
+        if sent % 10 == 0:
+            peer.listen_for(0.1)
+    assert sent > 300
+    peer.listen_for(2.0)
+    sender.close()
+    told = {status.name.split(':')[0] for message in peer.messages['/diagnostics']
+            for status in message.status if status.name.endswith(': messages refused')}
+    _whole(run, pids)
+    for node in ('sim_node', 'planner_node_av0', 'perception_node_av0', 'traffic_node',
+                 'drivability_node', 'timesync_node', 'recorder_node', 'cockpit_node'):
+        assert node in told, f'{node} told of no refusal'
+
+
+def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path) -> None:
+    """Documents that are none are told and dropped; code that they name is not imported."""
+    launcher, peer = run
+    pids, sender = dict(launcher.started), Sender(peer)
+    good = peer.messages['/scenario/game'][-1].data
+    proof = tmp_path / 'was_run'
+    (tmp_path / 'planner.py').write_text(PROOF.format(path=str(proof)))
+    # What the test before has sent of these is forgotten at the next reset; here at once.
+    for topic in ('/scenario/xml', '/scenario/objects'):
+        sender.send(topic, '', peer.messages[topic][0])
+    for text in games(good):
+        sender.send('/scenario/game', '', String(data=text))
+        peer.listen_for(0.05)
+    sender.send('/scenario/game', '', String(data=code(good, str(tmp_path / 'planner.py'))))
+    peer.wait_until(lambda: launcher.says('only a message names'), 'the refusal of the code')
+    assert not proof.exists()
+    sender.send('/scenario/game', '', String(data=good))
+    peer.listen_for(1.0)
+    sender.close()
+    # The test's own node has read all that, too.
+    peer.messages['/scenario/game'][:] = [String(data=good)]
+    _whole(run, pids)
+
+
+@pytest.mark.alone
+def test_a_flood_takes_nobodys_place(run: Run) -> None:
+    """
+    Hundreds of strangers' plans, agents and commands a second: everybody's own arrive.
+
+    Nine of ten: the machine has the flood to carry, too.
+    """
+    launcher, peer = run
+    pids = dict(launcher.started)
+
+    def report() -> tuple[dict[str, str], dict[str, str]]:
+        peer.forget()
+        peer.wait_until(lambda: peer.statuses('sim_node: av0 plans')
+                        and peer.statuses('sim_node: hv0 seat'), 'a report')
+        return run.counters(), peer.statuses('sim_node: hv0 seat')[-1][1]
+
+    before, _ = report()
+    flood = subprocess.Popen([sys.executable, Path(__file__).with_name('flood.py'), '6'],
+                             env=os.environ | {'ROS_DOMAIN_ID': str(launcher.domain)})
+    try:
+        while flood.poll() is None:
+            peer.listen()
+    finally:
+        flood.kill()
+    assert flood.wait() == 0
+    pedal = peer.cycles().commands('hv0')[:, 0]
+    assert np.mean(np.abs(pedal - THROTTLE) < 1e-6) > 0.9
+    after, seat = report()
+    asked, accepted, refused = (int(after[name]) - int(before[name])
+                                for name in ('requests', 'accepted', 'refused'))
+    assert accepted > 0.9 * asked > 10
+    assert after['steps_without_plan'] == before['steps_without_plan']
+    assert refused > 500 and int(seat['passed_over']) > 500
+    assert not any(status.message.startswith('agents are')
+                   for status, _ in peer.statuses('sim_node: traffic'))
+    _whole(run, pids)
+
+
+def test_the_run_has_its_files(run: Run) -> None:
+    """After all that: bag, scenario, timing and game."""
+    launcher, peer = run
+    assert peer.n > 500
+    time.sleep(1.0)
+    launcher.signal(signal.SIGINT)
+    assert launcher.wait() == 0
+    folder = launcher.out
+    assert json.loads((folder / 'timing.json').read_text())['cycles'] > 500
+    found = list(folder.glob('*.xml'))
+    assert len(found) == 1
+    scenario, _ = CommonRoadFileReader(found[0]).open()
+    assert scenario.obstacle_by_id(100) is not None or scenario.obstacles
+    assert (folder / 'game.yaml').is_file() and list((folder / 'bag').glob('*.mcap'))

@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Two graphs in one ROS domain: apart in namespaces, refused in the same one."""
+
+import json
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+from live_support import CUT_IN, Launcher
+from steady_game import write_steady_game
+
+SECONDS = 5
+
+
+def _finished(launcher: Launcher) -> None:
+    """Check that a run has all its cycles, and nobody else's."""
+    assert launcher.wait() == 0, launcher.text
+    timing = json.loads((launcher.out / 'timing.json').read_text())
+    assert timing['cycles'] == SECONDS * 100 and timing['gaps'] == 0
+    assert timing['notices'] == []
+    assert timing['planners']['av0']['accepted'] > 10
+    assert len(list(launcher.out.glob('*.xml'))) == 1
+
+
+def test_two_graphs_in_one_domain_do_not_touch_each_other(tmp_path: Path) -> None:
+    duration = ['--duration', str(SECONDS)]
+    with Launcher([CUT_IN, *duration, '--namespace', '/exp1'], tmp_path / 'one') as one, \
+            Launcher([CUT_IN, *duration, '--namespace', 'exp2/b'], tmp_path / 'two',
+                     domain=one.domain) as two:
+        _finished(one)
+        _finished(two)
+
+
+def test_a_second_simulation_in_a_namespace_is_refused(tmp_path: Path) -> None:
+    """By the launcher before it starts a node; by a sim_node that is started by hand."""
+    game = write_steady_game(tmp_path)
+    with Launcher([game, '--namespace', '/exp1'], tmp_path / 'one') as one:
+        one.wait_for('recording into')
+        one.wait_for('planner idm is ready')
+        with Launcher([game, '--namespace', '/exp1'], tmp_path / 'two',
+                      domain=one.domain) as two:
+            assert two.wait() == 2
+            refusal = ('error: another simulation runs in namespace /exp1 of ROS_DOMAIN_ID '
+                       f'{one.domain}; end it, or give this one a --namespace or another '
+                       'ROS_DOMAIN_ID')
+            assert [line for line in two.errors if line] == [refusal]
+            assert two.started == []
+            assert not (two.out / '.started').exists()
+        node = subprocess.run(
+            [sys.executable, '-m', 'crgame_ros.nodes.sim_node', '--ros-args', '-r',
+             '__ns:=/exp1'], env=os.environ | {'ROS_DOMAIN_ID': str(one.domain)},
+            capture_output=True, text=True, timeout=90.0, check=False)
+        assert node.returncode == 2
+        assert node.stderr.splitlines() == [refusal]
+        one.signal(signal.SIGINT)
+        assert one.wait() == 0
+
+
+def test_what_is_no_namespace_is_refused(tmp_path: Path) -> None:
+    with Launcher([CUT_IN, '--namespace', '/a b'], tmp_path / 'run') as launcher:
+        assert launcher.wait() == 2
+        assert any('is no namespace' in line for line in launcher.errors)

@@ -1,0 +1,214 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A recording that is played in a loop, first from its middle: every node begins anew."""
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import subprocess
+import sys
+from threading import Thread
+from typing import NamedTuple
+
+from bag_player import BagPlayer
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.ros.ros_messages import from_time
+from live_peer import Peer
+from live_support import Launcher, PATIENCE_S, SCENARIOS
+from page_client import PageClient
+import pytest
+from visualization_msgs.msg import Marker
+from worker_roles import own_domain_id
+
+DURATION_S = 4.0
+# Where the third round begins: without documents, which are known from the second.
+OFFSET_S = 0.5
+# Those who listen, with their parameters; what they publish is not played.
+NODES = {'marker_node': (), 'timesync_node': (), 'map_node': (), 'drivability_node': (),
+         'perception_node': ('vehicle:=av0',), 'planner_node': ('vehicle:=av0',),
+         'recorder_node': ('directory:={folder}/bag',),
+         'cockpit_node': ('port:=8650', 'directory:={folder}/cockpit')}
+THEIRS = ('/markers', '/timing/frame_skip', '/occupancy', '/hv0/drivability', '/av0/drivability',
+          '/av0/plan_request', '/av0/localization', '/av0/scan', '/av0/plan', '/av0/plan_path',
+          '/diagnostics')
+HEARD = ('/markers', ('/<v>/drivability', 'av0'), ('/<av>/plan_request', 'av0'),
+         ('/<av>/plan', 'av0'), '/diagnostics', '/timing/frame_skip')
+
+
+class Played(NamedTuple):
+    """
+    What came of a recording that was played from its middle, as a whole, and from `OFFSET_S` on.
+
+    :ivar peer: heard everything.
+    :ivar begun: how many messages of each topic had come when each round began.
+    :ivar pages: scenes that the page had got by then.
+    :ivar lines: what each node said.
+    :ivar codes: how each node ended.
+    """
+
+    folder: Path
+    peer: Peer
+    begun: list[dict[str, int]]
+    scenes: list[int]
+    lines: dict[str, list[str]]
+    codes: dict[str, int]
+
+    def stamps_s(self, topic: str, index: int) -> list[float]:
+        """Give the stamps of what came in one of the rounds [s]."""
+        ends = [*self.begun[1:], {name: len(found) for name, found in self.peer.messages.items()}]
+        heard = self.peer.messages[topic][self.begun[index].get(topic, 0):
+                                          ends[index].get(topic, 0)]
+        return [from_time(message.header.stamp) * 1e-9 for message in heard]
+
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.fixture(scope='module')
+def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
+    """Record 4 s of a game with perception, and play them for all nodes."""
+    folder = tmp_path_factory.mktemp('played')
+    with Launcher([SCENARIOS / 'fog.yaml', '--duration', str(DURATION_S)],
+                  folder / 'run') as launcher:
+        assert launcher.wait() == 0, launcher.text
+    domain = own_domain_id()
+    processes = {name: subprocess.Popen(
+        [sys.executable, '-m', f'crgame_ros.nodes.{name}', '--ros-args',
+         *(word for item in parameters for word in ('-p', item.format(folder=folder)))],
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain)}, text=True, stdin=subprocess.DEVNULL,
+        stdout=(folder / f'{name}.log').open('w'), stderr=subprocess.STDOUT)
+        for name, parameters in NODES.items()}
+    player = BagPlayer(folder / 'run' / 'bag', domain, THEIRS)
+    begun: list[dict[str, int]] = []
+    scenes: list[int] = []
+    with Peer(domain, *HEARD) as peer:
+        def counts() -> dict[str, int]:
+            return {topic: len(found) for topic, found in peer.messages.items()}
+
+        def play(start_offset_s: float) -> None:
+            begun.append(counts())
+            scenes.append(0 if page is None else sum(
+                item['type'] == 'scene' for item in list(page.events)))
+            thread = Thread(target=player.play, args=(start_offset_s,))
+            thread.start()
+            while thread.is_alive():
+                peer.listen()
+            peer.listen_for(0.3)
+
+        page = None
+        try:
+            peer.wait_until(lambda: all(
+                player.publishers[topic].get_subscription_count() >= count for topic, count in (
+                    ('/vehicles/state', 5), ('/timing/cycle', 3), ('/scenario/game', 8),
+                    ('/av0/true_request', 1))), 'all listeners')
+            play(player.start_s + OFFSET_S)
+            play(0.0)
+            page = PageClient('http://127.0.0.1:8650')
+            play(player.start_s + OFFSET_S)
+            scenes.append(sum(item['type'] == 'scene' for item in page.events))
+        finally:
+            if page is not None:
+                page.close()
+            player.close()
+            for process in processes.values():
+                process.terminate()
+            codes = {name: process.wait(PATIENCE_S) for name, process in processes.items()}
+        lines = {name: (folder / f'{name}.log').read_text().splitlines() for name in NODES}
+        print('\n'.join(line for found in lines.values() for line in found))
+        yield Played(folder, peer, begun, scenes, lines, codes)
+
+
+def test_nobody_dies_or_complains(played: Played) -> None:
+    """Each node is the process it was, and ended in good order; no error was said."""
+    assert played.codes == dict.fromkeys(NODES, 0)
+    wrong = [line for found in played.lines.values() for line in found
+             if 'ERROR' in line or 'Traceback' in line or 'error' in line.lower()]
+    assert wrong == []
+
+
+@pytest.mark.parametrize('node', ['marker_node', 'timesync_node', 'recorder_node'])
+def test_without_documents_it_is_told_once_why_nothing_happens(played: Played, node: str) -> None:
+    """From its middle on a recording has none; 2 s later that is said."""
+    told = [line for line in played.lines[node] if '/scenario/game' in line]
+    assert len(told) == 1 and '--start-offset' in told[0]
+
+
+def test_markers_are_deleted_and_drawn_anew(played: Played) -> None:
+    """Dark without documents, then the scene of each round, within a second."""
+    messages = played.peer.messages['/markers']
+    first, second, third = (count.get('/markers', 0) for count in played.begun)
+    assert first == second == 0
+    for begin, end in ((second, third), (third, len(messages))):
+        assert any(message.markers[0].action == Marker.DELETEALL
+                   for message in messages[begin:end])
+    offset_s = _offset_s(played)
+    for index in (1, 2):
+        boxes = [from_time(item.header.stamp) * 1e-9 - offset_s
+                 for message in messages[(second, third)[index - 1]:(third, None)[index - 1]]
+                 for item in message.markers if item.ns == 'vehicles']
+        assert min(boxes) < OFFSET_S + 1.0 and max(boxes) > DURATION_S - 0.5
+
+
+def _offset_s(played: Played) -> float:
+    return read_run_log(played.folder / 'run' / 'bag').game.scheduler.clock_offset_ns * 1e-9
+
+
+@pytest.mark.parametrize(('topic', 'within_s'), [
+    ('/<v>/drivability', 1.0), ('/<av>/plan_request', 1.0), ('/<av>/plan', 2.5)])
+def test_verdicts_perception_and_plans_begin_anew(played: Played, topic: str,
+                                                  within_s: float) -> None:
+    """
+    In the third round as in the second they begin within a second and go to the end.
+
+    A planner is loaded when a game names it for the first time, which takes it more than that.
+    """
+    offset_s = _offset_s(played)
+    assert played.stamps_s(topic, 0) == []
+    for index in (1, 2):
+        stamps = [stamp - offset_s for stamp in played.stamps_s(topic, index)]
+        assert min(stamps) < OFFSET_S + within_s and max(stamps) > DURATION_S - 1.2
+        assert stamps == sorted(stamps)
+
+
+def test_timing_is_measured_anew(played: Played) -> None:
+    """The counts of cycles grow within a round and never hold two of them."""
+    cycles = [int(values['cycles']) for status, values in
+              played.peer.statuses('timesync_node: table I')]
+    assert max(cycles) <= DURATION_S * 100
+    assert sum(later < earlier for earlier, later in zip(cycles, cycles[1:], strict=False)) == 1
+    refused = [values for status, values in played.peer.statuses('timesync_node: refused')]
+    assert refused == [] or all(values.get('/timing/cycle', '0') == '0' for values in refused)
+
+
+def test_each_round_is_a_recording_of_its_own(played: Played) -> None:
+    """Nothing is lost once the game is known: each bag holds what was played, and is a run."""
+    bags = sorted(path for path in played.folder.glob('bag*'))
+    assert [bag.name for bag in bags] == ['bag', 'bag_2']
+    original = read_run_log(played.folder / 'run' / 'bag')
+    for bag, offset_s in zip(bags, (0.0, OFFSET_S), strict=True):
+        with BagReader(bag) as reader:
+            counts = {name: topic.message_count for name, topic in reader.topics.items()}
+        log = read_run_log(bag)
+        assert log.ks[0] - original.ks[0] <= 10.0 * offset_s + 1.0
+        assert abs(int(log.ks[-1] - original.ks[-1])) <= 1
+        for topic in ('/vehicles/state', '/timing/cycle'):
+            # Of a busy machine some may be missing where publisher and reader had not met.
+            assert counts[topic] >= (DURATION_S - offset_s) * 100 * 0.95
+
+
+def test_the_page_gets_the_scene_again(played: Played) -> None:
+    """It forgets what it has shown, and goes on with the steps of the new round."""
+    assert played.scenes[-1] > played.scenes[-2] >= 0

@@ -1,0 +1,33 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Values of statuses: text that ROS's tools and the page read alike."""
+
+from crgame_ros.messages.status_values import status_text, status_truth
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize(('value', 'text'), [
+    (True, 'true'), (np.False_, 'false'), (0, '0'), (1.5, '1.5'), ('off', 'off'), (None, 'None')])
+def test_yes_and_no_are_words(value: object, text: str) -> None:
+    assert status_text(value) == text
+
+
+def test_a_yes_is_read_from_every_version() -> None:
+    """Earlier recordings say True; what is no yes is none, what is missing is as stated."""
+    values = {'now': 'true', 'before': 'True', 'no': 'False', 'off': 'off'}
+    assert [status_truth(values, key) for key in (*values, 'missing')] == [
+        True, True, False, False, False]
+    assert status_truth(values, 'missing', True) and not status_truth(values, 'no', True)

@@ -1,0 +1,48 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What eslint asks of the page and of its tests; types are checked by tsc (tsconfig.json). */
+
+import js from '@eslint/js';
+import globals from 'globals';
+
+export default [
+  js.configs.recommended,
+  {
+    linterOptions: { reportUnusedDisableDirectives: 'error' },
+    rules: {
+      'array-callback-return': 'error',
+      curly: 'error',
+      'default-case-last': 'error',
+      eqeqeq: 'error',
+      'max-lines': ['error', 400],
+      'no-constructor-return': 'error',
+      'no-eval': 'error',
+      'no-implied-eval': 'error',
+      'no-promise-executor-return': 'error',
+      'no-self-compare': 'error',
+      'no-shadow': 'error',
+      'no-unmodified-loop-condition': 'error',
+      'no-unused-expressions': 'error',
+      'no-unused-vars': ['error', { argsIgnorePattern: '^_' }],
+      'no-use-before-define': ['error', { functions: false, classes: false, variables: false }],
+      'no-useless-return': 'error',
+      'no-var': 'error',
+      'object-shorthand': 'error',
+      'prefer-const': 'error',
+      'prefer-object-has-own': 'error',
+      radix: 'error',
+      // What a person or a file says is only ever set as text.
+      'no-restricted-properties': ['error',
+        ...['innerHTML', 'outerHTML', 'insertAdjacentHTML', 'writeln'].map(
+          (property) => ({ property, message: 'Use the functions of dom.js.' }))],
+    },
+  },
+  {
+    files: ['crgame_ros/cockpit/page/js/**/*.js'],
+    languageOptions: { globals: globals.browser },
+  },
+  {
+    files: ['test/page/**/*.mjs'],
+    languageOptions: { globals: globals.nodeBuiltin },
+  },
+];

@@ -1,0 +1,34 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What scripts of the page share on `window`, and what TypeScript's library does not know yet. */
+
+import type { Connection } from '../../crgame_ros/cockpit/page/js/connection.js';
+import type { Driving } from '../../crgame_ros/cockpit/page/js/driving/driving.js';
+import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
+import type { createPerception } from
+  '../../crgame_ros/cockpit/page/js/perception/perception.js';
+import type { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import type { World } from '../../crgame_ros/cockpit/page/js/world/world.js';
+
+/** main.js fills it: every part may be missing, because each is loaded by itself. */
+interface Crgame {
+  store: Store;
+  connection: Connection;
+  world: World;
+  driving?: Driving;
+  perception?: ReturnType<typeof createPerception>;
+  ready?: boolean;
+  [part: string]: unknown;
+}
+
+declare global {
+  interface Window {
+    crgame: Crgame;
+    Plotly: Plotly;
+  }
+
+  interface Navigator {
+    /** Chromium's, https://wicg.github.io/keyboard-map/ */
+    keyboard?: { getLayoutMap?: () => Promise<ReadonlyMap<string, string>> };
+  }
+}

@@ -1,0 +1,193 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The page's own checks: types by tsc, rules by eslint, unit tests by Node's runner."""
+
+from collections.abc import Callable
+import fcntl
+import json
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+
+import pytest
+
+# In a worker with what else walks through this folder: npm writes into it.
+pytestmark = pytest.mark.xdist_group('test_lint')
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+PAGE = ROOT / 'crgame_ros' / 'cockpit' / 'page' / 'js'
+HEAD = ['// Copyright 2026 The crgame_ros authors', '// SPDX-License-Identifier: Apache-2.0']
+# What eslint itself needs.
+NODE = (20, 19)
+MAX_LINES = 400
+MAX_COLUMNS = 99
+# Seconds each, on a machine that has nothing else to do.
+INSTALL_S, CHECK_S = 600.0, 600.0
+
+
+def missing(path: str | None = None) -> str:
+    """
+    Say in a few words what these tests lack on this machine, empty if nothing.
+
+    :param path: where programs are looked for, by default as everywhere.
+    """
+    lacking = [name for name in ('node', 'npm') if shutil.which(name, path=path) is None]
+    if lacking:
+        return f'{" and ".join(lacking)} missing'
+    node = str(shutil.which('node', path=path))
+    said = subprocess.run([node, '--version'], capture_output=True, text=True).stdout.strip()
+    version = re.match(r'v(\d+)\.(\d+)', said)
+    if version is None or (int(version[1]), int(version[2])) < NODE:
+        return f'node is {said}, older than {NODE[0]}.{NODE[1]}'
+    return ''
+
+
+def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> None:
+    """Run a tool and fail with what it says."""
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=timeout_s)
+    if done.returncode != 0:
+        pytest.fail(f'{Path(command[0]).name} {command[1]}:\n{done.stdout}{done.stderr}',
+                    pytrace=False)
+
+
+def is_stale(folder: Path) -> bool:
+    """Tell whether node_modules is absent, incomplete or older than the lock file."""
+    # npm writes it when everything else is there.
+    installed = folder / 'node_modules' / '.package-lock.json'
+    lock = folder / 'package-lock.json'
+    return not installed.exists() or installed.stat().st_mtime < lock.stat().st_mtime
+
+
+@pytest.fixture(scope='module')
+def tools() -> Path:
+    """Give the folder of the tools that package-lock.json pins, installed if they are not."""
+    why = missing()
+    if why:
+        pytest.skip(f'the checks of the page are not run: {why}')
+    # Another call of pytest in this clone waits.
+    with (HERE / 'package-lock.json').open() as handle:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        if is_stale(HERE):
+            run('npm', 'ci', '--no-progress', cwd=HERE, timeout_s=INSTALL_S)
+    return HERE / 'node_modules'
+
+
+def check_types(root: Path) -> None:
+    """Let tsc check the page of a tree."""
+    here = root / HERE.relative_to(ROOT)
+    run('node', here / 'node_modules' / 'typescript' / 'bin' / 'tsc', '--project', here)
+
+
+def check_rules(root: Path) -> None:
+    """Let eslint check the page of a tree, and its tests."""
+    here = root / HERE.relative_to(ROOT)
+    run('node', here / 'node_modules' / 'eslint' / 'bin' / 'eslint.js', '--max-warnings', '0',
+        '--config', here / 'eslint.config.mjs', root / PAGE.relative_to(ROOT), here, cwd=root)
+
+
+@pytest.mark.usefixtures('tools')
+def test_types() -> None:
+    """Everything in the page has a type, and is used as that."""
+    check_types(ROOT)
+
+
+@pytest.mark.usefixtures('tools')
+def test_rules() -> None:
+    """The page and its tests keep the rules of eslint.config.mjs, without a warning."""
+    check_rules(ROOT)
+
+
+@pytest.mark.usefixtures('tools')
+def test_units() -> None:
+    """What needs no browser computes what it should, in Node's own runner."""
+    files = sorted(HERE.glob('*.test.mjs'))
+    assert len(files) > 10
+    run('node', '--test', *files)
+
+
+@pytest.mark.parametrize(('check', 'code', 'told'), [
+    (check_types, 'export const f = (/** @type {number} */ x, y) => x.length + y;\n',
+     ['TS2339', 'TS7006']),
+    (check_rules, 'export const f = (node, x) => { node.innerHTML = x == 1 ? y : x; };\n',
+     ['no-restricted-properties', 'eqeqeq', 'no-undef'])], ids=['types', 'rules'])
+def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], None], code: str,
+                        told: list[str]) -> None:
+    """Each of them fails on a page with such a file in it, and says why."""
+    shutil.copytree(PAGE, tmp_path / PAGE.relative_to(ROOT))
+    here = tmp_path / HERE.relative_to(ROOT)
+    here.mkdir(parents=True)
+    for name in ('tsconfig.json', 'globals.d.ts', 'eslint.config.mjs'):
+        shutil.copy2(HERE / name, here)
+    (here / 'node_modules').symlink_to(tools)
+    (tmp_path / PAGE.relative_to(ROOT) / 'wrong.js').write_text(code, encoding='utf-8')
+    with pytest.raises(pytest.fail.Exception) as failure:
+        check(tmp_path)
+    found = re.findall(r'error\b.*', str(failure.value))
+    assert len(found) == len(told), failure.value
+    assert all(any(name in line for line in found) for name in told), failure.value
+
+
+def test_a_machine_without_node_is_told(tmp_path: Path) -> None:
+    """Without both programs, or with a Node that eslint does not take."""
+    assert missing(str(tmp_path)) == 'node and npm missing'
+    for name, version in (('npm', '11.0.0'), ('node', 'v18.20.4')):
+        (tmp_path / name).write_text(f'#!/bin/sh\necho {version}\n')
+        (tmp_path / name).chmod(0o755)
+    assert missing(str(tmp_path)) == 'node is v18.20.4, older than 20.19'
+    (tmp_path / 'node').write_text('#!/bin/sh\necho v22.0.0\n')
+    assert missing(str(tmp_path)) == ''
+
+
+def test_tools_are_installed_anew_when_the_lock_changes(tmp_path: Path) -> None:
+    """Absent, half installed, complete, and older than the lock file."""
+    lock, installed = tmp_path / 'package-lock.json', tmp_path / 'node_modules'
+    lock.touch()
+    assert is_stale(tmp_path)
+    installed.mkdir()
+    assert is_stale(tmp_path)
+    (installed / '.package-lock.json').touch()
+    os.utime(lock, (1000, 1000))
+    assert not is_stale(tmp_path)
+    os.utime(installed / '.package-lock.json', (999, 999))
+    assert is_stale(tmp_path)
+
+
+def test_tools_are_pinned_and_come_from_whatever_registry_is_set() -> None:
+    """Exact versions, each package with its checksum, and none with the address of a server."""
+    wanted = json.loads((HERE / 'package.json').read_text(encoding='utf-8'))
+    lock = json.loads((HERE / 'package-lock.json').read_text(encoding='utf-8'))
+    assert 'dependencies' not in wanted
+    packages = {name: entry for name, entry in lock['packages'].items() if name}
+    for name, version in wanted['devDependencies'].items():
+        assert re.fullmatch(r'\d+\.\d+\.\d+', version), name
+        assert packages[f'node_modules/{name}']['version'] == version
+    assert all(entry['integrity'] and 'resolved' not in entry for entry in packages.values())
+
+
+def test_every_file_has_its_notice_and_fits_a_screen() -> None:
+    """Copyright and licence first, 400 lines of 99 columns at most."""
+    files = [*PAGE.rglob('*.js'), *HERE.glob('*.mjs'), *HERE.glob('*.ts')]
+    assert len(files) > 90
+    wrong = []
+    for file in sorted(files):
+        lines = file.read_text(encoding='utf-8').splitlines()
+        if lines[:2] != HEAD:
+            wrong.append(f'{file.name}: no notice')
+        if len(lines) > MAX_LINES or max(map(len, lines)) > MAX_COLUMNS:
+            wrong.append(f'{file.name}: {len(lines)} lines, up to {max(map(len, lines))} columns')
+    assert not wrong, '\n'.join(wrong)

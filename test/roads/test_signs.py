@@ -1,0 +1,94 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What signs and lights a lanelet has, of its own and of its stop line."""
+
+from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking, StopLine
+from commonroad.scenario.traffic_light import TrafficLight, TrafficLightDirection
+from commonroad.scenario.traffic_sign import (
+    TrafficSign,
+    TrafficSignElement,
+    TrafficSignIDGermany,
+)
+from crgame_ros.roads.signs import (
+    has_stop_sign,
+    lights_for,
+    lights_of,
+    sign_elements,
+    sign_names,
+    stop_line_ends,
+    stop_line_middle,
+)
+import numpy as np
+import pytest
+
+LEFT, CENTER, RIGHT = (np.array(((0.0, y), (20.0, y))) for y in (4.0, 2.0, 0.0))
+PLACED = (np.array((18.0, 4.0)), np.array((17.0, 0.0)))
+ARROWS = {1: TrafficLightDirection.ALL, 2: None, 3: TrafficLightDirection.LEFT_STRAIGHT,
+          4: TrafficLightDirection.RIGHT}
+
+
+def road(line: tuple[np.ndarray, np.ndarray] | tuple[None, None] | None,
+         ) -> tuple[Lanelet, LaneletNetwork]:
+    """Make a lanelet with a limit of its own, a stop sign at its line, and lights at both."""
+    network = LaneletNetwork.create_from_lanelet_list([Lanelet(LEFT, CENTER, RIGHT, 10)])
+    network.add_traffic_sign(TrafficSign(20, [TrafficSignElement(TrafficSignIDGermany.STOP)],
+                                         {10}, PLACED[0]), set())
+    network.add_traffic_sign(TrafficSign(21, [TrafficSignElement(
+        TrafficSignIDGermany.MAX_SPEED, ['10'])], {10}, PLACED[0]), set())
+    for number, direction in ARROWS.items():
+        network.add_traffic_light(TrafficLight(number, PLACED[0], direction=direction), set())
+    # Given last: the network would drop what leads nowhere.
+    lanelet = network.lanelets[0]
+    lanelet.traffic_signs, lanelet.traffic_lights = {21, 99}, {4, 2, 98}
+    if line is not None:
+        lanelet.stop_line = StopLine(*line, LineMarking.SOLID, {20}, {3, 1})
+    return lanelet, network
+
+
+def test_signs_and_lights_of_the_stop_line_count() -> None:
+    """In the order of their ids; ids that nothing has are left out."""
+    lanelet, network = road(PLACED)
+    assert sign_names(lanelet, network) == {'STOP', 'MAX_SPEED'}
+    own = list(sign_elements(lanelet, network, at_line=False))
+    assert [element.additional_values for element in own] == [['10']]
+    assert [light.traffic_light_id for light in lights_of(lanelet, network)] == [1, 2, 3, 4]
+    assert has_stop_sign(lanelet, network)
+
+
+def test_without_a_stop_line_nobody_halts_at_a_sign() -> None:
+    lanelet, network = road(None)
+    lanelet.traffic_signs = {20, 21}
+    assert sign_names(lanelet, network) == {'STOP', 'MAX_SPEED'}
+    assert not has_stop_sign(lanelet, network)
+    assert [light.traffic_light_id for light in lights_of(lanelet, network)] == [2, 4]
+
+
+@pytest.mark.parametrize(('arrow', 'kept'), [
+    ('straight', [1, 2, 3]), ('left', [1, 2, 3]), ('right', [1, 2, 4])])
+def test_arrows_are_for_who_goes_there(arrow: str, kept: list[int]) -> None:
+    lights = lights_of(*road(PLACED))
+    assert [light.traffic_light_id for light in lights_for(lights, arrow)] == kept
+    assert lights_for(lights[3:], 'left') == lights[3:], 'where none is for it, all are'
+
+
+def test_a_stop_line_without_a_place_is_at_the_end_of_the_lanelet() -> None:
+    lanelet, _ = road(PLACED)
+    assert stop_line_ends(lanelet).tolist() == [[18.0, 4.0], [17.0, 0.0]]
+    middle = stop_line_middle(lanelet)
+    assert middle is not None and middle.tolist() == [17.5, 2.0]
+    lanelet, _ = road((None, None))
+    assert stop_line_ends(lanelet).tolist() == [[20.0, 4.0], [20.0, 0.0]]
+    assert stop_line_middle(lanelet) is None
+    assert stop_line_middle(road(None)[0]) is None

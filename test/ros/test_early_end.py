@@ -1,0 +1,38 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Ctrl-C while a node still imports ends it like any other time: without a traceback."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from worker_roles import own_domain_id
+
+
+@pytest.mark.parametrize('after_s', [0.1, 0.2, 0.4, 0.8])
+def test_ctrl_c_during_imports_is_no_traceback(after_s: float) -> None:
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'crgame_ros.nodes.planner_node'], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True,
+        env=os.environ | {'ROS_DOMAIN_ID': str(own_domain_id())})
+    time.sleep(after_s)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60.0)
+    # Before Python itself is up, the system's own way of ending a process holds.
+    assert process.returncode in (0, 1, 130, -signal.SIGINT)
+    assert 'planner_node' not in errors and 'rclpy' not in errors

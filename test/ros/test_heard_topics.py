@@ -1,0 +1,45 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a run that waits for its start takes the recorder's word for."""
+
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.heard_topics import HeardTopics, OFFSET, RECORDED
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from live_peer import Peer
+from worker_roles import own_domain_id
+
+WANTED = {'/av0/plan', '/hv0/driver_command'}
+
+
+def test_only_this_runs_messages_count() -> None:
+    """Those of the run before, which the recorder may still speak of, do not."""
+    domain = own_domain_id()
+    with Peer(domain) as sim, Peer(domain) as recorder:
+        heard = HeardTopics(Endpoints(sim.node), 5)
+        publisher = recorder.publisher('/diagnostics')
+
+        def tell(offset_ns: int, *topics: str) -> None:
+            values = [KeyValue(key=OFFSET, value=str(offset_ns)),
+                      *(KeyValue(key=topic, value='1') for topic in topics)]
+            publisher.publish(DiagnosticArray(status=[DiagnosticStatus(
+                name=f'recorder_node: {RECORDED}', values=values)]))
+            publisher.wait_for_all_acked()
+
+        tell(3, *WANTED)
+        tell(5, '/av0/plan')
+        sim.wait_until(lambda: heard.missing(WANTED) == {'/hv0/driver_command'}, 'the plan')
+        tell(5, '/clock', '/hv0/driver_command')
+        sim.wait_until(lambda: not heard.missing(WANTED), 'the command')
+        heard.close()

@@ -1,0 +1,56 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A simulation of which no lock tells: it is noticed by what it says."""
+
+import threading
+import time
+
+from crgame_ros.errors import InputError
+from crgame_ros.ros import other_simulation
+from crgame_ros.ros.other_simulation import refuse_another
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from live_peer import Peer
+from live_support import PATIENCE_S
+import pytest
+from rosgraph_msgs.msg import Clock
+from worker_roles import own_domain_id
+
+
+def test_who_speaks_as_a_simulation_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock alone is that of somebody who was killed a moment ago, or of a bag."""
+    domain = own_domain_id()
+    with Peer(domain) as here, Peer(domain) as there:
+        refuse_another(here.node, time.monotonic())
+        there.node.create_publisher(Clock, 'clock', 1)
+        here.wait_until(lambda: here.node.count_publishers('clock'), 'the clock')
+        with monkeypatch.context() as patch:
+            patch.setattr(other_simulation, 'ALIVE_S', 1.0)
+            refuse_another(here.node, time.monotonic())
+        says = there.node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+        silent = threading.Event()
+
+        def say() -> None:
+            while not silent.wait(0.05):
+                says.publish(DiagnosticArray(status=[DiagnosticStatus(name='sim_node: run')]))
+
+        speaker = threading.Thread(target=say)
+        speaker.start()
+        try:
+            monkeypatch.setattr(other_simulation, 'ALIVE_S', PATIENCE_S)
+            with pytest.raises(InputError, match='another simulation runs in namespace / '):
+                refuse_another(here.node, time.monotonic())
+        finally:
+            silent.set()
+            speaker.join()

@@ -1,0 +1,175 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The JSON Schema says what the reader says: own files fit, and what one refuses both do."""
+
+from collections.abc import Iterator
+import copy
+import json
+from pathlib import Path
+import random
+from typing import Any
+
+from crgame_ros.cli import main
+from crgame_ros.errors import InputError
+from crgame_ros.game.game_file import dump_game, load_game, parse_game
+from crgame_ros.occupancy.occupancy_map_file import map_text
+from crgame_ros.paths import config_directory, scenarios_directory
+from crgame_ros.schema_command import KINDS, schema_of
+from jsonschema import Draft202012Validator
+import pytest
+import yaml
+
+GAMES = sorted(path for path in scenarios_directory().glob('*.yaml') if path.suffixes == ['.yaml'])
+FILES = {
+    'game': GAMES,
+    'vehicle': [config_directory() / 'vehicles' / 'bmw_320i.yaml'],
+    'steering': [config_directory() / 'vehicles' / 'steering_ratio.yaml'],
+    'device': sorted((config_directory() / 'devices').glob('*.yaml')),
+    'timeline': sorted(path for ending in ('keys', 'joy')
+                       for path in scenarios_directory().glob(f'*.{ending}.yaml')),
+    'control': [config_directory() / 'control.yaml']}
+WHOLE = """\
+scenario: a.xml
+rate: 200
+duration: 12.5
+humans:
+  - {id: hv0, driver: idle, spawn: {lanelet: 13, s: 40, d: -0.5, speed: 20}, dynamics: ks}
+  - {spawn: {x: 1.0, y: -2.0, yaw: 0.5}, dynamics: {name: dynamic-bicycle, slip: 0.9}}
+  - {spawn: auto}
+avs:
+  - {id: av7, planning_problem: 100, planner: idm, options: {v0: 20.0}, spawn: lanelet}
+  - tracker: {name: pure-pursuit, pose: true, look_ahead_time: 0.5}
+    perception:
+      localisation: {position_bias: [0.5, -1], rate: 20}
+      sensors: [{name: front, x: 4, rays: 181}, {}]
+      seed: 4
+prediction: {mode: plans, horizon: 4.0}
+drivability: {collision: false}
+timing: {pacing: false, clip: drop, dt_min: 0.001, warm_up_steps: 7}
+events:
+  - {name: a, release: {object: 42}, when: {time: 5}}
+  - {name: b, brake: {object: 43}, when: {between: [hv0, o42], distance: 20.0}}
+  - {name: c, obstacle: {x: 1, y: 2, width: 0.5, type: parkedVehicle}}
+  - {name: d, speed_limit: {speed: 8.3, lanelets: [3, 4]}, when: {step: 3}}
+  - {name: e, planner_run: {av: av0, run: false}, when: {vehicle: hv0, x: 1, y: 2, radius: 3}}
+  - {name: f, traffic: {agent: t3, speed_factor: 1.3, red_runner: true}}
+objects:
+  - {id: bin, kind: static, type: unknown, at: [12.0, 3.0], size: [0.6, 0.6]}
+  - {kind: particle, path: [[10, -4], [10, 6]], speed: 1.4, start: 2.0, headway: 4}
+  - {kind: bicycle, path: [[0, 0], [20, 0]], speeds: [3, 4.5], reactive: true, end: vanish}
+  - {kind: bicycle, type: truck, lanelet: 12, s: 5, radius: 1}
+  - {kind: particle, trajectory: [[0, 0, 0], [1, 1, 0]]}
+traffic: {recorded: reactive, agents: 3, options: {time_gap: 1.2}, capacity: 7, seed: null}
+occupancy: map.yaml
+"""
+# What compares values with each other, or looks beyond the file.
+NO_SCHEMA = ('is there already', 'is larger than "dt_max"', 'the same place', 'km long',
+             'size and', '"speed" and "speeds"', 'one for each way-point', 'the last may be 0',
+             'vanishes', 'changes nothing', 'has both', 'name two ids', 'the trajectory',
+             'comes after', 'it moves by', 'is no row', 'is no number that')
+# A whole number with a point is one to JSON Schema, and none to the reader: there is none here.
+VALUES: list[Any] = [None, True, 0, -1, 0.5, 7, 1e9 + 0.5, 'x', '', 'reactive', 'lanelet', [],
+                     [1], [0, 1], {}, {'x': 1}]
+
+
+def validator(kind: str) -> Draft202012Validator:
+    """Make one that checks by the schema alone."""
+    schema = schema_of(kind)
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
+
+
+@pytest.mark.parametrize('kind', FILES)
+def test_own_files_fit_their_schema(kind: str) -> None:
+    assert FILES[kind]
+    for path in FILES[kind]:
+        validator(kind).validate(yaml.safe_load(path.read_text(encoding='utf-8')))
+
+
+def test_written_files_fit_their_schema() -> None:
+    """What a run's folder holds, and a map that we have drawn, can be edited as well."""
+    validator('occupancy').validate(yaml.safe_load(map_text('map.pgm', 0.1, (0.0, 1.0))))
+    found = validator('game')
+    for path in GAMES:
+        found.validate(yaml.safe_load(dump_game(load_game(path))))
+
+
+def places(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Give every mapping and list inside of a value with each of its keys."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) \
+        if isinstance(value, list) else ()
+    for key, inner in list(items):
+        yield value, key
+        yield from places(inner)
+
+
+def mutated(values: Any, luck: random.Random) -> Any:
+    """Change one place: another value, no value, or a key that is no key."""
+    changed = copy.deepcopy(values)
+    holder, key = luck.choice(list(places(changed)))
+    way = luck.randrange(4)
+    if way == 0:
+        del holder[key]
+    elif way == 1 and isinstance(holder, dict):
+        holder[luck.choice(
+            ['speed', 'x', 'nonsense', 'kind', 'radius', 'at', 'lanelet'])] = luck.choice(VALUES)
+    else:
+        holder[key] = copy.deepcopy(luck.choice(VALUES))
+    return changed
+
+
+def test_reader_and_schema_refuse_the_same() -> None:
+    """Of hundreds of games with one mistake each; both outcomes are common."""
+    luck, found = random.Random(4), validator('game')
+    sound = yaml.safe_load(WHOLE)
+    found.validate(sound)
+    parse_game(sound, 'game.yaml', Path())
+    refused = 0
+    for _ in range(800):
+        values = mutated(sound, luck)
+        reason = None
+        try:
+            parse_game(values, 'game.yaml', Path())
+        except InputError as error:
+            reason = str(error)
+            assert len(reason) < 500
+            if any(words in reason for words in NO_SCHEMA):
+                continue
+        refused += reason is not None
+        assert found.is_valid(values) == (reason is None), (
+            reason, [error.message for error in found.iter_errors(values)], values)
+    assert 250 < refused < 700
+
+
+def test_every_key_is_described() -> None:
+    """By its sentence in the docstring, which the tables of the documentation have too."""
+    for kind in KINDS:
+        schema = schema_of(kind)
+        for name, part in {'': schema, **schema['$defs']}.items():
+            part = part['anyOf'][1] if 'anyOf' in part and 'type' not in part else part
+            for key, entry in part.get('properties', {}).items():
+                keyed = name in ('EventSpec', 'TimelineFile')
+                assert 'description' in entry or keyed, f'{name}.{key}'
+
+
+def test_the_command_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """To standard output or into a file; a folder that is none is told in one line."""
+    assert main(['schema']) == 0
+    assert json.loads(capsys.readouterr().out) == schema_of('game')
+    assert main(['schema', 'vehicle', '--out', str(tmp_path / 'v.json')]) == 0
+    assert json.loads((tmp_path / 'v.json').read_text(encoding='utf-8')) == schema_of('vehicle')
+    assert main(['schema', '--out', str(tmp_path / 'none' / 'v.json')]) == 2
+    assert 'cannot be written (No such file' in capsys.readouterr().err
+    assert main(['schema', 'cake']) == 2
