@@ -41,6 +41,17 @@ def steady_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
 def run(steady_graph: Run) -> Iterator[Run]:
     """Begin the game again, at the pace of the clock, and leave nobody frozen behind."""
     launcher, peer = steady_graph
+    try:
+        _begin_again(peer)
+    except AssertionError:
+        launcher.tell_where()
+        raise
+    yield steady_graph
+    for name in dict(launcher.started):
+        launcher.thaw(name)
+
+
+def _begin_again(peer: Peer) -> None:
     assert peer.set_parameter('real_time_factor', 1.0).successful
     epoch = peer.games[-1].epoch
     assert peer.call('/sim/reset').success
@@ -48,6 +59,3 @@ def run(steady_graph: Run) -> Iterator[Run]:
     peer.forget()
     for topic in ('/vehicles/state', '/<av>/plan', '/<v>/driver_command'):
         peer.wait_until(lambda topic=topic: peer.messages[topic], f'a message of {topic}')
-    yield steady_graph
-    for name in dict(launcher.started):
-        launcher.thaw(name)

@@ -27,6 +27,7 @@ import time
 from types import TracebackType
 from typing import IO, Self
 
+from crgame_ros.ros.node_main import TELL_WHERE
 from worker_roles import own_domain_id
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -153,6 +154,14 @@ class Launcher:
         """Let a frozen node go on."""
         os.kill(self.node(name), signal.SIGCONT)
 
+    def tell_where(self) -> None:
+        """Let every node say what its threads are at, for whoever reads why a test failed."""
+        for name, pid in dict(self.started).items():
+            if is_node(pid) and _state(pid) != 'T':
+                print(f'{name}: where it is:')
+                os.kill(pid, TELL_WHERE)
+        time.sleep(1.0)
+
     def wait_for_restart(self, name: str, times: int = 1) -> None:
         """Wait until a node has been started again so often."""
         wait_until(lambda: [item for item, _ in self.started].count(name) > times,
@@ -182,4 +191,6 @@ class Launcher:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
+        if error is not None and self._process.poll() is None:
+            self.tell_where()
         self.close()
