@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The `crgame` command: run, offline, convert, recover, info, rasterize, roads, schema, doctor."""
+"""The `crgame` command: run, offline, convert, measure, recover, info and tools for files."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -35,6 +35,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame run       run a game live, as ./run.sh does
   crgame offline   run a game as fast as it can, without ROS
   crgame convert   turn a recording into a CommonRoad scenario
+  crgame measure   how critical a recorded run was
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
   crgame rasterize draw curbs and obstacles of a scenario as an occupancy map
@@ -88,6 +89,7 @@ def _build_parser() -> argparse.ArgumentParser:
     convert.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
+    _add_measure(commands.add_parser('measure', help='how critical a recorded run was'))
     recover = commands.add_parser('recover', help='finish a killed recording')
     recover.add_argument('bag', type=Path, help='folder or .mcap file')
     recover.set_defaults(command=_recover)
@@ -102,6 +104,11 @@ def _build_parser() -> argparse.ArgumentParser:
                         help='remove the shared memory that killed ROS processes have left')
     doctor.set_defaults(command=_doctor)
     return parser
+
+
+def _add_measure(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.analysis.measure_command import add_arguments
+    add_arguments(parser)
 
 
 def _add_rasterize(parser: argparse.ArgumentParser) -> None:

@@ -40,8 +40,8 @@ AT_THE_TOP = {'cli', 'doctor', 'requirements', 'schema_command'}
 FOLDERS = (
     LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints', 'occupancy',
     'scripted', 'messages', 'driver', 'timing', 'drivability', 'control', 'planner', 'perception',
-    'traffic', 'simulation', 'recording', 'analysis', 'cockpit', 'ros', 'nodes/sim',
-    'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher', HIGHEST)
+    'traffic', 'simulation', 'recording', 'analysis/criticality', 'analysis', 'cockpit', 'ros',
+    'nodes/sim', 'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].
 CELL, NAMES, TOP = 22, 150, 120

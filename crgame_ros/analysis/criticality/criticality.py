@@ -1,0 +1,317 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The criticality of a run: what each driven vehicle has left to everybody near it, tick by tick.
+
+The same code runs live, offline and on recordings. All definitions are those of the literature
+that `docs/criticality.md` names; distances are bumper to bumper, along the subject's own path.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import NamedTuple
+
+from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.analysis.criticality.car_following_measures import (
+    deceleration_to_avoid_crash,
+    required_acceleration,
+    time_gap,
+    time_to_collision,
+    time_to_collision_accelerating,
+)
+from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
+from crgame_ros.analysis.criticality.footprint_approach import distance, time_to_contact
+from crgame_ros.analysis.criticality.leader import find_leader
+from crgame_ros.analysis.criticality.own_path import OwnPaths
+from crgame_ros.drivability.monitor import road_transforms
+from crgame_ros.game.objects import ObjectStates, Role
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.reference_point import shifted, shifted_velocities
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.route import goal_lanelets
+from crgame_ros.simulation.observer import ObservedRun
+from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+FloatArray = NDArray[np.float64]
+
+# Who is farther away is not near [m].
+NEAR = 100.0
+# A circle's footprint is a polygon around it of so many corners.
+CIRCLE_CORNERS = 32
+
+
+class Thresholds(NamedTuple):
+    """
+    What counts as critical, as in the SSM device of SUMO.
+
+    :param ttc_s: smaller times to collision are [s]
+    :param drac: greater decelerations are [m/s^2]
+    :param pet_s: smaller post-encroachment times are [s]
+    """
+
+    ttc_s: float = 3.0
+    drac: float = 3.0
+    pet_s: float = 2.0
+
+
+USUAL = Thresholds()
+
+
+class Measure(NamedTuple):
+    """
+    A measure of a pair.
+
+    :param unit: as tables write it.
+    :param worst: the smaller (-1) or the greater (1) values are the more critical.
+    :param undefined: the value where there is nothing to measure.
+    :param definition: in a sentence.
+    """
+
+    unit: str
+    worst: int
+    undefined: float
+    definition: str
+
+
+# In the order of the columns of `TickMeasures.values`.
+MEASURES = {
+    'gap': Measure('m', -1, math.nan,
+                   "from the subject's front to the leader's rear along its own path"),
+    'time_gap': Measure('s', -1, math.inf, "gap divided by the subject's speed"),
+    'thw': Measure('s', -1, math.inf,
+                   "time until the subject's front is where the leader's rear is now"),
+    'ttc': Measure('s', -1, math.inf, 'gap divided by the closing speed along the path'),
+    'ttc_a': Measure('s', -1, math.inf,
+                     'the same where each keeps its acceleration until it stands'),
+    'drac': Measure('m/s^2', 1, 0.0, 'half the squared closing speed divided by the gap'),
+    'a_req': Measure('m/s^2', -1, 0.0, 'constant acceleration that just avoids contact'),
+    'ttc_2d': Measure('s', -1, math.inf,
+                      'time until footprints touch that keep velocity and yaw'),
+    'min_distance': Measure('m', -1, math.nan, 'distance of the footprints'),
+}
+_OF_LEADER = 7
+
+
+class TickMeasures(NamedTuple):
+    """
+    What a subject has left at a tick.
+
+    :param subject: its number among the driven vehicles.
+    :param others: (P) who is near: driven vehicles, then objects, by number.
+    :param values: (P, measures) columns as in `MEASURES`; those of car following are of the
+        leader alone, as undefined for all others.
+    """
+
+    subject: int
+    others: NDArray[np.int64]
+    values: FloatArray
+
+
+@dataclass
+class Worst:
+    """The most critical value of a measure: of whom, and when [s]."""
+
+    value: float
+    other: str
+    time_s: float
+
+
+@dataclass
+class VehicleCriticality:
+    """
+    The criticality of a run for one vehicle.
+
+    :param worst: by measure; those that were never defined are missing.
+    :param tet_s: time with a ttc below its threshold (TET) [s]; each tick stands for its step
+    :param tit: integral of what the ttc is below it (TIT) [s^2]
+    :param crossings: with whom it crossed ways, and how much later (PET).
+    """
+
+    vehicle_id: str
+    worst: dict[str, Worst]
+    tet_s: float
+    tit: float
+    crossings: list[WayCrossed]
+
+
+class Criticality:
+    """
+    Measures every scenario tick of a run (`RunObserver`).
+
+    :param run: what is known of it beforehand.
+    :param problems: (V) planning problems whose goals the vehicles' routes lead to; whoever has
+        none follows its lane.
+    :param thresholds: what counts as critical.
+    """
+
+    def __init__(self, run: ObservedRun, problems: Sequence[PlanningProblem | None] = (),
+                 thresholds: Thresholds = USUAL) -> None:
+        self._vehicles = len(run.vehicles)
+        everybody = (*run.vehicles, *run.others)
+        self.ids = tuple(item.id for item in everybody)
+        self.thresholds = thresholds
+        self._scheduler = run.scheduler
+        humans = sum(item.role is Role.HUMAN for item in run.vehicles)
+        self._transforms = road_transforms(humans, run.av_transforms)
+        self._rear_to_center = np.array([item.rear_to_center for item in run.vehicles])
+        outlines = [_convex(outline(item.shape, CIRCLE_CORNERS)) for item in everybody]
+        self._radii = np.array([np.hypot(*corners.T).max() for corners in outlines])
+        # In one array, shorter ones filled up; and who has as many corners, to compute no more.
+        most = max(map(len, outlines), default=1)
+        self._outlines = np.array([
+            np.concatenate((corners, np.repeat(corners[-1:], most - len(corners), axis=0)))
+            for corners in outlines]).reshape(-1, most, 2)
+        self._corners = np.array([len(corners) for corners in outlines], dtype=np.int64)
+        roads = RoadNetwork(run.loaded.scenario.lanelet_network)
+        self._paths = OwnPaths(roads, [
+            frozenset() if problem is None else goal_lanelets(roads, problem)
+            for problem in problems or (None,) * self._vehicles])
+        self._crossings = CrossedWays(self._vehicles, self._radii)
+        self._before: tuple[float, FloatArray] | None = None
+        self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, []) for item in run.vehicles]
+        self.latest: tuple[TickMeasures, ...] = ()
+        self.new_crossings: tuple[WayCrossed, ...] = ()
+
+    def observe(self, n: int, since_tick_s: float, vehicle_states: FloatArray,
+                objects: ObjectStates | None) -> None:
+        """Measure a published state, if it is that of a tick (`RunObserver`)."""
+        if objects is None or since_tick_s != 0.0:
+            return
+        time_s = n * self._scheduler.dt_s
+        centers = shifted(vehicle_states[:, :3], self._rear_to_center)
+        velocities = _center_velocities(vehicle_states, self._rear_to_center)
+        poses = np.concatenate((centers, objects.poses))
+        moves = np.concatenate((velocities, objects.velocities[:, :2]))
+        accelerations = self._accelerations(time_s, vehicle_states, poses, moves)
+        placed_outlines = placed(self._outlines, poses)
+        self.latest = tuple(
+            self._measure(subject, poses, moves, accelerations, placed_outlines)
+            for subject in range(self._vehicles) if math.isfinite(poses[subject, 0]))
+        self.new_crossings = tuple(self._crossings.observe(
+            time_s, placed_outlines, poses[:, :2]))
+        self._sum_up(time_s)
+
+    def report(self) -> tuple[VehicleCriticality, ...]:
+        """Sum up what has been observed so far."""
+        return tuple(self._found)
+
+    def _accelerations(self, time_s: float, states: FloatArray, poses: FloatArray,
+                       moves: FloatArray) -> FloatArray:
+        """Give everybody's acceleration (N, 2): the vehicles' own, the others' by differences."""
+        result = np.zeros_like(moves)
+        if self._before is not None and time_s > self._before[0]:
+            lapse = time_s - self._before[0]
+            result = np.nan_to_num((moves - self._before[1]) / lapse)
+        own, yaw = states[:, StateColumn.ACCELERATION], poses[:self._vehicles, 2]
+        result[:self._vehicles] = own[:, None] * np.column_stack((np.cos(yaw), np.sin(yaw)))
+        self._before = (time_s, moves)
+        return result
+
+    def _measure(self, subject: int, poses: FloatArray, moves: FloatArray,
+                 accelerations: FloatArray, outlines: FloatArray) -> TickMeasures:
+        transform = self._transforms[subject]
+        if not transform.is_identity:
+            # Where the road is.
+            poses = transform.to_scenario(poses)
+            moves, accelerations = (transform.turn_to_scenario(vectors)
+                                    for vectors in (moves, accelerations))
+            outlines = placed(self._outlines, poses)
+        away = np.hypot(*(poses[:, :2] - poses[subject, :2]).T)
+        away[subject] = np.nan
+        others = np.flatnonzero(away - self._radii - self._radii[subject] < NEAR)
+        values = np.empty((len(others), len(MEASURES)))
+        values[:, :_OF_LEADER] = _UNDEFINED
+        self._approach(subject, others, moves, outlines, values)
+        path = self._paths.at(subject, *poses[subject].tolist())
+        leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
+                             poses[others, :2], self._radii[others])
+        if leader is not None:
+            other = int(others[leader.number])
+            here, there = (np.array((math.cos(yaw), math.sin(yaw)))
+                           for yaw in (leader.own_heading, leader.heading))
+            values[leader.number, :_OF_LEADER] = _of_leader(
+                leader.gap, moves[subject] @ here, moves[other] @ there,
+                accelerations[subject] @ here, accelerations[other] @ there)
+        return TickMeasures(subject, others, values)
+
+    def _approach(self, subject: int, others: NDArray[np.int64], moves: FloatArray,
+                  outlines: FloatArray, values: FloatArray) -> None:
+        own = outlines[subject, :self._corners[subject]]
+        corners = self._corners[others]
+        for count in np.unique(corners):
+            rows = np.flatnonzero(corners == count)
+            theirs = outlines[others[rows], :count]
+            values[rows, -2] = time_to_contact(own, theirs, moves[subject], moves[others[rows]])
+            values[rows, -1] = distance(own, theirs)
+
+    def _sum_up(self, time_s: float) -> None:
+        step_s = self._scheduler.time_step_s
+        for subject, others, values in self.latest:
+            found = self._found[subject]
+            for column, (name, measure) in enumerate(MEASURES.items()):
+                defined = np.flatnonzero(values[:, column] != measure.undefined)
+                ranks = measure.worst * values[defined, column]
+                defined, ranks = defined[~np.isnan(ranks)], ranks[~np.isnan(ranks)]
+                if not len(ranks):
+                    continue
+                row = defined[np.argmax(ranks)]
+                value, known = float(values[row, column]), found.worst.get(name)
+                if known is None or measure.worst * (value - known.value) > 0.0:
+                    found.worst[name] = Worst(value, self.ids[others[row]], time_s)
+            short = self.thresholds.ttc_s - values[:, list(MEASURES).index('ttc')].min(
+                initial=np.inf)
+            if short > 0.0:
+                found.tet_s += step_s
+                found.tit += step_s * float(short)
+        for crossing in self.new_crossings:
+            for number in (crossing.first, crossing.second):
+                if number < self._vehicles:
+                    self._found[number].crossings.append(crossing)
+
+
+def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: float,
+               leader_acceleration: float) -> FloatArray:
+    """Give the measures of car following, in the order of `MEASURES`."""
+    arrays = [np.array([value]) for value in (gap, speed, leader_speed, acceleration,
+                                              leader_acceleration)]
+    gaps, own, other, own_a, other_a = arrays
+    headway = time_gap(gaps, own)
+    return np.concatenate((
+        gaps, headway, headway, time_to_collision(gaps, own, other),
+        time_to_collision_accelerating(gaps, own, other, own_a, other_a),
+        deceleration_to_avoid_crash(gaps, own, other),
+        required_acceleration(gaps, own, other, other_a)))
+
+
+def _center_velocities(states: FloatArray, rear_to_center: FloatArray) -> FloatArray:
+    """Give the velocities (V, 2) of the vehicles' centres."""
+    yaw, speed = states[:, StateColumn.YAW], states[:, StateColumn.SPEED]
+    rear = np.column_stack((speed * np.cos(yaw), speed * np.sin(yaw),
+                            states[:, StateColumn.YAW_RATE]))
+    return shifted_velocities(yaw, rear, rear_to_center)[:, :2]
+
+
+def _convex(corners: FloatArray) -> FloatArray:
+    """Give the corners of the smallest convex footprint around one."""
+    hull = shapely.convex_hull(shapely.multipoints(corners))
+    return np.asarray(shapely.get_coordinates(hull)[:-1])
+
+
+# Of who leads nobody.
+_UNDEFINED = _of_leader(math.nan, 0.0, 0.0, 0.0, 0.0)

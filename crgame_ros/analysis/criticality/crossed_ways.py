@@ -1,0 +1,190 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Post-encroachment: how long after one has left a conflict area another enters it (PET)."""
+
+from collections import deque
+from itertools import pairwise
+import math
+from typing import NamedTuple
+
+from crgame_ros.analysis.criticality.footprint_approach import time_to_contact
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+FloatArray = NDArray[np.float64]
+
+# Nobody asks who was here longer ago [s].
+MEMORY_S = 10.0
+# Paths cross at an angle between this and half a turn less this; else one follows or meets [rad].
+LEAST_ANGLE = math.radians(20.0)
+# The second one's way through the conflict area is taken as straight on so far [m].
+AHEAD = 15.0
+# Who moves less in a step has no direction [m].
+STANDING = 1e-3
+ROUNDING_S = 1e-9
+
+
+class WayCrossed(NamedTuple):
+    """
+    Two have crossed each other's way.
+
+    :param first: number of the one that was in the conflict area first.
+    :param second: number of the other.
+    :param entered_s: when the second entered it [s]
+    :param pet_s: from when the first had left it [s]; 0 if it had not
+    """
+
+    first: int
+    second: int
+    entered_s: float
+    pet_s: float
+
+
+class _Moment(NamedTuple):
+    """Where everybody was at a time; NaN where absent."""
+
+    time_s: float
+    outlines: FloatArray
+    centers: FloatArray
+
+
+class CrossedWays:
+    """
+    Follows footprints from tick to tick and finds who crosses whose way.
+
+    The conflict area is the intersection of the areas that both footprints sweep. Between two
+    ticks they move evenly. Only crossing ways count, not those of who follows or comes towards:
+    the table of definitions leaves a measure without crossing undefined.
+
+    :param watched: how many, from the first on, are looked at with everybody; others among each
+        other are not.
+    :param radii: (N) of circles around the centres that hold the footprints [m]
+    """
+
+    def __init__(self, watched: int, radii: FloatArray) -> None:
+        self._watched = watched
+        self._radii = radii
+        self._past: deque[_Moment] = deque()
+        self._inside: set[tuple[int, int]] = set()
+
+    def observe(self, time_s: float, outlines: FloatArray,
+                centers: FloatArray) -> list[WayCrossed]:
+        """
+        Take where everybody is, and give the crossings that are known from now on.
+
+        :param time_s: of this tick, later than the one before [s]
+        :param outlines: (N, C, 2) corners of convex footprints [m]; NaN where absent
+        :param centers: (N, 2) [m]
+        """
+        now = _Moment(time_s, outlines, centers)
+        found = []
+        if len(self._past) > 1:
+            entering = self._candidates(now)
+            # Who has come out of an area may enter it anew.
+            self._inside &= entering.keys()
+            for pair, segments in entering.items():
+                crossing = self._enters(*pair, segments, now)
+                if crossing is not None:
+                    found.append(crossing)
+        self._past.append(now)
+        while self._past[0].time_s < time_s - MEMORY_S:
+            self._past.popleft()
+        return found
+
+    def _candidates(self, now: _Moment) -> dict[tuple[int, int], list[int]]:
+        """List by (first, second) the steps of the first that the second's way may cross now."""
+        been = np.stack([moment.centers for moment in self._past])
+        moves = np.diff(been, axis=0)
+        ways = now.centers - been[-1]
+        steps, lengths = np.hypot(moves[..., 0], moves[..., 1]), np.hypot(ways[:, 0], ways[:, 1])
+        pairs: dict[tuple[int, int], list[int]] = {}
+        everybody = np.arange(len(ways))
+        for i in range(self._watched):
+            others = np.delete(everybody, i)
+            reach = self._radii[i] + self._radii[others]
+            near = _within(been[-1, i] - been[:-1, others],
+                           reach + steps[:, others] + lengths[i])
+            rows, columns = np.nonzero(near)
+            seconds = np.full(len(rows), i)
+            self._add(pairs, rows, others[columns], seconds, moves, ways)
+            near = _within(been[-1, others] - been[:-1, None, i],
+                           reach + steps[:, i, None] + lengths[others])
+            rows, columns = np.nonzero(near)
+            self._add(pairs, rows, np.full(len(rows), i), others[columns], moves, ways)
+        return pairs
+
+    @staticmethod
+    def _add(pairs: dict[tuple[int, int], list[int]], steps: NDArray[np.int64],
+             firsts: NDArray[np.int64], seconds: NDArray[np.int64], moves: FloatArray,
+             ways: FloatArray) -> None:
+        """Note those whose ways cross, by their angle."""
+        (ax, ay), (bx, by) = moves[steps, firsts].T, ways[seconds].T
+        lengths, others = np.hypot(ax, ay), np.hypot(bx, by)
+        crosses = (lengths > STANDING) & (others > STANDING) & (
+            np.abs(ax * by - ay * bx) > math.sin(LEAST_ANGLE) * lengths * others)
+        for step, first, second in zip(steps[crosses].tolist(), firsts[crosses].tolist(),
+                                       seconds[crosses].tolist(), strict=True):
+            pairs.setdefault((first, second), []).append(step)
+
+    def _enters(self, first: int, second: int, segments: list[int],
+                now: _Moment) -> WayCrossed | None:
+        """Look whether a second one enters, in this step, what a first one has swept."""
+        before = self._past[-1]
+        way = now.centers[second] - before.centers[second]
+        lapse = now.time_s - before.time_s
+        contact = math.inf
+        for index in segments:
+            area = _hull(self._past[index].outlines[first], self._past[index + 1].outlines[first])
+            contact = min(contact, float(time_to_contact(
+                area, before.outlines[second], np.zeros(2), way / lapse)))
+        pair = (first, second)
+        # A touch at the very tick belongs to the step that ends there.
+        if contact > lapse + ROUNDING_S:
+            self._inside.discard(pair)
+            return None
+        known = pair in self._inside or (second, first) in self._inside
+        self._inside.add(pair)
+        if known or contact == 0.0:
+            return None
+        entered_s = before.time_s + contact
+        left_s = self._left(first, before.outlines[second] + way * contact / lapse, way, now)
+        return WayCrossed(first, second, entered_s, max(entered_s - left_s, 0.0))
+
+    def _left(self, first: int, outline: FloatArray, way: FloatArray, now: _Moment) -> float:
+        """Find when the first one left the area through which the second one is to go."""
+        through = _hull(outline, outline + AHEAD * way / np.hypot(*way))
+        latest = -math.inf
+        for begin, end in pairwise((*self._past, now)):
+            if not np.isfinite(begin.centers[first] + end.centers[first]).all():
+                continue
+            lapse = end.time_s - begin.time_s
+            back = (begin.centers[first] - end.centers[first]) / lapse
+            # Backwards in time it comes into the area when it leaves it forwards.
+            contact = float(time_to_contact(through, end.outlines[first], np.zeros(2), back))
+            if contact <= lapse + ROUNDING_S:
+                latest = max(latest, end.time_s - contact)
+        return latest
+
+
+def _within(offsets: FloatArray, reach: FloatArray) -> NDArray[np.bool_]:
+    x, y = offsets[..., 0], offsets[..., 1]
+    return np.asarray(x * x + y * y < reach * reach)
+
+
+def _hull(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Give the corners of the smallest convex area around two footprints."""
+    hull = shapely.convex_hull(shapely.multipoints(np.concatenate((first, second))))
+    return np.asarray(shapely.get_coordinates(hull)[:-1])

@@ -1,0 +1,81 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Who is ahead of a vehicle on its own path, and how far: bumper to bumper."""
+
+from typing import NamedTuple
+
+from crgame_ros.analysis.criticality.own_path import OwnPath
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# The corridor is as wide as the vehicle, and so much more on either side [m].
+MARGIN = 0.25
+# What the distance to the nearest sample may differ by from that to the path, and s too [m].
+SLACK = 2.0
+
+
+class Ahead(NamedTuple):
+    """
+    The nearest one ahead in the corridor.
+
+    :param number: its number among the others.
+    :param gap: from the subject's front to its rear, along the path [m]; negative where they
+        overlap along it
+    :param own_heading: of the path where the subject's centre is [rad]
+    :param heading: of the path where the leader's centre is [rad]
+    """
+
+    number: int
+    gap: float
+    own_heading: float
+    heading: float
+
+
+def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: FloatArray,
+                centers: FloatArray, radii: FloatArray) -> Ahead | None:
+    """
+    Find the nearest one ahead whose footprint overlaps the corridor of a vehicle.
+
+    :param path: of the vehicle; the corridor keeps the offset that the vehicle has now.
+    :param own: (C, 2) corners of its footprint [m]
+    :param own_center: (2) [m]
+    :param others: (N, D, 2) corners of the others [m]
+    :param centers: (N, 2) of the others; NaN where absent [m]
+    :param radii: (N) of circles around their centres that hold their footprints [m]
+    """
+    s, d = _project(path, np.concatenate((own_center[None], own)))
+    low, high, front = d[1:].min() - MARGIN, d[1:].max() + MARGIN, s[1:].max()
+    away, guess = path.near(np.nan_to_num(centers, nan=np.inf, posinf=1e9))
+    reach = max(abs(low), abs(high)) + radii + SLACK
+    candidates = np.flatnonzero((away < reach) & (guess > s[0] - radii - SLACK))
+    if not len(candidates):
+        return None
+    places = np.concatenate((centers[candidates, None], others[candidates]), axis=1)
+    along, aside = (each.reshape(places.shape[:2])
+                    for each in _project(path, places.reshape(-1, 2)))
+    ahead = (along[:, 0] > s[0]) & (aside[:, 1:].min(axis=1) <= high) \
+        & (aside[:, 1:].max(axis=1) >= low)
+    if not ahead.any():
+        return None
+    rear = np.where(ahead, along[:, 1:].min(axis=1), np.inf)
+    nearest = int(np.argmin(rear))
+    headings = np.interp([s[0], along[nearest, 0]], path.line.s, path.line.headings)
+    return Ahead(int(candidates[nearest]), float(rear[nearest] - front), *headings.tolist())
+
+
+def _project(path: OwnPath, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return path.line.refine(points, path.near(points)[1])

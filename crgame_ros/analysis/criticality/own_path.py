@@ -1,0 +1,101 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The path that a driven vehicle is on: its lane, and the lanes that follow on its route."""
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.polyline import resample
+from crgame_ros.roads.lane_line import LaneLine
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.route import find_route, in_lane
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# How far ahead somebody is looked for [m], and how far samples of the path are apart [m].
+REACH = 300.0
+SPACING = 1.0
+# Who drives at a greater angle to its lane is not on it [rad].
+MAX_ANGLE = math.radians(60.0)
+
+
+class OwnPath(NamedTuple):
+    """
+    A path, straight beyond both ends.
+
+    :param line: with arc length and offset.
+    :param samples: (S, 2) points of it, `SPACING` apart [m]
+    """
+
+    line: LaneLine
+    samples: FloatArray
+
+    @classmethod
+    def along(cls, points: FloatArray) -> 'OwnPath':
+        """Make it of a polyline (n, 2) [m]."""
+        return cls(LaneLine(points), resample(points, SPACING))
+
+    def near(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Give the distances (N) of positions (N, 2) to the nearest samples, and their s [m]."""
+        x, y = self.samples.T
+        square = (positions[:, :1] - x) ** 2 + (positions[:, 1:] - y) ** 2
+        nearest = np.argmin(square, axis=1)
+        scale = self.line.length / (len(self.samples) - 1)
+        return np.sqrt(square.min(axis=1)), nearest * scale
+
+
+class OwnPaths:
+    """
+    The paths of all driven vehicles, each made when its vehicle first comes to a lane.
+
+    Off the road, and at a great angle to the lane, a vehicle's path is straight on.
+
+    :param roads: the road network.
+    :param goals: (V) lanelets of each vehicle's goal; none: it follows its lane.
+    """
+
+    def __init__(self, roads: RoadNetwork, goals: Sequence[frozenset[int]]) -> None:
+        self._roads = roads
+        self._goals = goals
+        self._paths: dict[tuple[frozenset[int], int], OwnPath] = {}
+
+    def at(self, vehicle: int, x: float, y: float, yaw: float) -> OwnPath:
+        """
+        Give the path of a vehicle whose centre is at a pose.
+
+        :param vehicle: its number among the driven ones.
+        """
+        lanelet = self._roads.lanelet_at(x, y, yaw) if self._roads.lanelet_ids else None
+        if lanelet is not None:
+            path = self._on_lane(self._goals[vehicle], lanelet)
+            s = path.near(np.array([[x, y]]))[1]
+            heading = float(np.interp(s, path.line.s, path.line.headings)[0])
+            if abs(wrap_pi(yaw - heading)) <= MAX_ANGLE:
+                return path
+        ahead = (x + REACH * math.cos(yaw), y + REACH * math.sin(yaw))
+        return OwnPath.along(np.array([(x, y), ahead]))
+
+    def _on_lane(self, goals: frozenset[int], lanelet: int) -> OwnPath:
+        path = self._paths.get((goals, lanelet))
+        if path is None:
+            route = find_route(self._roads, lanelet, 0.0, goals, REACH)
+            leg = in_lane(self._roads, route, REACH).legs[0]
+            points = np.concatenate([self._roads.line(part).points for part in leg])
+            path = self._paths[goals, lanelet] = OwnPath.along(points)
+        return path

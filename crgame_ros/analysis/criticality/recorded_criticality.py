@@ -1,0 +1,43 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The criticality of a run that is over, from its log."""
+
+from crgame_ros.analysis.criticality.criticality import Criticality, Thresholds, USUAL
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.scenario.loading import parse_scenario
+from crgame_ros.simulation.observer import ObservedRun
+
+
+def measure_log(log: RunLog, thresholds: Thresholds = USUAL) -> Criticality:
+    """
+    Measure every scenario step of a run.
+
+    :param log: of a recording (`read_run_log`) or of an offline run (`run_log_of`).
+    :raises InputError: if the scenario in it cannot be used.
+    """
+    game = log.game
+    loaded = parse_scenario(log.xml_text, '/scenario/xml')
+    problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    run = ObservedRun(log.vehicles, log.objects, loaded, game.scheduler, game.drivability, None,
+                      tuple(av.transform for av in game.avs), log.vehicle_states[0])
+    criticality = Criticality(
+        run, [*[None] * len(game.humans),
+              *[problems.get(av.planning_problem) for av in game.avs]], thresholds)
+    for k, states, poses, velocities in zip(log.ks.tolist(), log.vehicle_states, log.object_poses,
+                                            log.object_velocities, strict=True):
+        n = (k - game.scheduler.k0) * game.scheduler.steps_per_tick
+        criticality.observe(n, 0.0, states, ObjectStates(poses, velocities))
+    return criticality

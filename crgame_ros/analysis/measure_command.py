@@ -1,0 +1,109 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""`crgame measure`: how critical a recorded run was, for people and as JSON."""
+
+import argparse
+from collections.abc import Iterator
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import InputError
+
+# Behind what is beyond its threshold.
+CRITICAL = '   <- critical'
+# Of longer times nothing is told: they come of speeds that are almost equal.
+TOLD_S = 100.0
+
+DESCRIPTION = """\
+Measure how critical a recorded run was: for each driven vehicle the worst moment of each measure,
+the time it spent below a threshold, and whose way it crossed.
+
+Distances are bumper to bumper along the vehicle's own lane. docs/criticality.md defines each."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument('run', type=Path, help='folder of a run, or its recording')
+    parser.add_argument('--epoch', type=int, help='which run of a recording that holds several '
+                        '(resets count them from 0; default: the last)')
+    for name, unit, value, which in (
+            ('ttc', 'S', 3.0, 'smaller'), ('drac', 'M/S2', 3.0, 'greater'),
+            ('pet', 'S', 2.0, 'smaller')):
+        parser.add_argument(f'--{name}', type=float, default=value, metavar=unit,
+                            help=f'{which} ones are critical (default: {value:g})')
+    parser.add_argument('--json', action='store_true', help='print it as JSON')
+    parser.set_defaults(command=measure)
+
+
+def measure(values: argparse.Namespace) -> int:
+    """Measure a run, and print what was found."""
+    from crgame_ros.analysis.criticality.criticality import Thresholds
+    from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+    from crgame_ros.recording.run_log import read_run_log
+    for name in ('ttc', 'drac', 'pet'):
+        if not 0.0 < getattr(values, name) < math.inf:
+            raise InputError(f'is {getattr(values, name)}', f'--{name}', 'give a positive number')
+    path = values.run
+    log = read_run_log(path / 'bag' if (path / 'bag').is_dir() else path, values.epoch)
+    found = summary(measure_log(log, Thresholds(values.ttc, values.drac, values.pet)))
+    if values.json:
+        print(json.dumps(found, indent=2))
+    else:
+        print('\n'.join(_lines(found)))
+    return 0
+
+
+def summary(criticality: Any) -> dict[str, Any]:
+    """Say what was found, as JSON has it: times in s since the start, SI units."""
+    from crgame_ros.analysis.criticality.criticality import MEASURES
+    thresholds, ids = criticality.thresholds, criticality.ids
+    return {
+        'thresholds': thresholds._asdict(),
+        'vehicles': {
+            vehicle.vehicle_id: {
+                'worst': {name: {'value': worst.value, 'unit': MEASURES[name].unit,
+                                 'of': worst.other, 'time_s': worst.time_s}
+                          for name in MEASURES if (worst := vehicle.worst.get(name))},
+                'tet_s': vehicle.tet_s, 'tit_s2': vehicle.tit,
+                'crossings': [{'first': ids[each.first], 'second': ids[each.second],
+                               'entered_s': each.entered_s, 'pet_s': each.pet_s}
+                              for each in vehicle.crossings]}
+            for vehicle in criticality.report()}}
+
+
+def _lines(found: dict[str, Any]) -> Iterator[str]:
+    limits = found['thresholds']
+    for vehicle_id, vehicle in found['vehicles'].items():
+        yield vehicle_id
+        near = {name: worst for name, worst in vehicle['worst'].items()
+                if worst['unit'] != 's' or worst['value'] < TOLD_S}
+        for name, worst in near.items():
+            critical = (name == 'ttc' and worst['value'] < limits['ttc_s']
+                        or name == 'drac' and worst['value'] > limits['drac'])
+            yield (f'  {name:<13}{worst["value"]:9.2f} {worst["unit"]:<6} {worst["of"]} at '
+                   f'{worst["time_s"]:.1f} s{CRITICAL if critical else ""}')
+        if not near:
+            yield '  nobody was near'
+        yield (f'  tet          {vehicle["tet_s"]:9.2f} s      with a ttc below '
+               f'{limits["ttc_s"]:g} s')
+        yield f'  tit          {vehicle["tit_s2"]:9.2f} s^2    what it was below that, over time'
+        for each in vehicle['crossings']:
+            yield (f'  pet          {each["pet_s"]:9.2f} s      {each["second"]} after '
+                   f'{each["first"]} at {each["entered_s"]:.1f} s'
+                   f'{CRITICAL if each["pet_s"] < limits["pet_s"] else ""}')

@@ -1,0 +1,95 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Measures of car following against closed forms and integration in small steps."""
+
+from crgame_ros.analysis.criticality.car_following_measures import (
+    deceleration_to_avoid_crash,
+    required_acceleration,
+    time_gap,
+    time_to_collision,
+    time_to_collision_accelerating,
+)
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+Array = NDArray[np.float64]
+
+
+def _row(*values: float) -> tuple[Array, ...]:
+    return tuple(np.array([value]) for value in values)
+
+
+def test_twenty_behind_ten() -> None:
+    """45.5 m of gap: 4.55 s, 2.275 s, DRAC 100 / 91 m/s^2; a leader braking with 3: 3.10 s."""
+    gap, speed, leader, still, brakes = _row(45.5, 20.0, 10.0, 0.0, -3.0)
+    assert time_to_collision(gap, speed, leader)[0] == pytest.approx(4.55, abs=1e-9)
+    assert time_gap(gap, speed)[0] == pytest.approx(2.275, abs=1e-9)
+    assert deceleration_to_avoid_crash(gap, speed, leader)[0] == pytest.approx(100 / 91, abs=1e-9)
+    assert required_acceleration(gap, speed, leader, brakes)[0] == pytest.approx(
+        -3.0 - 100 / 91, abs=1e-9)
+    assert time_to_collision_accelerating(gap, speed, leader, still, still)[0] == pytest.approx(
+        4.55, abs=1e-9)
+    assert time_to_collision_accelerating(gap, speed, leader, still, brakes)[0] == pytest.approx(
+        (np.sqrt(373.0) - 10.0) / 3.0, abs=1e-9)
+
+
+def test_what_is_undefined() -> None:
+    """NaN, inf and 0 as the table of definitions says."""
+    gap = np.array([np.nan, 10.0, 10.0, 0.0])
+    speed, leader = np.array([10.0, 0.0, 5.0, 10.0]), np.array([0.0, 0.0, 5.0, 5.0])
+    still = np.zeros(4)
+    np.testing.assert_array_equal(time_gap(gap, speed), [np.nan, np.inf, 2.0, 0.0])
+    np.testing.assert_array_equal(time_to_collision(gap, speed, leader),
+                                  [np.inf, np.inf, np.inf, 0.0])
+    np.testing.assert_array_equal(
+        time_to_collision_accelerating(gap, speed, leader, still, still),
+        [np.inf, np.inf, np.inf, 0.0])
+    np.testing.assert_array_equal(deceleration_to_avoid_crash(gap, speed, leader),
+                                  [0.0, 0.0, 0.0, np.inf])
+    np.testing.assert_array_equal(required_acceleration(gap, speed, leader, still),
+                                  [0.0, 0.0, 0.0, -np.inf])
+
+
+def test_accelerating_against_small_steps() -> None:
+    """2,000 pairs, standing, braking, reversing and accelerating ones, driven in steps of 1 ms."""
+    random = np.random.default_rng(7)
+    count, dt, end_s = 2000, 1e-3, 30.0
+    gap = random.uniform(0.5, 80.0, count)
+    speed = np.where(random.random(count) < 0.1, 0.0, random.uniform(-3.0, 30.0, count))
+    leader = np.where(random.random(count) < 0.2, 0.0, random.uniform(-10.0, 30.0, count))
+    a, b = random.uniform(-8.0, 4.0, (2, count)) * (random.random((2, count)) < 0.8)
+    found = time_to_collision_accelerating(gap, speed, leader, a, b)
+    expected = np.full(count, np.inf)
+    place, own, other = np.array(gap), np.array(speed), np.array(leader)
+    held = [np.zeros(count, dtype=bool) for _ in range(2)]
+    for step in range(round(end_s / dt)):
+        moves = []
+        for v, acceleration, stands in ((own, a, held[0]), (other, b, held[1])):
+            stands |= (v == 0.0) & (acceleration < 0.0)
+            after = v + acceleration * dt
+            stops = ~stands & (v * after <= 0.0) & (v != 0.0)
+            after = np.where(stops | stands, 0.0, after)
+            moves.append(np.where(stands, 0.0, 0.5 * (v + after) * dt))
+            stands |= stops
+            v[:] = after
+        place = place + moves[1] - moves[0]
+        expected = np.where(np.isinf(expected) & (place <= 0.0), (step + 1) * dt, expected)
+    within = np.minimum(found, end_s + 1.0) < end_s - 0.1
+    # Those that only just touch, or only just don't, differ by what the steps round.
+    agree = np.isclose(found, expected, rtol=0.0, atol=0.02)
+    both = np.isinf(expected) & (found > end_s - 0.1)
+    assert np.mean(agree | both) > 0.998
+    assert 600 < within.sum() < 1900

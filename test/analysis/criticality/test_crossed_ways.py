@@ -1,0 +1,98 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""WayCrossed ways: the time between one leaving and the other entering the conflict area."""
+
+from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
+from crgame_ros.geometry.outline import placed
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+Array = NDArray[np.float64]
+LENGTH, WIDTH = 4.0, 2.0
+BOX = 0.5 * np.array([(LENGTH, WIDTH), (-LENGTH, WIDTH), (-LENGTH, -WIDTH), (LENGTH, -WIDTH)])
+RADIUS = float(np.hypot(*BOX[0]))
+
+
+def _crossings(starts: Array, velocities: Array, seconds: float = 12.0, dt: float = 0.1,
+               watched: int = 1, turn: float = 0.0) -> list[WayCrossed]:
+    """Let boxes drive straight on, seen from a map that is turned."""
+    rotation = np.array(((np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))))
+    yaw = np.arctan2(velocities[:, 1], velocities[:, 0]) + turn
+    crossings = CrossedWays(watched, np.full(len(starts), RADIUS))
+    found = []
+    for k in range(round(seconds / dt)):
+        centers = (starts + k * dt * velocities) @ rotation + (500.0, -300.0)
+        poses = np.column_stack((centers, yaw))
+        found += crossings.observe(k * dt, placed(BOX, poses), centers)
+    return found
+
+
+@pytest.mark.parametrize('turn', np.linspace(0.0, 2.0 * np.pi, 9)[:-1])
+def test_two_cars_at_a_right_angle(turn: float) -> None:
+    """
+    By hand: the first leaves when its rear passes the other's left side, and so on.
+
+    10 m/s from x = -20: its rear is at x = 1 after (20 + 1 + 2) / 10 = 2.3 s. The second, 8 m/s
+    from y = -35, has its front at y = -1 after (35 - 1 - 2) / 8 = 4.0 s.
+    """
+    crossing, = _crossings(np.array([(-20.0, 0.0), (0.0, -35.0)]),
+                           np.array([(10.0, 0.0), (0.0, 8.0)]), turn=turn)
+    assert (crossing.first, crossing.second) == (0, 1)
+    assert crossing.entered_s == pytest.approx(4.0, abs=1e-6)
+    assert crossing.pet_s == pytest.approx(1.7, abs=1e-6)
+
+
+def test_the_watched_one_may_be_second() -> None:
+    """The same with their numbers exchanged."""
+    crossing, = _crossings(np.array([(0.0, -35.0), (-20.0, 0.0)]),
+                           np.array([(0.0, 8.0), (10.0, 0.0)]))
+    assert (crossing.first, crossing.second) == (1, 0)
+    assert crossing.pet_s == pytest.approx(1.7, abs=1e-6)
+
+
+@pytest.mark.parametrize('angle', [30.0, 60.0, 110.0, 150.0])
+def test_at_any_angle_it_is_the_conflict_areas(angle: float) -> None:
+    """The area is a parallelogram: entered and left at its corners, found by intersection."""
+    direction = np.array((np.cos(np.radians(angle)), np.sin(np.radians(angle))))
+    crossing, = _crossings(np.array([(-20.0, 0.0), -45.0 * direction]),
+                           np.array([(10.0, 0.0), 8.0 * direction]))
+    # Corners of the parallelogram |y| <= 1, |cross(direction, p)| <= 1.
+    corners = np.array([((y * direction[0] - side) / direction[1], y)
+                        for y in (-1.0, 1.0) for side in (-1.0, 1.0)])
+    left_s = (corners[:, 0].max() + 2.0 + 20.0) / 10.0
+    entered_s = ((corners @ direction).min() - 2.0 + 45.0) / 8.0
+    assert crossing.entered_s == pytest.approx(entered_s, abs=1e-6)
+    assert crossing.pet_s == pytest.approx(entered_s - left_s, abs=1e-6)
+
+
+def test_who_follows_meets_or_stands_crosses_nobody() -> None:
+    """One behind the other, towards each other in two lanes, beside a standing one: nothing."""
+    assert not _crossings(
+        np.array([(-20.0, 0.0), (-40.0, 0.5), (90.0, 3.0), (5.0, 3.0)]),
+        np.array([(10.0, 0.0), (9.0, 0.0), (-10.0, 0.0), (1e-9, 0.0)]), watched=2)
+
+
+def test_who_is_not_watched_counts_with_the_watched_alone() -> None:
+    """Of three crossing ways, those two with the watched one."""
+    found = _crossings(np.array([(-20.0, 0.0), (0.0, -35.0), (30.0, -60.0)]),
+                       np.array([(10.0, 0.0), (0.0, 8.0), (0.0, 8.0)]))
+    assert [(each.first, each.second) for each in found] == [(0, 1), (0, 2)]
+
+
+def test_who_comes_late_crosses_no_more() -> None:
+    """After ten seconds it is forgotten; a newcomer is nobody's earlier way."""
+    assert not _crossings(np.array([(-20.0, 0.0), (0.0, -110.0)]),
+                          np.array([(10.0, 0.0), (0.0, 8.0)]), seconds=20.0)
