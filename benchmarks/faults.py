@@ -43,8 +43,8 @@ ROOT = Path(__file__).resolve().parents[1]
 GAMES = ('occluded_pedestrian', 'dense_merge', 'two_avs')
 # Quiet before a fault, how long it is watched at most, and how long a frozen node stands [s].
 QUIET_S, WATCHED_S, FROZEN_S = 3.0, 10.0, 3.0
-# Until there is another spare process after a kill, on two cores.
-SPARE_S = 10.0
+# Until what a kill has stirred up is quiet again.
+REST_S = 4.0
 NS = 1e-9
 
 
@@ -139,11 +139,13 @@ def try_game(game: Path, faults: list[str], wanted: list[str]) -> Iterator[tuple
             avs = [i for i, node in zip(ids, nodes, strict=True) if node.startswith('planner')]
             humans = [i for i, node in zip(ids, nodes, strict=True) if node.startswith('driver')]
             ear = Ear(avs, humans, page)
+            # A run that ends before its first scenario step leaves no files.
+            ear.listen(QUIET_S)
             for node in nodes:
                 for fault in faults if not wanted or node in wanted else ():
                     # Everybody where the game begins: at the end of a road there is nothing to do.
                     control.call('reset')
-                    ear.listen(SPARE_S if fault == 'kill' else QUIET_S)
+                    ear.listen(REST_S if fault == 'kill' else QUIET_S)
                     yield game.stem, node, *_strike(graph, ear, node, fault, avs)
             graph.stop()
             yield game.stem, 'all', 'end', *_lost(Path(name) / 'run')
