@@ -63,6 +63,8 @@ from scenario_traffic import BLOCK, LANE_WIDTH, loaded, motorway, town  # noqa: 
 from traffic_others import timed  # noqa: E402
 
 COUNTS = (10, 100, 1000, 10000)
+# The map of a larger one has more points than a scenario file may have.
+LARGEST_TOWN = 3000
 # Wanted at most, by agents [ms].
 WANTED = {10: 0.4, 1000: 4.0, 10000: 40.0}
 STEP_S, SUBSTEPS, LANES, LIMIT = 0.1, 10, 3, 120.0 / 3.6
@@ -249,7 +251,8 @@ def main() -> None:
     if values.only != 'town':
         motorway_table(counts, values.steps, values.others, values.highway_env_up_to)
     if values.only != 'motorway':
-        town_table(counts, values.steps, values.others)
+        town_table(tuple(count for count in counts if count <= LARGEST_TOWN), values.steps,
+                   values.others)
 
 
 if __name__ == '__main__':

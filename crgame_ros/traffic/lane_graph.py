@@ -28,7 +28,7 @@ IntArray = NDArray[np.int64]
 
 STEP = 0.5
 # Tables and conflicts of so many lanes are made in 10 s, in half a gigabyte [m].
-MAX_LENGTH = 4e5
+MAX_LENGTH = 6e5
 # Published maps hold successors that begin elsewhere: such a link is no way to drive on [m].
 MAX_GAP = 1.0
 # Headings of published centre lines jump from vertex to vertex; smoothed over this length [m].

@@ -122,7 +122,7 @@ def test_thousands_of_kilometres_of_lanes_have_no_traffic(tmp_path: Path) -> Non
     """Tables of lanes grow with their length; without traffic there are none."""
     scenario = edited(tmp_path, 'ZAM_TJunction-1_1_T-1.xml', 300.0, np.zeros(2))
     start_s = time.process_time()
-    with pytest.raises(InputError, match='km of lanes are more than 400 km; use a part of'):
+    with pytest.raises(InputError, match='km of lanes are more than 600 km; use a part of'):
         setup_of(scenario)
     assert time.process_time() - start_s < 10.0
 
