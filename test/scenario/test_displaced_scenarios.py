@@ -120,7 +120,7 @@ def test_a_lanelet_far_away_is_no_way_to_drive_on(
 
 def test_thousands_of_kilometres_of_lanes_have_no_traffic(tmp_path: Path) -> None:
     """Tables of lanes grow with their length; without traffic there are none."""
-    scenario = edited(tmp_path, 'ZAM_TJunction-1_1_T-1.xml', 300.0, np.zeros(2))
+    scenario = edited(tmp_path, 'ZAM_Intersection-1_1_T-1.xml', 300.0, np.zeros(2))
     start_s = time.process_time()
     with pytest.raises(InputError, match='km of lanes are more than 600 km; use a part of'):
         setup_of(scenario)
