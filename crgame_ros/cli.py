@@ -257,7 +257,7 @@ def _info(values: argparse.Namespace) -> int:
 def _doctor(values: argparse.Namespace) -> int:
     if values.clean:
         from crgame_ros.ros.shared_memory import remove_stale
-        count, size = remove_stale()
+        count, size = remove_stale(ports=True)
         print(f'removed {count} files of processes that are gone from /dev/shm '
               f'({size / 1e6:.0f} MB)')
         return 0

@@ -61,22 +61,24 @@ def remove_half_made_ports(folder: Path = SHARED_MEMORY) -> list[str]:
     return removed
 
 
-def remove_stale(folder: Path = SHARED_MEMORY) -> tuple[int, int]:
+def remove_stale(folder: Path = SHARED_MEMORY, *, ports: bool = False) -> tuple[int, int]:
     """
-    Remove the segments of Fast DDS whose processes are gone.
+    Remove what Fast DDS left there whose processes are gone.
 
     Files of this user alone, which no process that can be seen has mapped and whose lock nobody
-    holds: the kernel lets go of both with the process, however that ended. Ports stay: they are
-    few, their names are used again, and one that somebody is just opening would be lost to the
-    others.
+    holds: the kernel lets go of both with the process, however that ended.
 
     :param folder: where Fast DDS keeps them.
+    :param ports: remove ports, too, 50 kB each. Their names are used again: one that somebody is
+        opening at this very moment would be lost to the others, so it is for people to choose
+        that moment.
     :return: how many were removed, and their size on the disk of memory [bytes]
     """
     if not folder.is_dir():
         return 0, 0
     left = [path for path in sorted(folder.iterdir())
-            if SEGMENT.fullmatch(path.name) and _is_left(path)]
+            if (SEGMENT.fullmatch(path.name) or ports and PORT.fullmatch(path.name))
+            and _is_left(path)]
     # Every process is asked only where something may be left.
     mapped = _mapped(folder) if left else set()
     count = size = 0
@@ -88,20 +90,23 @@ def remove_stale(folder: Path = SHARED_MEMORY) -> tuple[int, int]:
             blocks = path.stat().st_blocks
             path.unlink()
             count, size = count + 1, size + 512 * blocks
-            _lock_of(path).unlink()
+        for belonging in (*_locks_of(path), path.with_name(f'sem.{path.name}_mutex')):
+            with suppress(OSError):
+                belonging.unlink()
     return count, size
 
 
-def _lock_of(segment: Path) -> Path:
-    return segment.with_name(f'{segment.name}_el')
+def _locks_of(path: Path) -> tuple[Path, Path]:
+    """Give the files by which readers hold a segment or port, alone or together."""
+    return path.with_name(f'{path.name}_el'), path.with_name(f'{path.name}_sl')
 
 
-def _is_left(segment: Path) -> bool:
-    """Tell whether a segment is this user's, not young, and nobody holds its lock."""
+def _is_left(path: Path) -> bool:
+    """Tell whether a file is this user's, not young, and nobody holds its locks."""
     try:
-        found = segment.stat()
+        found = path.stat()
         return found.st_uid == os.getuid() and time.time() - found.st_mtime >= YOUNG_S \
-            and _is_free(_lock_of(segment))
+            and all(_is_free(lock) for lock in _locks_of(path))
     except OSError:
         return False
 

@@ -94,6 +94,22 @@ def test_what_dead_processes_left_goes_and_what_is_used_stays(tmp_path: Path) ->
                     'fastrtps_port7002', 'somebody_elses', 'fastrtps_xyz'}
 
 
+def test_ports_of_the_dead_go_when_asked_for(tmp_path: Path) -> None:
+    """With their locks and mutexes; one that is mapped stays, and so does one that is held."""
+    gone, locked, mapped = (f'fastrtps_port{number}' for number in (7410, 7411, 7412))
+    _left(tmp_path, gone, f'{gone}_el', f'sem.{gone}_mutex', locked, f'{locked}_sl',
+          f'sem.{locked}_mutex', mapped, f'sem.{mapped}_mutex', 'sem.strange')
+    with (tmp_path / f'{locked}_sl').open() as holder, (tmp_path / mapped).open('rb') as file, \
+            mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ):
+        fcntl.flock(holder, fcntl.LOCK_SH)
+        assert remove_stale(tmp_path) == (0, 0)
+        count, size = remove_stale(tmp_path, ports=True)
+    assert count == 1 and size > 0
+    assert {path.name for path in tmp_path.iterdir()} == {
+        locked, f'{locked}_sl', f'sem.{locked}_mutex', mapped, f'sem.{mapped}_mutex',
+        'sem.strange'}
+
+
 def test_a_living_participant_keeps_its_memory_and_a_killed_one_does_not() -> None:
     """Real Fast DDS: its own files are there while it lives, whoever cleans, and go after it."""
     code = ('import rclpy, time; rclpy.init(); node = rclpy.create_node("held"); '
