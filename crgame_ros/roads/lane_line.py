@@ -71,18 +71,10 @@ class LaneLine:
         row = np.arange(len(positions))
         inside[:, 0] = np.minimum(along[:, 0], self._step[0])
         inside[:, -1] = np.where(along[:, -1] > 0.0, along[:, -1], inside[:, -1])
-        return self.refine(positions, self.s[best] + inside[row, best])
+        return self._refine(positions, self.s[best] + inside[row, best])
 
-    def refine(self, positions: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """
-        Project positions whose arc length is nearly known.
-
-        It is moved until the position lies on the normal of the interpolated heading.
-
-        :param positions: (N, 2) [m]
-        :param s: (N) arc lengths to begin with [m]
-        :return: arc lengths and offsets (N), (N) [m]
-        """
+    def _refine(self, positions: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Move s until the position lies on the normal of the interpolated heading."""
         zero = np.zeros_like(s)
         error = np.full_like(s, np.inf)
         trial = s

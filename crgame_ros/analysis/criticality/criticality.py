@@ -257,8 +257,9 @@ class Criticality:
         for count in np.unique(corners):
             rows = np.flatnonzero(corners == count)
             theirs = outlines[others[rows], :count]
-            values[rows, -2] = time_to_contact(own, theirs, moves[subject], moves[others[rows]])
-            values[rows, -1] = distance(own, theirs)
+            contact = time_to_contact(own, theirs, moves[subject], moves[others[rows]])
+            values[rows, -2] = contact
+            values[rows, -1] = distance(own, theirs, contact == 0.0)
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s

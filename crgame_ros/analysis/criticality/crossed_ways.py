@@ -145,11 +145,10 @@ class CrossedWays:
         before = self._past[-1]
         way = now.centers[second] - before.centers[second]
         lapse = now.time_s - before.time_s
-        contact = math.inf
-        for index in segments:
-            area = _hull(self._past[index].outlines[first], self._past[index + 1].outlines[first])
-            contact = min(contact, float(time_to_contact(
-                area, before.outlines[second], np.zeros(2), way / lapse)))
+        begins, ends = (np.stack([self._past[step + late].outlines[first] for step in segments])
+                        for late in (0, 1))
+        contact = float(time_to_contact(_hulls(begins, ends), before.outlines[second],
+                                        np.zeros(2), way / lapse).min())
         pair = (first, second)
         # A touch at the very tick belongs to the step that ends there.
         if contact > lapse + ROUNDING_S:
@@ -165,7 +164,7 @@ class CrossedWays:
 
     def _left(self, first: int, outline: FloatArray, way: FloatArray, now: _Moment) -> float:
         """Find when the first one left the area through which the second one is to go."""
-        through = _hull(outline, outline + AHEAD * way / np.hypot(*way))
+        through = _hulls(outline[None], outline[None] + AHEAD * way / np.hypot(*way))[0]
         latest = -math.inf
         for begin, end in pairwise((*self._past, now)):
             if not np.isfinite(begin.centers[first] + end.centers[first]).all():
@@ -184,7 +183,15 @@ def _within(offsets: FloatArray, reach: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(x * x + y * y < reach * reach)
 
 
-def _hull(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Give the corners of the smallest convex area around two footprints."""
-    hull = shapely.convex_hull(shapely.multipoints(np.concatenate((first, second))))
-    return np.asarray(shapely.get_coordinates(hull)[:-1])
+def _hulls(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Give the corners (S, K, 2) of the smallest convex areas around pairs of footprints."""
+    points = np.concatenate((first, second), axis=1)
+    count, each = points.shape[:2]
+    hulls = shapely.convex_hull(shapely.multipoints(
+        points.reshape(-1, 2), indices=np.repeat(np.arange(count), each)))
+    corners, owner = shapely.get_coordinates(hulls, return_index=True)
+    lengths = np.bincount(owner, minlength=count)
+    starts = np.cumsum(lengths) - lengths
+    # Those of fewer corners repeat their last one, which is the first again.
+    rows = np.minimum(np.arange(lengths.max()), lengths[:, None] - 1)
+    return np.asarray(corners[starts[:, None] + rows])

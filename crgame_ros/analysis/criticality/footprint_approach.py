@@ -38,10 +38,11 @@ def time_to_contact(first: FloatArray, second: FloatArray, velocity: FloatArray,
     relative = second_velocity - velocity
     shape = np.broadcast_shapes(first.shape[:-2], second.shape[:-2], relative.shape[:-1])
     entered, left = np.full(shape, -np.inf), np.full(shape, np.inf)
-    for edges in (_edges(first), _edges(second)):
-        normals = np.stack((-edges[..., 1], edges[..., 0]), axis=-1)
-        own, other = _extent(first, normals), _extent(second, normals)
-        speed = np.einsum('...ki,...i->...k', normals, relative)
+    for polygon in (first, second):
+        edges = _edges(polygon)
+        # Turned by a right angle: the direction of the edge's normal, of any length.
+        own, other = _extent(first, edges), _extent(second, edges)
+        speed = edges[..., 0] * relative[..., 1, None] - edges[..., 1] * relative[..., 0, None]
         with np.errstate(divide='ignore', invalid='ignore'):
             begin, end = (own[0] - other[1]) / speed, (own[1] - other[0]) / speed
         resting = speed == 0.0
@@ -54,26 +55,34 @@ def time_to_contact(first: FloatArray, second: FloatArray, velocity: FloatArray,
     return np.where(touching, np.maximum(entered, 0.0), np.inf)
 
 
-def distance(first: FloatArray, second: FloatArray) -> FloatArray:
+def distance(first: FloatArray, second: FloatArray,
+             touching: NDArray[np.bool_] | None = None) -> FloatArray:
     """
     Give the smallest distance of convex footprints (min_distance) [m].
 
     :param first: (..., C, 2) corners in turn [m]; shorter ones repeat a corner
     :param second: (..., D, 2) corners of the others.
+    :param touching: (...) whether they touch now, where that is known.
     :return: (...) 0 where they overlap.
     """
     square = np.minimum(_corners_to_edges(first, second), _corners_to_edges(second, first))
-    still = np.zeros(2)
-    return np.where(time_to_contact(first, second, still, still) == 0.0, 0.0, np.sqrt(square))
+    if touching is None:
+        still = np.zeros(2)
+        touching = time_to_contact(first, second, still, still) == 0.0
+    return np.where(touching, 0.0, np.sqrt(square))
 
 
 def _edges(corners: FloatArray) -> FloatArray:
-    return np.roll(corners, -1, axis=-2) - corners
+    edges = np.empty_like(corners)
+    np.subtract(corners[..., 1:, :], corners[..., :-1, :], out=edges[..., :-1, :])
+    np.subtract(corners[..., 0, :], corners[..., -1, :], out=edges[..., -1, :])
+    return edges
 
 
-def _extent(corners: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give the least and the greatest projection (..., K) onto each normal (..., K, 2)."""
-    along = np.einsum('...ki,...ci->...kc', normals, corners)
+def _extent(corners: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give the least and the greatest projection (..., K) onto the normals of edges."""
+    along = edges[..., :, 0, None] * corners[..., None, :, 1] \
+        - edges[..., :, 1, None] * corners[..., None, :, 0]
     return along.min(axis=-1), along.max(axis=-1)
 
 

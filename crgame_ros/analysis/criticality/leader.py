@@ -57,7 +57,7 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
     :param centers: (N, 2) of the others; NaN where absent [m]
     :param radii: (N) of circles around their centres that hold their footprints [m]
     """
-    s, d = _project(path, np.concatenate((own_center[None], own)))
+    s, d = path.project(np.concatenate((own_center[None], own)))
     low, high, front = d[1:].min() - MARGIN, d[1:].max() + MARGIN, s[1:].max()
     away, guess = path.near(np.nan_to_num(centers, nan=np.inf, posinf=1e9))
     reach = max(abs(low), abs(high)) + radii + SLACK
@@ -66,7 +66,7 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
         return None
     places = np.concatenate((centers[candidates, None], others[candidates]), axis=1)
     along, aside = (each.reshape(places.shape[:2])
-                    for each in _project(path, places.reshape(-1, 2)))
+                    for each in path.project(places.reshape(-1, 2)))
     ahead = (along[:, 0] > s[0]) & (aside[:, 1:].min(axis=1) <= high) \
         & (aside[:, 1:].max(axis=1) >= low)
     if not ahead.any():
@@ -75,7 +75,3 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
     nearest = int(np.argmin(rear))
     headings = np.interp([s[0], along[nearest, 0]], path.line.s, path.line.headings)
     return Ahead(int(candidates[nearest]), float(rear[nearest] - front), *headings.tolist())
-
-
-def _project(path: OwnPath, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return path.line.refine(points, path.near(points)[1])
