@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The `crgame` command: run, offline, convert, measure, recover, info and tools for files."""
+"""The `crgame` command: runs, their recordings, what came of them, and tools for files."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -36,6 +36,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame offline   run a game as fast as it can, without ROS
   crgame convert   turn a recording into a CommonRoad scenario
   crgame measure   how critical a recorded run was
+  crgame replay    the recorded human against other planners
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
   crgame rasterize draw curbs and obstacles of a scenario as an occupancy map
@@ -90,6 +91,8 @@ def _build_parser() -> argparse.ArgumentParser:
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
     _add_measure(commands.add_parser('measure', help='how critical a recorded run was'))
+    _add_replay(commands.add_parser('replay',
+                                    help='the recorded human against other planners'))
     recover = commands.add_parser('recover', help='finish a killed recording')
     recover.add_argument('bag', type=Path, help='folder or .mcap file')
     recover.set_defaults(command=_recover)
@@ -108,6 +111,11 @@ def _build_parser() -> argparse.ArgumentParser:
 
 def _add_measure(parser: argparse.ArgumentParser) -> None:
     from crgame_ros.analysis.measure_command import add_arguments
+    add_arguments(parser)
+
+
+def _add_replay(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.replay_command import add_arguments
     add_arguments(parser)
 
 

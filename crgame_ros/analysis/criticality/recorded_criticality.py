@@ -14,6 +14,8 @@
 # limitations under the License.
 """The criticality of a run that is over, from its log."""
 
+from collections.abc import Callable
+
 from crgame_ros.analysis.criticality.criticality import Criticality, Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.recording.run_log import RunLog
@@ -21,11 +23,13 @@ from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.simulation.observer import ObservedRun
 
 
-def measure_log(log: RunLog, thresholds: Thresholds = USUAL) -> Criticality:
+def measure_log(log: RunLog, thresholds: Thresholds = USUAL,
+                progress: Callable[[float], object] = lambda _: None) -> Criticality:
     """
     Measure every scenario step of a run.
 
     :param log: of a recording (`read_run_log`) or of an offline run (`run_log_of`).
+    :param progress: is told how much has been measured, from 0 to 1.
     :raises InputError: if the scenario in it cannot be used.
     """
     game = log.game
@@ -36,8 +40,9 @@ def measure_log(log: RunLog, thresholds: Thresholds = USUAL) -> Criticality:
     criticality = Criticality(
         run, [*[None] * len(game.humans),
               *[problems.get(av.planning_problem) for av in game.avs]], thresholds)
-    for k, states, poses, velocities in zip(log.ks.tolist(), log.vehicle_states, log.object_poses,
-                                            log.object_velocities, strict=True):
+    for row, k in enumerate(log.ks.tolist()):
         n = (k - game.scheduler.k0) * game.scheduler.steps_per_tick
-        criticality.observe(n, 0.0, states, ObjectStates(poses, velocities))
+        criticality.observe(n, 0.0, log.vehicle_states[row],
+                            ObjectStates(log.object_poses[row], log.object_velocities[row]))
+        progress((row + 1) / len(log.ks))
     return criticality

@@ -1,0 +1,146 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The command `crgame replay`: the recorded human against other planners."""
+
+import argparse
+from collections.abc import Iterator, Mapping, Sequence
+import gc
+import json
+from pathlib import Path
+import re
+import sys
+from typing import Any, TYPE_CHECKING
+
+from crgame_ros.analysis.measure_command import summary, TOLD_S
+from crgame_ros.errors import InputError
+
+if TYPE_CHECKING:  # A command that needs no engine starts without it.
+    from crgame_ros.recording.run_log import RunLog
+    from crgame_ros.simulation.setup import Setup
+
+DESCRIPTION = """\
+Drive the human of a recording again, against one planner after the other, and compare.
+
+  crgame replay runs/NAME --planner idm --planner reactive --planner my.py:Mine
+
+The human does what was recorded, to the last bit; the seeds of perception and traffic are the
+same. Each run becomes a CommonRoad scenario; comparison.json has all numbers. Where traffic
+reacts, the table says from when on the world around the human is another than it was."""
+FOLDER = 'replays'
+NEVER = '-'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument('run', type=Path, help='folder of a run, or its recording')
+    parser.add_argument('--planner', action='append', required=True, metavar='NAME',
+                        help='planner of all AVs, or FILE.py:Class; may be repeated')
+    parser.add_argument('--latency', type=int, default=0, metavar='L',
+                        help='simulation steps between a request and its plan (default: 0)')
+    parser.add_argument('--out', type=Path, metavar='DIR',
+                        help='new folder to write (default: "replays" in the folder of the run)')
+    parser.set_defaults(command=replay)
+
+
+def replay(values: argparse.Namespace) -> int:
+    """Drive against every planner, write the runs and print the comparison."""
+    from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+    from crgame_ros.launcher.arguments import RunRequest
+    from crgame_ros.launcher.run_plan import effective_setup
+    from crgame_ros.planner.planner_registry import planner_class
+    from crgame_ros.recording.run_log import read_run_log
+    if values.latency < 0:
+        raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
+    bag = values.run / 'bag' if (values.run / 'bag').is_dir() else values.run
+    recorded = read_run_log(bag)
+    if not recorded.game.humans or not recorded.game.avs:
+        raise InputError('has no human and an AV', str(bag), 'give a run in which both drive')
+    # Every planner is known before the first of them drives.
+    for name in values.planner:
+        planner_class(name)
+    setups = {name: effective_setup(RunRequest(driver=f'replay:{bag}', planners=(name,)))
+              for name in values.planner}
+    folder = _make_folder(values.out, values.run)
+    found: list[dict[str, Any]] = [
+        {'planner': 'recorded', 'criticality': summary(measure_log(recorded))}]
+    for name, setup in setups.items():
+        print(f'driving against {name} …', file=sys.stderr, flush=True)
+        found.append(_drive(name, setup, recorded, values.latency,
+                            folder / f'{_file_name(name, setups)}.xml'))
+    # What planners hold in circles compiled packages would complain of at the end.
+    gc.collect()
+    (folder / 'comparison.json').write_text(json.dumps(found, indent=2) + '\n', encoding='utf-8')
+    print('\n'.join(_table(found)))
+    print(f'files are in {folder}')
+    return 0
+
+
+def _drive(planner: str, setup: 'Setup', recorded: 'RunLog', latency_steps: int,
+           file: Path) -> dict[str, Any]:
+    """Drive against one planner, write the run, and say what came of it."""
+    from crgame_ros.analysis.counterfactual import drive_against
+    from crgame_ros.recording.export import write_scenario
+    alternative = drive_against(planner, setup, recorded, latency_steps)
+    write_scenario(alternative.log, file)
+    return alternative.as_dict()
+
+
+def _make_folder(out: Path | None, run: Path) -> Path:
+    """Make a new folder: what is there already stays as it is."""
+    wanted = out or (run if run.is_dir() else run.parent) / FOLDER
+    folder, number = wanted, 1
+    try:
+        wanted.parent.mkdir(parents=True, exist_ok=True)
+        while folder.exists():
+            number += 1
+            folder = wanted.with_name(f'{wanted.name}_{number}')
+        folder.mkdir()
+    except OSError as error:
+        raise InputError(f'cannot be made ({error.strerror})', str(folder),
+                         'give another --out') from error
+    return folder
+
+
+def _file_name(planner: str, among: Sequence[str] | Mapping[str, Any]) -> str:
+    """Name a planner's file, apart from those of planners in other folders."""
+    name = re.sub(r'\W+', '_', Path(planner).name)
+    same = [each for each in among if re.sub(r'\W+', '_', Path(each).name) == name]
+    return name if len(same) == 1 else f'{name}_{same.index(planner) + 1}'
+
+
+def _table(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Lay the comparison out: a row for each planner and vehicle."""
+    head = ('planner', 'vehicle', 'gap [m]', 'ttc [s]', 'a_req [m/s^2]', 'distance [m]', 'tet [s]',
+            'contacts', 'human differs', 'others differ')
+    rows = [head]
+    for each in found:
+        for vehicle_id, vehicle in each['criticality']['vehicles'].items():
+            worst = {name: f'{entry["value"]:.2f}' for name, entry in vehicle['worst'].items()
+                     if entry['unit'] != 's' or entry['value'] < TOLD_S}
+            touched = [item for item in each.get('contacts', ())
+                       if vehicle_id in (item['vehicle'], item['with'])]
+            rows.append((
+                each['planner'], vehicle_id,
+                *(worst.get(name, NEVER) for name in ('gap', 'ttc', 'a_req', 'min_distance')),
+                f'{vehicle["tet_s"]:.1f}',
+                str(len(touched)) if 'contacts' in each else NEVER,
+                *(NEVER if each.get(name) is None else f'from {each[name]:.1f} s'
+                  for name in ('human_differs_s', 'others_differ_s'))))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
+    for row in rows:
+        yield '  '.join(f'{text:<{width}}' for text, width in zip(row, widths, strict=True)
+                        ).rstrip()

@@ -1,0 +1,150 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The recorded human against the same planner, and against others."""
+
+from collections.abc import Callable
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.cli import main
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
+import numpy as np
+import pytest
+
+OWN_PLANNER = '''
+from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
+
+
+class Mine(ConstantVelocityPlanner):
+    """Somebody's own."""
+'''
+STANDING_PLANNER = '''
+from dataclasses import replace
+
+from crgame_ros.planner.braking import braking_plan
+from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
+
+
+class Standing(ConstantVelocityPlanner):
+    """Stops where it is."""
+
+    def setup(self, context):
+        super().setup(context)
+        self.vehicle = context.vehicle
+
+    def plan(self, request):
+        return replace(braking_plan(request, None, self.vehicle), fallback=False)
+'''
+PLANNERS = {'cut_in': 'idm', 'occluded_pedestrian': 'idm', 'dense_merge': 'idm'}
+
+
+@pytest.fixture(scope='module')
+def record(recorder: Any, tmp_path_factory: pytest.TempPathFactory,
+           ) -> Callable[[str], tuple[Path, OfflineResult]]:
+    """Return a function that runs a game with uneven steps, and records it, once."""
+    known: dict[str, tuple[Path, OfflineResult]] = {}
+
+    def run(name: str) -> tuple[Path, OfflineResult]:
+        if name not in known:
+            setup = build_setup(load_game(scenarios_directory() / f'{name}.yaml'))
+            intervals_s = np.random.default_rng(3).uniform(0.006, 0.014, 800)
+            drivers, _ = recorded_inputs(setup)
+            result = run_offline(setup, duration_s=8.0, drivers=drivers, intervals_s=intervals_s)
+            folder = tmp_path_factory.mktemp(name) / 'run'
+            recorder.ours(folder / 'bag', recorder.messages(result, intervals_s=intervals_s))
+            known[name] = folder, result
+        return known[name]
+    return run
+
+
+@pytest.mark.parametrize('name', PLANNERS)
+def test_the_same_human_against_the_same_planner_and_another(
+        name: str, record: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    """
+    The same planner gives the recorded run again, to the last bit; another one another AV.
+
+    With traffic and with perception, too; the human does what it did in each.
+    """
+    folder, result = record(name)
+    (tmp_path / 'own.py').write_text(OWN_PLANNER)
+    monkeypatch.chdir(tmp_path)
+    own = PLANNERS[name]
+    assert main(['replay', str(folder), '--planner', own, '--planner', 'own.py:Mine',
+                 '--out', 'out']) == 0
+    text = capsys.readouterr().out
+    recorded, same, other = json.loads(Path('out/comparison.json').read_text())
+    assert same['state_hash'] == result.state_hash != other['state_hash']
+    assert same['human_differs_s'] is same['others_differ_s'] is other['human_differs_s'] is None
+    expected = recorded['criticality']['vehicles']
+    for vehicle, found in same['criticality']['vehicles'].items():
+        assert found['tet_s'] == pytest.approx(expected[vehicle]['tet_s'])
+        assert found['worst']['min_distance']['value'] == pytest.approx(
+            expected[vehicle]['worst']['min_distance']['value'], abs=1e-6)
+    human = recorded['criticality']['vehicles']['hv0']
+    assert human['worst'] and 'own.py:Mine' in text and 'others differ' in text
+    for file in ('idm.xml', 'own_py_Mine.xml'):
+        written = load_scenario(Path('out') / file).scenario
+        assert len(written.dynamic_obstacles) >= 2
+
+
+def test_traffic_that_reacts_makes_another_world(
+        record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An AV that stops in the merge: agents behind it brake, and the table says from when on."""
+    folder, _ = record('dense_merge')
+    (tmp_path / 'standing.py').write_text(STANDING_PLANNER)
+    assert main(['replay', str(folder), '--planner', f'{tmp_path / "standing.py"}:Standing',
+                 '--out', str(tmp_path / 'out')]) == 0
+    _, other = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    assert 0.0 < other['others_differ_s'] < 8.0
+    assert f'from {other["others_differ_s"]:.1f} s' in capsys.readouterr().out
+
+
+def test_folders_are_new_and_files_have_names_of_their_own(
+        record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Beside the run, numbered; two planners of one name in two folders."""
+    folder, _ = record('cut_in')
+    words = []
+    for part in ('a', 'b'):
+        (tmp_path / part).mkdir()
+        (tmp_path / part / 'own.py').write_text(OWN_PLANNER)
+        words += ['--planner', f'{tmp_path / part / "own.py"}:Mine']
+    for number in ('', '_2'):
+        assert main(['replay', str(folder), *words]) == 0
+        made = folder / f'replays{number}'
+        assert {path.name for path in made.iterdir()} == {
+            'comparison.json', 'own_py_Mine_1.xml', 'own_py_Mine_2.xml'}
+    assert str(folder / 'replays_2') in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('words', [
+    ('missing', '--planner', 'idm'), ('{run}', '--planner', 'nobody'), ('{run}',),
+    ('{run}', '--planner', 'idm', '--latency', '-1'),
+    ('{run}', '--planner', 'idm', '--out', '/proc/none')])
+def test_what_cannot_be_replayed_is_told_in_a_line(
+        words: tuple[str, ...], record: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is driven, nothing written."""
+    folder, _ = record('cut_in')
+    before = sorted(folder.rglob('*'))
+    assert main(['replay', *(word.format(run=folder) for word in words)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith('error: ') and error.count('\n') == 1
+    assert sorted(folder.rglob('*')) == before
