@@ -240,7 +240,7 @@ class Criticality:
         self._approach(subject, others, moves, outlines, values)
         path = self._paths.at(subject, *poses[subject].tolist())
         leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
-                             poses[others, :2], self._radii[others])
+                             poses[others, :2], self._radii[others], values[:, -1] == 0.0)
         if leader is not None:
             other = int(others[leader.number])
             here, there = (np.array((math.cos(yaw), math.sin(yaw)))

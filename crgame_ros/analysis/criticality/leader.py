@@ -46,7 +46,8 @@ class Ahead(NamedTuple):
 
 
 def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: FloatArray,
-                centers: FloatArray, radii: FloatArray) -> Ahead | None:
+                centers: FloatArray, radii: FloatArray,
+                touching: NDArray[np.bool_]) -> Ahead | None:
     """
     Find the nearest one ahead whose footprint overlaps the corridor of a vehicle.
 
@@ -56,6 +57,7 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
     :param others: (N, D, 2) corners of the others [m]
     :param centers: (N, 2) of the others; NaN where absent [m]
     :param radii: (N) of circles around their centres that hold their footprints [m]
+    :param touching: (N) whether they touch it; of those beside it these alone lead
     """
     s, d = path.project(np.concatenate((own_center[None], own)))
     low, high, front = d[1:].min() - MARGIN, d[1:].max() + MARGIN, s[1:].max()
@@ -67,11 +69,14 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
     places = np.concatenate((centers[candidates, None], others[candidates]), axis=1)
     along, aside = (each.reshape(places.shape[:2])
                     for each in path.project(places.reshape(-1, 2)))
-    ahead = (along[:, 0] > s[0]) & (aside[:, 1:].min(axis=1) <= high) \
-        & (aside[:, 1:].max(axis=1) >= low)
+    rears, right, left = (along[:, 1:].min(axis=1), aside[:, 1:].min(axis=1),
+                          aside[:, 1:].max(axis=1))
+    # Who is passed closely is not in the way.
+    ahead = (along[:, 0] > s[0]) & (right <= high) & (left >= low) & (
+        (rears >= front) | touching[candidates])
     if not ahead.any():
         return None
-    rear = np.where(ahead, along[:, 1:].min(axis=1), np.inf)
+    rear = np.where(ahead, rears, np.inf)
     nearest = int(np.argmin(rear))
     headings = np.interp([s[0], along[nearest, 0]], path.line.s, path.line.headings)
     return Ahead(int(candidates[nearest]), float(rear[nearest] - front), *headings.tolist())

@@ -169,6 +169,19 @@ def test_the_nearest_in_the_corridor_leads(cut_in: LoadedScenario) -> None:
     assert gaps[1] == pytest.approx(80.0 - 0.2 - 52.25, abs=0.01)
 
 
+def test_who_is_passed_closely_does_not_lead(cut_in: LoadedScenario) -> None:
+    """0.1 m beside: no gap; but one that is touched there has one below 0, and no time left."""
+    for offset, gap in ((1.9, math.nan), (1.7, -3.5)):
+        criticality = Criticality(_run(_lane(cut_in, Placement()),
+                                       [_car('av0', Role.AUTONOMOUS)], [_car('o1', Role.STATIC)]))
+        criticality.observe(0, 0.0, _state(np.array([50.0, 0.0, 0.0]), 10.0, 0.0)[None],
+                            ObjectStates(np.array([(51.0, offset, 0.0)]), np.zeros((1, 3))))
+        values, = criticality.latest[0].values
+        assert values[COLUMN['gap']] == pytest.approx(gap, nan_ok=True)
+        assert (values[COLUMN['ttc']] == 0.0) is not math.isnan(gap)
+        assert values[COLUMN['min_distance']] == pytest.approx(max(offset - 1.8, 0.0))
+
+
 SCENARIOS = ['DEU_Flensburg-10_1_T-1', 'DEU_Guetersloh-36_1_T-1', 'USA_Lanker-1_3_T-1',
              'USA_US101-4_1_T-1', 'ZAM_Tjunction-1_42_T-1']
 SUBJECTS, STEPS = 2, 8
