@@ -32,7 +32,7 @@ from crgame_ros.perception.mounted_sensor import Detections, MountedSensor
 from crgame_ros.perception.sensors import Scan
 from crgame_ros.perception.tracks import Tracks
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import StateColumn, VehicleState
+from crgame_ros.vehicle.state import pose_rates, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
@@ -181,12 +181,8 @@ class Perception:
     def _scan(self, n: int, firing: Sequence[MountedSensor], vehicle_states: Array,
               object_poses: Array, object_velocities: Array) -> None:
         """Let sensors look at the world; what they see is known after their latency."""
-        yaw, speed = vehicle_states[:, StateColumn.YAW], vehicle_states[:, StateColumn.SPEED]
         poses = np.concatenate((vehicle_states[:, :3], object_poses))
-        velocities = np.concatenate((
-            np.stack((speed * np.cos(yaw), speed * np.sin(yaw),
-                      vehicle_states[:, StateColumn.YAW_RATE]), axis=1),
-            object_velocities))
+        velocities = np.concatenate((pose_rates(vehicle_states), object_velocities))
         centers = np.concatenate((shifted(vehicle_states[:, :3], self._to_center), object_poses))
         # A sensor does not see the vehicle that carries it.
         centers[self._own] = np.nan

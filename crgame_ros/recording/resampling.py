@@ -24,7 +24,7 @@ from collections.abc import Collection, Sequence
 
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.timing.cycle_rows import CycleTable
-from crgame_ros.vehicle.state import StateColumn
+from crgame_ros.vehicle.state import pose_rates
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,12 +106,12 @@ def _at(states: FloatArray, times_s: FloatArray, wanted_s: FloatArray) -> FloatA
     found = first + share * (second - first)
     turn = wrap_pi_array(second[:, 2] - first[:, 2])
     displacement = np.column_stack((second[:, :2] - first[:, :2], turn))
-    found[:, :3] = first[:, :3] + cubic(share, length, displacement, _rates(first),
-                                        _rates(second))
+    found[:, :3] = first[:, :3] + cubic(share, length, displacement, pose_rates(first),
+                                        pose_rates(second))
     # Nothing was recorded so early or so late: the vehicle goes on as it was.
     beyond_s = (wanted_s - times_s[after])[:, np.newaxis]
     found = np.where(inside[:, np.newaxis], found, second)
-    found[:, :3] += np.where(inside[:, np.newaxis], 0.0, beyond_s * _rates(second))
+    found[:, :3] += np.where(inside[:, np.newaxis], 0.0, beyond_s * pose_rates(second))
     found[:, 2] = wrap_pi_array(found[:, 2])
     # What was recorded for that very time stays as it is to the last bit.
     exact = times_s[after] == wanted_s
@@ -132,10 +132,3 @@ def cubic(share: FloatArray, length: FloatArray, displacement: FloatArray,
     rest = 1.0 - share
     return (share * share * (3.0 - 2.0 * share) * displacement
             + share * rest * length * (rest * start_rates - share * end_rates))
-
-
-def _rates(states: FloatArray) -> FloatArray:
-    """Give the rates (K, 3) of x, y and yaw [m/s, m/s, rad/s]."""
-    yaw, speed = states[:, StateColumn.YAW], states[:, StateColumn.SPEED]
-    return np.column_stack((speed * np.cos(yaw), speed * np.sin(yaw),
-                            states[:, StateColumn.YAW_RATE]))

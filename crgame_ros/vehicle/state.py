@@ -18,6 +18,8 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from crgame_ros.geometry.reference_point import ahead
+import numpy as np
+from numpy.typing import NDArray
 
 
 class VehicleState(NamedTuple):
@@ -67,3 +69,15 @@ class StateColumn(IntEnum):
 
 
 STATE_WIDTH = len(StateColumn)
+
+
+def pose_rates(states: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    Give the rates of x, y and yaw of the rear axle.
+
+    :param states: (N, 8) columns as in `StateColumn`.
+    :return: (N, 3) [m/s, m/s, rad/s]
+    """
+    yaw, speed = states[:, StateColumn.YAW], states[:, StateColumn.SPEED]
+    return np.column_stack((speed * np.cos(yaw), speed * np.sin(yaw),
+                            states[:, StateColumn.YAW_RATE]))

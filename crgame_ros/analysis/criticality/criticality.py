@@ -43,7 +43,7 @@ from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.simulation.observer import ObservedRun
-from crgame_ros.vehicle.state import StateColumn
+from crgame_ros.vehicle.state import pose_rates, StateColumn
 import numpy as np
 from numpy.typing import NDArray
 import shapely
@@ -195,7 +195,8 @@ class Criticality:
             return
         time_s = n * self._scheduler.dt_s
         centers = shifted(vehicle_states[:, :3], self._rear_to_center)
-        velocities = _center_velocities(vehicle_states, self._rear_to_center)
+        velocities = shifted_velocities(centers[:, 2], pose_rates(vehicle_states),
+                                        self._rear_to_center)[:, :2]
         poses = np.concatenate((centers, objects.poses))
         moves = np.concatenate((velocities, objects.velocities[:, :2]))
         accelerations = self._accelerations(time_s, vehicle_states, poses, moves)
@@ -298,14 +299,6 @@ def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: floa
         time_to_collision_accelerating(gaps, own, other, own_a, other_a),
         deceleration_to_avoid_crash(gaps, own, other),
         required_acceleration(gaps, own, other, other_a)))
-
-
-def _center_velocities(states: FloatArray, rear_to_center: FloatArray) -> FloatArray:
-    """Give the velocities (V, 2) of the vehicles' centres."""
-    yaw, speed = states[:, StateColumn.YAW], states[:, StateColumn.SPEED]
-    rear = np.column_stack((speed * np.cos(yaw), speed * np.sin(yaw),
-                            states[:, StateColumn.YAW_RATE]))
-    return shifted_velocities(yaw, rear, rear_to_center)[:, :2]
 
 
 def _convex(corners: FloatArray) -> FloatArray:
