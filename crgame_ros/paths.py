@@ -14,7 +14,9 @@
 # limitations under the License.
 """Where the package's data files (config, scenarios, contract) are; what files are good for."""
 
+from collections.abc import Iterator
 import errno
+from itertools import count
 import os
 from pathlib import Path
 import stat
@@ -41,6 +43,13 @@ def share_directory() -> Path:
             return candidate
     raise CrgameError(f'{package}: the data files of {PACKAGE} are missing; '
                       'install with colcon or `pip install .`, or run from the source tree')
+
+
+def numbered(wanted: Path) -> Iterator[Path]:
+    """Give a name, then the same with _2, _3, …: what is there already stays as it is."""
+    yield wanted
+    for number in count(2):
+        yield wanted.with_name(f'{wanted.name}_{number}')
 
 
 def irregular(mode: int) -> str | None:

@@ -25,6 +25,7 @@ from typing import Any, TYPE_CHECKING
 
 from crgame_ros.analysis.measure_command import summary, TOLD_S
 from crgame_ros.errors import InputError
+from crgame_ros.paths import numbered
 
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
     from crgame_ros.recording.run_log import RunLog
@@ -62,10 +63,11 @@ def replay(values: argparse.Namespace) -> int:
     from crgame_ros.launcher.arguments import RunRequest
     from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.planner.planner_registry import planner_class
+    from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_log import read_run_log
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
-    bag = values.run / 'bag' if (values.run / 'bag').is_dir() else values.run
+    bag = recording_in(values.run)
     recorded = read_run_log(bag)
     if not recorded.game.humans or not recorded.game.avs:
         raise InputError('has no human and an AV', str(bag), 'give a run in which both drive')
@@ -102,12 +104,10 @@ def _drive(planner: str, setup: 'Setup', recorded: 'RunLog', latency_steps: int,
 def _make_folder(out: Path | None, run: Path) -> Path:
     """Make a new folder: what is there already stays as it is."""
     wanted = out or (run if run.is_dir() else run.parent) / FOLDER
-    folder, number = wanted, 1
+    folder = wanted
     try:
         wanted.parent.mkdir(parents=True, exist_ok=True)
-        while folder.exists():
-            number += 1
-            folder = wanted.with_name(f'{wanted.name}_{number}')
+        folder = next(name for name in numbered(wanted) if not name.exists())
         folder.mkdir()
     except OSError as error:
         raise InputError(f'cannot be made ({error.strerror})', str(folder),

@@ -58,14 +58,14 @@ def measure(values: argparse.Namespace) -> int:
     from crgame_ros.analysis.criticality.criticality import Thresholds
     from crgame_ros.analysis.criticality.recorded_criticality import measure_log
     from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_log import read_run_log
     for name in ('ttc', 'drac', 'pet'):
         if not 0.0 < getattr(values, name) < math.inf:
             raise InputError(f'is {getattr(values, name)}', f'--{name}', 'give a positive number')
     path = values.run
     say = partial(print, file=sys.stderr, flush=True)
-    log = read_run_log(path / 'bag' if (path / 'bag').is_dir() else path, values.epoch,
-                       Progress(say, f'reading {path}'))
+    log = read_run_log(recording_in(path), values.epoch, Progress(say, f'reading {path}'))
     found = summary(measure_log(log, Thresholds(values.ttc, values.drac, values.pet),
                                 Progress(say, f'measuring {path}')))
     if values.json:

@@ -29,8 +29,8 @@ from crgame_ros.cockpit.replay_marks import Mark
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.epochs import epoch_numbers, read_epoch
-from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.scenario.loading import parse_scenario
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ class ReplayBackend:
 
     def __init__(self, path: Path, epoch: int | None = None,
                  progress: Progress | None = None) -> None:
-        self.path = _recording_in(path)
+        self.path = recording_in(path)
         self._progress = progress
         # SQLite and the chunks in memory belong to one thread.
         self._thread = ThreadPoolExecutor(1, 'replay')
@@ -263,12 +263,6 @@ class ReplayBackend:
         :raises CrgameError: always.
         """
         raise CrgameError('This is a recording: start ./run.sh without --replay to play a game.')
-
-
-def _recording_in(path: Path) -> Path:
-    """Choose the recording in the folder of a run."""
-    inside = path / 'bag'
-    return inside if inside.is_dir() and not (path / METADATA_FILE).exists() else path
 
 
 def _whole_number(text: str | None) -> int | None:

@@ -29,7 +29,7 @@ from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.game.game_file import dump_game, load_game
 from crgame_ros.launcher.arguments import RunRequest
-from crgame_ros.paths import check_room, default_game
+from crgame_ros.paths import check_room, default_game, numbered
 from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
 from crgame_ros.recording.recorded_game import read_recorded_game
 from crgame_ros.recording.recorded_inputs import (
@@ -262,10 +262,10 @@ def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
 def _make_folder(out: Path | None, benchmark_id: str, now: datetime) -> Path:
     """Make a folder of its own for the run: what is there already stays as it is."""
     wanted = out if out is not None else Path('runs') / f'{now:%Y%m%d-%H%M%S}_{benchmark_id}'
-    folder, number = wanted, 1
+    folder = wanted
     try:
         wanted.parent.mkdir(parents=True, exist_ok=True)
-        while True:
+        for folder in numbered(wanted):
             with contextlib.suppress(FileExistsError):
                 folder.mkdir()
             if not folder.is_dir():
@@ -275,8 +275,6 @@ def _make_folder(out: Path | None, benchmark_id: str, now: datetime) -> Path:
                     # Whoever makes this file has the folder: several may start at once.
                     (folder / CLAIM).touch(exist_ok=False)
                     break
-            number += 1
-            folder = wanted.with_name(f'{wanted.name}_{number}')
     except OSError as error:
         raise InputError(f'cannot be made ({error.strerror})', str(folder),
                          'choose another folder with --out') from error

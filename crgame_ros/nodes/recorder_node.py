@@ -24,6 +24,7 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import GAME_TOPIC, parse_game_document
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.contract import load_contract, Topic
+from crgame_ros.paths import numbered
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.run_folder import run_folder
@@ -250,12 +251,8 @@ class RecorderNode(Node):
 
     def _folder_of(self, epoch: int) -> Path:
         """Choose a folder; a simulation that was started again begins with the first run anew."""
-        folder = wanted = run_folder(self._directory.parent, epoch) / self._directory.name
-        number = 1
-        while folder.exists():
-            number += 1
-            folder = wanted.with_name(f'{wanted.name}_{number}')
-        return folder
+        wanted = run_folder(self._directory.parent, epoch) / self._directory.name
+        return next(folder for folder in numbered(wanted) if not folder.exists())
 
     def _write(self, recorded: RecordedTopic, data: bytes, published_ns: int,
                received_ns: int) -> None:

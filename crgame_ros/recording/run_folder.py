@@ -17,6 +17,8 @@
 from pathlib import Path
 import re
 
+from crgame_ros.recording.metadata import METADATA_FILE
+
 # In a folder in which there is nothing more to come, whether or not all could be written.
 FINISHED_MARK = '.finished'
 # How a recorder that was started again names its folder.
@@ -38,6 +40,12 @@ def run_folders(session: Path) -> list[Path]:
     later = [(int(found[1]), path) for path in session.iterdir()
              if (found := _LATER.fullmatch(path.name)) and path.is_dir()]
     return [session, *(path for _, path in sorted(later))]
+
+
+def recording_in(path: Path) -> Path:
+    """Choose the recording in the folder of a run; a recording is given as it is."""
+    inside = path / 'bag'
+    return inside if inside.is_dir() and not (path / METADATA_FILE).exists() else path
 
 
 def bags_of(folder: Path) -> list[Path]:

@@ -75,12 +75,17 @@ class ObservedRun:
     av_transforms: tuple[RigidTransform, ...]
     initial_states: NDArray[np.float64]
 
+    @property
+    def road_transforms(self) -> tuple[RigidTransform, ...]:
+        """Give through which transform each driven vehicle is seen on the road (CRG 28)."""
+        humans = sum(item.role is Role.HUMAN for item in self.vehicles)
+        return road_transforms(humans, self.av_transforms)
+
 
 def drivability_monitor(run: ObservedRun) -> DrivabilityMonitor:
     """Make the observer of contacts and the road, ready for the vehicles where they begin."""
-    humans = sum(item.role is Role.HUMAN for item in run.vehicles)
     monitor = DrivabilityMonitor(
         run.vehicles, run.others, run.loaded.scenario.lanelet_network, run.drivability,
-        run.occupancy, road_transforms(humans, run.av_transforms))
+        run.occupancy, run.road_transforms)
     monitor.prepare(run.initial_states)
     return monitor

@@ -36,8 +36,7 @@ from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
 from crgame_ros.analysis.criticality.footprint_approach import distance, time_to_contact
 from crgame_ros.analysis.criticality.leader import find_leader
 from crgame_ros.analysis.criticality.own_path import OwnPaths
-from crgame_ros.drivability.monitor import road_transforms
-from crgame_ros.game.objects import ObjectStates, Role
+from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.road_network import RoadNetwork
@@ -167,8 +166,7 @@ class Criticality:
         self.ids = tuple(item.id for item in everybody)
         self.thresholds = thresholds
         self._scheduler = run.scheduler
-        humans = sum(item.role is Role.HUMAN for item in run.vehicles)
-        self._transforms = road_transforms(humans, run.av_transforms)
+        self._transforms = run.road_transforms
         self._rear_to_center = np.array([item.rear_to_center for item in run.vehicles])
         outlines = [_convex(outline(item.shape, CIRCLE_CORNERS)) for item in everybody]
         self._radii = np.array([np.hypot(*corners.T).max() for corners in outlines])
