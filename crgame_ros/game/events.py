@@ -252,9 +252,6 @@ ACTIONS: dict[str, type[Action]] = {
     'release': Release, 'brake': Brake, 'obstacle': PutObstacle, 'speed_limit': SpeedLimit,
     'traffic': TrafficChange, 'plan_display': PlanDisplay, 'planner': PlannerSwap,
     'planner_run': PlannerRun}
-# The key by which each condition is known.
-CONDITIONS: dict[str, type[Condition]] = {
-    'time': AtTime, 'step': AtStep, 'vehicle': Near, 'between': Between}
 
 
 @dataclass(frozen=True)

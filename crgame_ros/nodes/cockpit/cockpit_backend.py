@@ -15,7 +15,7 @@
 """The cockpit of a live run: what pages ask for becomes messages to the graph."""
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 import time
 from typing import Any, Literal
@@ -32,6 +32,7 @@ from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.ros_messages import to_joy
 from crgame_ros.ros.seats import GAME
+from crgame_ros.ros.spinning import attempt
 from crgame_ros.vehicle.driver_command import DriverCommand
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -89,25 +90,17 @@ class LiveBackend:
     async def _run(self) -> None:
         """Pass the run on until stopped; no part ends it or keeps the others from their work."""
         while True:
-            self._attempt(self._pass_on)
-            self._attempt(self._drive)
+            attempt(self._node, self._pass_on)
+            attempt(self._node, self._drive)
             if time.monotonic() - self._served_s >= SERVE_PERIOD_S:
                 self._served_s = time.monotonic()
-                self._attempt(self._serve)
+                attempt(self._node, self._serve)
             await asyncio.sleep(self._period_s())
 
     def _period_s(self) -> float:
         if self._table.held:
             return PERIOD_S
         return WATCH_PERIOD_S if self._hub.clients else IDLE_PERIOD_S
-
-    def _attempt(self, work: Callable[[], None]) -> None:
-        try:
-            work()
-        except Exception as error:
-            # A pump that ended would leave every page dead and say nothing.
-            self._node.get_logger().error(f'{work.__name__}: {error!r}'[:500],
-                                          throttle_duration_sec=COMPLAIN_S)
 
     def _pass_on(self) -> None:
         for problem in self._feed.poll():
