@@ -23,7 +23,7 @@ import re
 import sys
 from typing import Any, TYPE_CHECKING
 
-from crgame_ros.analysis.measure_command import summary, TOLD_S
+from crgame_ros.analysis.measure_command import TOLD_S
 from crgame_ros.errors import InputError
 from crgame_ros.paths import numbered
 
@@ -78,7 +78,7 @@ def replay(values: argparse.Namespace) -> int:
               for name in values.planner}
     folder = _make_folder(values.out, values.run)
     found: list[dict[str, Any]] = [
-        {'planner': 'recorded', 'criticality': summary(measure_log(recorded))}]
+        {'planner': 'recorded', 'criticality': measure_log(recorded).as_dict()}]
     for name, setup in setups.items():
         print(f'driving against {name} …', file=sys.stderr, flush=True)
         found.append(_drive(name, setup, recorded, values.latency,

@@ -20,7 +20,6 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
-from crgame_ros.analysis.measure_command import summary
 from crgame_ros.errors import InputError
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_log import run_log_of, RunLog
@@ -63,7 +62,7 @@ class Alternative:
             'accepted_ratio': {av: record.accepted_ratio
                                for av, record in self.result.planners.items()},
             'contacts': [item.as_dict() for item in contacts_of(self.result)],
-            'criticality': summary(self.criticality)}
+            'criticality': self.criticality.as_dict()}
 
 
 def drive_against(planner: str, setup: Setup, recorded: RunLog,

@@ -23,6 +23,7 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.errors import InputError
 
 # Behind what is beyond its threshold.
@@ -45,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                         '(resets count them from 0; default: the last)')
     for name, unit, value, which in (
-            ('ttc', 'S', 3.0, 'smaller'), ('drac', 'M/S2', 3.0, 'greater'),
-            ('pet', 'S', 2.0, 'smaller')):
+            ('ttc', 'S', USUAL.ttc_s, 'smaller'), ('drac', 'M/S2', USUAL.drac, 'greater'),
+            ('pet', 'S', USUAL.pet_s, 'smaller')):
         parser.add_argument(f'--{name}', type=float, default=value, metavar=unit,
                             help=f'{which} ones are critical (default: {value:g})')
     parser.add_argument('--json', action='store_true', help='print it as JSON')
@@ -55,7 +56,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def measure(values: argparse.Namespace) -> int:
     """Measure a run, and print what was found."""
-    from crgame_ros.analysis.criticality.criticality import Thresholds
     from crgame_ros.analysis.criticality.recorded_criticality import measure_log
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in
@@ -66,31 +66,13 @@ def measure(values: argparse.Namespace) -> int:
     path = values.run
     say = partial(print, file=sys.stderr, flush=True)
     log = read_run_log(recording_in(path), values.epoch, Progress(say, f'reading {path}'))
-    found = summary(measure_log(log, Thresholds(values.ttc, values.drac, values.pet),
-                                Progress(say, f'measuring {path}')))
+    found = measure_log(log, Thresholds(values.ttc, values.drac, values.pet),
+                        Progress(say, f'measuring {path}')).as_dict()
     if values.json:
         print(json.dumps(found, indent=2))
     else:
         print('\n'.join(_lines(found)))
     return 0
-
-
-def summary(criticality: Any) -> dict[str, Any]:
-    """Say what was found, as JSON has it: times in s since the start, SI units."""
-    from crgame_ros.analysis.criticality.criticality import MEASURES
-    thresholds, ids = criticality.thresholds, criticality.ids
-    return {
-        'thresholds': thresholds._asdict(),
-        'vehicles': {
-            vehicle.vehicle_id: {
-                'worst': {name: {'value': worst.value, 'unit': MEASURES[name].unit,
-                                 'of': worst.other, 'time_s': worst.time_s}
-                          for name in MEASURES if (worst := vehicle.worst.get(name))},
-                'tet_s': vehicle.tet_s, 'tit_s2': vehicle.tit,
-                'crossings': [{'first': ids[each.first], 'second': ids[each.second],
-                               'entered_s': each.entered_s, 'pet_s': each.pet_s}
-                              for each in vehicle.crossings]}
-            for vehicle in criticality.report()}}
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:

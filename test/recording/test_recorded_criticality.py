@@ -20,7 +20,6 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
-from crgame_ros.analysis.measure_command import summary
 from crgame_ros.cli import main
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
@@ -57,11 +56,11 @@ def test_one_code_for_runs_logs_and_recordings(
         observed: tuple[Criticality, OfflineResult], recorder: Any, tmp_path: Path) -> None:
     """The same worst moments, times and crossings, however the run comes."""
     criticality, result = observed
-    expected = _flat(summary(criticality))
+    expected = _flat(criticality.as_dict())
     assert len(expected) > 30
     bag = recorder.ours(tmp_path / 'bag', recorder.messages(result))
     for log in (run_log_of(result), read_run_log(bag)):
-        found = _flat(summary(measure_log(log)))
+        found = _flat(measure_log(log).as_dict())
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 

@@ -15,14 +15,14 @@
 """
 The criticality of a run: what each driven vehicle has left to everybody near it, tick by tick.
 
-The same code runs live, offline and on recordings. All definitions are those of the literature
-that `docs/criticality.md` names; distances are bumper to bumper, along the subject's own path.
+The same code looks on at offline runs, and at recordings. All definitions are in
+`docs/criticality.md`; distances are bumper to bumper, along the subject's own path.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.criticality.car_following_measures import (
@@ -36,6 +36,7 @@ from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
 from crgame_ros.analysis.criticality.footprint_approach import distance, time_to_contact
 from crgame_ros.analysis.criticality.leader import find_leader
 from crgame_ros.analysis.criticality.own_path import OwnPaths
+from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
@@ -53,23 +54,6 @@ FloatArray = NDArray[np.float64]
 NEAR = 100.0
 # A circle's footprint is a polygon around it of so many corners.
 CIRCLE_CORNERS = 32
-
-
-class Thresholds(NamedTuple):
-    """
-    What counts as critical, as in the SSM device of SUMO.
-
-    :param ttc_s: smaller times to collision are [s]
-    :param drac: greater decelerations are [m/s^2]
-    :param pet_s: smaller post-encroachment times are [s]
-    """
-
-    ttc_s: float = 3.0
-    drac: float = 3.0
-    pet_s: float = 2.0
-
-
-USUAL = Thresholds()
 
 
 class Measure(NamedTuple):
@@ -104,7 +88,8 @@ MEASURES = {
                       'time until footprints touch that keep velocity and yaw'),
     'min_distance': Measure('m', -1, math.nan, 'distance of the footprints'),
 }
-_OF_LEADER = 7
+COLUMN = {name: column for column, name in enumerate(MEASURES)}
+_OF_LEADER = COLUMN['ttc_2d']
 
 
 class TickMeasures(NamedTuple):
@@ -210,6 +195,23 @@ class Criticality:
         """Sum up what has been observed so far."""
         return tuple(self._found)
 
+    def as_dict(self) -> dict[str, Any]:
+        """Say what was found, as JSON has it: times in s since the start, SI units."""
+        return {
+            'thresholds': self.thresholds._asdict(),
+            'vehicles': {
+                vehicle.vehicle_id: {
+                    'worst': {name: {'value': worst.value, 'unit': measure.unit,
+                                     'of': worst.other, 'time_s': worst.time_s}
+                              for name, measure in MEASURES.items()
+                              if (worst := vehicle.worst.get(name))},
+                    'tet_s': vehicle.tet_s, 'tit_s2': vehicle.tit,
+                    'crossings': [{'first': self.ids[each.first],
+                                   'second': self.ids[each.second],
+                                   'entered_s': each.entered_s, 'pet_s': each.pet_s}
+                                  for each in vehicle.crossings]}
+                for vehicle in self._found}}
+
     def _accelerations(self, time_s: float, states: FloatArray, poses: FloatArray,
                        moves: FloatArray) -> FloatArray:
         """Give everybody's acceleration (N, 2): the vehicles' own, the others' by differences."""
@@ -239,7 +241,8 @@ class Criticality:
         self._approach(subject, others, moves, outlines, values)
         path = self._paths.at(subject, *poses[subject].tolist())
         leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
-                             poses[others, :2], self._radii[others], values[:, -1] == 0.0)
+                             poses[others, :2], self._radii[others],
+                             values[:, COLUMN['min_distance']] == 0.0)
         if leader is not None:
             other = int(others[leader.number])
             here, there = (np.array((math.cos(yaw), math.sin(yaw)))
@@ -257,8 +260,8 @@ class Criticality:
             rows = np.flatnonzero(corners == count)
             theirs = outlines[others[rows], :count]
             contact = time_to_contact(own, theirs, moves[subject], moves[others[rows]])
-            values[rows, -2] = contact
-            values[rows, -1] = distance(own, theirs, contact == 0.0)
+            values[rows, COLUMN['ttc_2d']] = contact
+            values[rows, COLUMN['min_distance']] = distance(own, theirs, contact == 0.0)
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s
@@ -274,8 +277,7 @@ class Criticality:
                 value, known = float(values[row, column]), found.worst.get(name)
                 if known is None or measure.worst * (value - known.value) > 0.0:
                     found.worst[name] = Worst(value, self.ids[others[row]], time_s)
-            short = self.thresholds.ttc_s - values[:, list(MEASURES).index('ttc')].min(
-                initial=np.inf)
+            short = self.thresholds.ttc_s - values[:, COLUMN['ttc']].min(initial=np.inf)
             if short > 0.0:
                 found.tet_s += step_s
                 found.tit += step_s * float(short)

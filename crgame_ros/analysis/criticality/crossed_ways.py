@@ -112,18 +112,20 @@ class CrossedWays:
         steps, lengths = np.hypot(moves[..., 0], moves[..., 1]), np.hypot(ways[:, 0], ways[:, 1])
         pairs: dict[tuple[int, int], list[int]] = {}
         everybody = np.arange(len(ways))
+        unwatched = everybody[self._watched:]
         for i in range(self._watched):
             others = np.delete(everybody, i)
-            reach = self._radii[i] + self._radii[others]
             near = _within(been[-1, i] - been[:-1, others],
-                           reach + steps[:, others] + lengths[i])
+                           self._radii[i] + self._radii[others] + steps[:, others] + lengths[i])
             rows, columns = np.nonzero(near)
             seconds = np.full(len(rows), i)
             self._add(pairs, rows, others[columns], seconds, moves, ways)
-            near = _within(been[-1, others] - been[:-1, None, i],
-                           reach + steps[:, i, None] + lengths[others])
+            # Those that are watched have their turn as the second one.
+            near = _within(been[-1, unwatched] - been[:-1, None, i],
+                           self._radii[i] + self._radii[unwatched] + steps[:, i, None]
+                           + lengths[unwatched])
             rows, columns = np.nonzero(near)
-            self._add(pairs, rows, np.full(len(rows), i), others[columns], moves, ways)
+            self._add(pairs, rows, np.full(len(rows), i), unwatched[columns], moves, ways)
         return pairs
 
     @staticmethod

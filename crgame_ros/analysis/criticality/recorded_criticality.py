@@ -16,7 +16,8 @@
 
 from collections.abc import Callable
 
-from crgame_ros.analysis.criticality.criticality import Criticality, Thresholds, USUAL
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.scenario.loading import parse_scenario

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
-from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, TickMeasures
+from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, TickMeasures
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -35,7 +35,6 @@ from numpy.typing import NDArray
 import pytest
 
 Array = NDArray[np.float64]
-COLUMN = {name: index for index, name in enumerate(MEASURES)}
 SCHEDULER = ScenarioScheduler(100_000_000, 10)
 
 
