@@ -16,7 +16,7 @@
 
 from pathlib import Path
 
-from crgame_ros.analysis.figures import draw_run
+from crgame_ros.analysis.pictures.run_figure import draw_run
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory, share_directory

@@ -48,7 +48,7 @@ def read_run_events(path: Path, epoch: int | None = None) -> RecordedEvents:
     :raises InputError: if there is no such run in it.
     """
     games, fired = {}, {}
-    with BagReader(path) as reader:
+    with BagReader(path, parts=True) as reader:
         for topic, _, _, message in reader.readable([GAME_TOPIC, EVENTS_TOPIC]):
             try:
                 if topic == GAME_TOPIC:

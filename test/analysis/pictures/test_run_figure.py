@@ -14,7 +14,7 @@
 # limitations under the License.
 """Pictures of runs show who drives in them."""
 
-from crgame_ros.analysis.figures import colour_of, draw_run
+from crgame_ros.analysis.pictures.run_figure import colour_of, draw_run
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.offline import run_offline

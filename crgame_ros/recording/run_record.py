@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""All of a run that measures need beside its motion: what its drivers did, and its events."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.simulation.offline import OfflineResult
+from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """
+    A run that is over.
+
+    :param log: how everybody moved, at the scenario's steps.
+    :param ns: (R) simulation steps n of which is known what led to them, rising; where a recorder
+        missed some they are not consecutive.
+    :param commands: (R, V, 4) throttle, brake, steering and reverse that the step from n - 1 to n
+        consumed, of the driven vehicles in the log's order; NaN of an AV that follows its plan.
+    :param fired: events that took effect, in order.
+    """
+
+    log: RunLog
+    ns: NDArray[np.int64]
+    commands: NDArray[np.float64]
+    fired: tuple[FiredEvent, ...]
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Simulated time of the commands since the run's start (R) [s]."""
+        return np.asarray(self.ns * self.log.game.scheduler.dt_s)
+
+
+def read_run_record(path: Path, epoch: int | None = None,
+                    progress: Callable[[float], object] | None = None) -> RunRecord:
+    """
+    Read a run from a recording; parameters and errors are those of `read_run_log`.
+
+    Without recorded cycles there are no commands.
+    """
+    log = read_run_log(path, epoch, progress)
+    vehicles = [item.id for item in log.vehicles]
+    fired = read_run_events(path, log.game.epoch).fired
+    if log.cycles is None:
+        return RunRecord(log, np.empty(0, dtype=np.int64),
+                         np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired)
+    ns = log.cycles.column('n').astype(np.int64)
+    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired)
+
+
+def run_record_of(result: OfflineResult) -> RunRecord:
+    """Give the record of an offline run."""
+    commands = np.full((len(result.commands) - 1, len(result.setup.vehicle_ids),
+                        len(COMMAND_COLUMNS)), np.nan)
+    commands[:, :result.commands.shape[1]] = result.commands[1:]
+    return RunRecord(run_log_of(result), np.arange(1, len(result.commands)), commands,
+                     result.fired)

@@ -1,0 +1,43 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What measures are given of a run: the same from its recording as from the run itself."""
+
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.run_record import read_run_record, run_record_of
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+import numpy as np
+
+
+def test_a_recording_has_the_same_record(recorder: Any, tmp_path: Path) -> None:
+    """Commands of humans bit by bit, none of AVs that follow their plans, and no more events."""
+    setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
+    drivers, intervals_s = recorded_inputs(setup)
+    result = run_offline(setup, duration_s=3.0, drivers=drivers, intervals_s=intervals_s)
+    here = run_record_of(result)
+    there = read_run_record(recorder.ours(tmp_path / 'bag', recorder.messages(result)))
+    assert np.array_equal(here.ns, np.arange(1, 301))
+    for record in (here, there):
+        assert np.array_equal(record.ns, here.ns)
+        assert np.allclose(record.times_s, 0.01 * here.ns, rtol=0.0, atol=1e-12)
+        assert np.array_equal(record.commands[:, 0], result.commands[1:, 0])
+        assert np.isnan(record.commands[:, 1]).all()
+        assert record.fired == result.fired
+        assert np.array_equal(record.log.ks, here.log.ks)
