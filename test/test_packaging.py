@@ -36,9 +36,9 @@ from packaging.utils import canonicalize_name
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'timesync_node',
-         'recorder_node', 'marker_node', 'cockpit_node', 'perception_node', 'traffic_node',
-         'map_node')
+NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'criticality_node',
+         'timesync_node', 'recorder_node', 'marker_node', 'cockpit_node',
+         'perception_node', 'traffic_node', 'map_node')
 DATA = ('launch', 'config', 'scenarios', 'msg_defs')
 # Modules of ROS packages whose name is no ROS package's.
 MESSAGE_PACKAGE = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy')

@@ -27,7 +27,7 @@ from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.simulation.roster import Participants
 
 COMPANION_NICE = 5
-# Pictures for people give way to everybody.
+# Pictures for people, and what is measured beside the run, give way to everybody.
 VIEWER_NICE = 10
 
 
@@ -39,7 +39,8 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
         NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
                  nice=COMPANION_NICE, restart=True),
         NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
-        NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True)]
+        NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True),
+        NodeSpec('criticality_node', 'criticality_node', nice=VIEWER_NICE, restart=True)]
     viewers = _viewer_specs(plan)
     # With a driver in the browser the run begins when somebody has taken the seat, and step 0
     # must reach the page.

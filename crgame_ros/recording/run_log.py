@@ -22,7 +22,11 @@ from crgame_ros.errors import InputError, one_line
 from crgame_ros.game.documents import GAME_TOPIC, GameDocument, parse_game_document
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
-from crgame_ros.messages.joints import vehicle_to_joints, vehicles_from_joints
+from crgame_ros.messages.joints import (
+    VEHICLE_JOINTS,
+    vehicle_to_joints,
+    vehicles_from_joints,
+)
 from crgame_ros.messages.world_messages import (
     OBJECT_STATES_TOPIC,
     TICK_STATES_TOPIC,
@@ -64,6 +68,9 @@ class RunLog:
     :param ks: (K) consecutive scenario steps.
     :param vehicle_states: (K, V, 8) rear-axle states at the time (k - k0) Delta t_c of their own
         motion (`resampling`), columns as in `StateColumn`.
+    :param published_states: (K, V, 8) the states that were published at these steps, and that
+        everybody saw together: around a stall those of who is driven by hand are ahead of the
+        others. Where a recorder missed one, that of `vehicle_states`.
     :param object_poses: (K, M, 3) centre poses [m, m, rad]; NaN where absent.
     :param object_velocities: (K, M, 3) their derivatives; NaN where absent.
     :param notices: what of the run is not in here, one line each.
@@ -75,6 +82,7 @@ class RunLog:
     descriptions: tuple[ObjectDescription, ...]
     ks: NDArray[np.int64]
     vehicle_states: FloatArray
+    published_states: FloatArray
     object_poses: FloatArray
     object_velocities: FloatArray
     notices: tuple[str, ...] = ()
@@ -133,8 +141,9 @@ def read_run_log(path: Path, epoch: int | None = None,
     others = bridge_objects(ticks, recorded.get(OBJECT_STATES_TOPIC, {}), scheduler.dt_s,
                             3 * len(objects)) if objects else np.empty((len(ticks), 2, 0))
     others = others.reshape(len(ticks), 2, len(objects), 3)
+    published = _published(recorded[VEHICLES_TOPIC], ticks, vehicle_states)
     return RunLog(run.xml_text, run.game, run.descriptions, _ks(scheduler, ticks), vehicle_states,
-                  others[:, 0], others[:, 1], tuple(map(one_line, notices)), table)
+                  published, others[:, 0], others[:, 1], tuple(map(one_line, notices)), table)
 
 
 def _wanted(reader: BagReader, vehicles: list[str], objects: list[str]) -> dict[str, list[str]]:
@@ -229,6 +238,17 @@ def _vehicle_states(points: Mapping[int, FloatArray], ns: IntArray, vehicles: Se
                      notices)
 
 
+def _published(points: Mapping[int, FloatArray], ticks: IntArray,
+               resampled: FloatArray) -> FloatArray:
+    """Give the states (K, V, 8) as they were published; the resampled ones where none is known."""
+    published = resampled.copy()
+    for row, n in enumerate(ticks.tolist()):
+        if (point := points.get(n)) is not None:
+            # One by one, as who follows a run reads them: to the last bit.
+            published[row] = vehicles_from_joints(*point.reshape(3, -1, len(VEHICLE_JOINTS)))
+    return published
+
+
 def _intervals(run: Epoch, table: CycleTable | None, vehicles: Sequence[str], last_n: int,
                notices: list[str]) -> FloatArray:
     """Give the intervals over which each vehicle was moved, nominal where unknown (n + 1, V)."""
@@ -279,6 +299,6 @@ def run_log_of(result: OfflineResult) -> RunLog:
     game = parse_game_document(
         game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
     return RunLog(
-        setup.loaded.xml_text, game, setup.descriptions, ks, states,
+        setup.loaded.xml_text, game, setup.descriptions, ks, states, result.vehicle_states[ticks],
         result.object_poses[:len(ks)].reshape(len(ks), -1, 3),
         result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(map(one_line, notices)))

@@ -24,9 +24,7 @@ from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.simulation.observer import ObservedRun, RunObserver
-from crgame_ros.vehicle.state import STATE_WIDTH
-import numpy as np
+from crgame_ros.simulation.observer import documented_run, ObservedRun, RunObserver
 from rclpy.node import Node
 
 PERIOD_S = 0.005
@@ -65,6 +63,11 @@ class ObserverNode(Node, ABC, Generic[Observer]):
         :param stamp_ns: of the state [ns]
         """
 
+    @property
+    def epoch(self) -> int:
+        """Epoch of the run that is observed; -1 before the first."""
+        return -1 if self._scenario is None else self._scenario.game.epoch
+
     def run(self, stop: StopFlag) -> None:
         """Observe until asked to stop."""
         poll(self, stop, PERIOD_S, self._work)
@@ -86,7 +89,10 @@ class ObserverNode(Node, ABC, Generic[Observer]):
     def _begin(self, scenario: ScenarioSet) -> None:
         self._scenario, self._observer = scenario, None
         self._world.begin(scenario)
-        self._observer = self.make(observed_run(scenario))
+        game = scenario.game
+        self._observer = self.make(documented_run(
+            game, scenario.loaded, scenario.objects,
+            None if game.occupancy is None else TiledOccupancy(game.occupancy)))
 
     def _begin_anew(self) -> None:
         """Observe the same run from its start: a recording is played once more."""
@@ -101,18 +107,3 @@ class ObserverNode(Node, ABC, Generic[Observer]):
         self._observer.observe(step.n, scheduler.since_tick_s(step.n), step.states,
                                step.objects if step.tick else None)
         self.tell(self._observer, stamp_ns)
-
-
-def observed_run(scenario: ScenarioSet) -> ObservedRun:
-    """
-    Give what an observer knows of a run before it begins.
-
-    :raises InputError: if its map of permanent obstacles cannot be used.
-    """
-    game = scenario.game
-    states = [item.state for item in game.vehicles]
-    return ObservedRun(
-        scenario.driven, scenario.others, scenario.loaded, game.scheduler, game.drivability,
-        None if game.occupancy is None else TiledOccupancy(game.occupancy),
-        tuple(av.transform for av in game.avs),
-        np.array(states).reshape(-1, STATE_WIDTH))

@@ -14,16 +14,20 @@
 # limitations under the License.
 """Whoever looks on at a run: at every published state, live in a node, offline in lockstep."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.drivability.monitor import DrivabilityMonitor, road_transforms
+from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.occupancy.occupancy import OccupancyMap
 from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.vehicle.state import STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,6 +68,8 @@ class ObservedRun:
     :param occupancy: the map of permanent obstacles; None if the game has none.
     :param av_transforms: of the AVs, from simulation to scenario coordinates (CRG 6-8)
     :param initial_states: (V, 8) rear-axle states.
+    :param problems: (V) planning problems whose goals lead the vehicles; None who has none, empty
+        where nobody has one.
     """
 
     vehicles: tuple[ObjectDescription, ...]
@@ -74,12 +80,31 @@ class ObservedRun:
     occupancy: OccupancyMap | None
     av_transforms: tuple[RigidTransform, ...]
     initial_states: NDArray[np.float64]
+    problems: tuple[PlanningProblem | None, ...] = ()
 
     @property
     def road_transforms(self) -> tuple[RigidTransform, ...]:
         """Give through which transform each driven vehicle is seen on the road (CRG 28)."""
         humans = sum(item.role is Role.HUMAN for item in self.vehicles)
         return road_transforms(humans, self.av_transforms)
+
+
+def documented_run(game: GameDocument, loaded: LoadedScenario,
+                   descriptions: Sequence[ObjectDescription],
+                   occupancy: OccupancyMap | None = None) -> ObservedRun:
+    """
+    Give what an observer knows of a run from its documents, live or recorded.
+
+    :param descriptions: of everything that can appear.
+    """
+    problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    states = [item.state for item in game.vehicles]
+    return ObservedRun(
+        tuple(item for item in descriptions if item.role.is_ego),
+        tuple(item for item in descriptions if not item.role.is_ego),
+        loaded, game.scheduler, game.drivability, occupancy,
+        tuple(av.transform for av in game.avs), np.array(states).reshape(-1, STATE_WIDTH),
+        (*[None] * len(game.humans), *(problems.get(av.planning_problem) for av in game.avs)))
 
 
 def drivability_monitor(run: ObservedRun) -> DrivabilityMonitor:

@@ -220,7 +220,8 @@ def observed_run(setup: Setup) -> ObservedRun:
     return ObservedRun(
         setup.vehicle_descriptions, setup.obstacles.descriptions, setup.loaded, setup.scheduler,
         setup.game.drivability, setup.open_occupancy(), tuple(av.transform for av in setup.avs),
-        np.reshape([vehicle.state for vehicle in setup.vehicles], (-1, STATE_WIDTH)))
+        np.reshape([vehicle.state for vehicle in setup.vehicles], (-1, STATE_WIDTH)),
+        (*[None] * len(setup.humans), *(av.planning_problem for av in setup.avs)))
 
 
 def _perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:

@@ -35,7 +35,8 @@ def test_the_nodes_are_those_of_the_game(project_root: Path, tmp_path: Path, gam
     words = launch_words({'game': str(project_root / 'scenarios' / f'{game}.yaml'),
                           'out': str(tmp_path / 'run'), 'headless': 'true'})
     names = {spec.name for spec in node_specs(plan_run(parse_arguments(words)))}
-    assert needed | {'sim_node', 'recorder_node', 'drivability_node', 'timesync_node'} <= names
+    assert needed | {'sim_node', 'recorder_node', 'drivability_node', 'timesync_node',
+                     'criticality_node'} <= names
     assert 'cockpit_node' not in names
 
 

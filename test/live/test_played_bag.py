@@ -38,13 +38,14 @@ DURATION_S = 4.0
 OFFSET_S = 0.5
 # Those who listen, with their parameters; what they publish is not played.
 NODES = {'marker_node': (), 'timesync_node': (), 'map_node': (), 'drivability_node': (),
+         'criticality_node': (),
          'perception_node': ('vehicle:=av0',), 'planner_node': ('vehicle:=av0',),
          'recorder_node': ('directory:={folder}/bag',),
          'cockpit_node': ('port:=8650', 'directory:={folder}/cockpit')}
 THEIRS = ('/markers', '/timing/frame_skip', '/occupancy', '/hv0/drivability', '/av0/drivability',
-          '/av0/plan_request', '/av0/localization', '/av0/scan', '/av0/plan', '/av0/plan_path',
-          '/diagnostics')
-HEARD = ('/markers', ('/<v>/drivability', 'av0'), ('/<av>/plan_request', 'av0'),
+          '/criticality', '/av0/plan_request', '/av0/localization', '/av0/scan', '/av0/plan',
+          '/av0/plan_path', '/diagnostics')
+HEARD = ('/markers', '/criticality', ('/<v>/drivability', 'av0'), ('/<av>/plan_request', 'av0'),
          ('/<av>/plan', 'av0'), '/diagnostics', '/timing/frame_skip')
 
 

@@ -23,15 +23,24 @@ import signal
 import commonroad
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.scenario.obstacle import DynamicObstacle
+from crgame_ros.analysis.criticality.criticality_rows import (
+    COLUMNS,
+    criticality_rows,
+    CRITICALITY_TOPIC,
+    read_criticality_rows,
+)
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.game.game_file import load_game
 from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.recording.run_log import read_run_log
 from crgame_ros.timing.cycle_rows import CycleTable
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS, wait_until
 from lxml import etree
 import numpy as np
+from numpy.typing import NDArray
 import pytest
 
 DURATION_S = 3.5
@@ -48,7 +57,7 @@ TABLE_I = {'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 't
            'real_time_ratio', 'time_efficiency', 'precision_ratio'}
 PLANS = {'accepted', 'fallback', 'refused', 'skipped', 'latency_ms'}
 NODES = {'sim_node', 'driver_node_hv0', 'planner_node_av0', 'recorder_node', 'drivability_node',
-         'timesync_node', 'marker_node'}
+         'timesync_node', 'marker_node', 'criticality_node'}
 
 
 @pytest.fixture(scope='module')
@@ -97,6 +106,28 @@ def test_a_run_leaves_its_four_outputs(finished: Launcher) -> None:
     assert not finished.says('Traceback|ERROR|WARN')
 
 
+def test_criticality_is_the_same_live_and_from_the_bag(finished: Launcher) -> None:
+    """Each recorded row, to the last bit; and the node tells of each vehicle."""
+    with BagReader(finished.out / 'bag') as reader:
+        live = np.concatenate([
+            read_criticality_rows(item.message.layout.dim[1].label, item.message.data)
+            for item in reader.decoded([CRITICALITY_TOPIC])])
+        told = {status.name for item in reader.decoded(['/diagnostics'])
+                for status in item.message.status}
+    # Its subscriptions know the simulation within a second; none waits for it, as for planners.
+    first = int(live[0, 1])
+    assert first <= 1.0 / DT_S
+    assert sorted(set(live[:, 1].tolist())) == list(range(first, STEPS + 1, STEPS_PER_TICK))
+    assert np.isfinite(live[:, COLUMNS.index('min_distance')]).all()
+    blocks: list[NDArray[np.float64]] = []
+    log = read_run_log(finished.out / 'bag')
+    measure_log(log, on_tick=lambda it: blocks.append(criticality_rows(it, 0, it.n)))
+    again = np.concatenate(blocks)
+    # Others' accelerations, differences from step to step, are known from its second step on.
+    assert np.array_equal(live[live[:, 1] > first], again[again[:, 1] > first], equal_nan=True)
+    assert {'criticality_node: hv0', 'criticality_node: av0'} <= told
+
+
 def test_the_timing_report_has_table_one(finished: Launcher) -> None:
     """`timing.json` has CRG's table I and what the plans did, with plausible numbers."""
     report = json.loads((finished.out / 'timing.json').read_text())
@@ -124,7 +155,8 @@ def test_every_status_has_the_time_of_the_run_and_an_owner(finished: Launcher) -
                 stamps.setdefault(status.name, []).append(
                     stamp.sec * 1_000_000_000 + stamp.nanosec)
     assert {'/sim_node', '/planner_node_av0', '/recorder_node', '/drivability_node',
-            '/timesync_node'} <= owners.keys() <= {f'/{name}' for name in NODES}
+            '/timesync_node', '/criticality_node'} <= owners.keys() <= {
+                f'/{name}' for name in NODES}
     assert all(owner.split('/')[1].startswith(name.partition(':')[0].partition('_node')[0])
                for owner, names in owners.items() for name in names if ':' in name)
     first_ns, last_ns = (value.sec * 1_000_000_000 + value.nanosec

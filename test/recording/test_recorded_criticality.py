@@ -35,9 +35,7 @@ import pytest
 def observed(request: pytest.FixtureRequest) -> tuple[Criticality, OfflineResult]:
     """Run a game offline under observation."""
     setup = build_setup(load_game(scenarios_directory() / f'{request.param}.yaml'))
-    problems = {each.planning_problem_id: each for each in setup.loaded.planning_problems}
-    criticality = Criticality(observed_run(setup), [
-        *[None] * len(setup.humans), *[problems[av.spec.planning_problem] for av in setup.avs]])
+    criticality = Criticality(observed_run(setup))
     drivers, intervals_s = recorded_inputs(setup)
     return criticality, run_offline(setup, drivers=drivers, intervals_s=intervals_s,
                                     observers=[criticality])

@@ -220,6 +220,7 @@ def test_nodes_are_those_of_the_game(graph: Graph) -> None:
     """One process each; a driver for each human and a planner for each AV, named after them."""
     case = graph.case
     expected = {('sim_node',), ('recorder_node',), ('drivability_node',), ('timesync_node',),
+                ('criticality_node',),
                 ('marker_node',), ('cockpit_node',),
                 *((f'driver_node_{item}',) for item in case.humans),
                 *((f'planner_node_{item}',) for item in case.avs),

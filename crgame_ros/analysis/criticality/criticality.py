@@ -19,12 +19,10 @@ The same code looks on at offline runs, and at recordings. All definitions are i
 `docs/criticality.md`; distances are bumper to bumper, along the subject's own path.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple
 
-from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.criticality.car_following_measures import (
     deceleration_to_avoid_crash,
     required_acceleration,
@@ -89,7 +87,9 @@ MEASURES = {
     'min_distance': Measure('m', -1, math.nan, 'distance of the footprints'),
 }
 COLUMN = {name: column for column, name in enumerate(MEASURES)}
+UNDEFINED = np.array([measure.undefined for measure in MEASURES.values()])
 _OF_LEADER = COLUMN['ttc_2d']
+_SENSES = np.array([float(measure.worst) for measure in MEASURES.values()])
 
 
 class TickMeasures(NamedTuple):
@@ -105,6 +105,23 @@ class TickMeasures(NamedTuple):
     subject: int
     others: NDArray[np.int64]
     values: FloatArray
+
+    def worst(self) -> tuple[FloatArray, NDArray[np.int64]]:
+        """
+        Give the most critical value of each measure, and who it is of.
+
+        :return: (measures) values, as undefined where there is none, and (measures) numbers of
+            others, -1 there.
+        """
+        if not len(self.others):
+            return UNDEFINED.copy(), np.full(len(UNDEFINED), -1)
+        ranks = self.values * _SENSES
+        ranks[(self.values == UNDEFINED) | np.isnan(self.values)] = -np.inf
+        rows = ranks.argmax(axis=0)
+        columns = np.arange(len(rows))
+        there = ranks[rows, columns] > -np.inf
+        return (np.where(there, self.values[rows, columns], UNDEFINED),
+                np.where(there, self.others[rows], -1))
 
 
 @dataclass
@@ -138,15 +155,17 @@ class Criticality:
     """
     Measures every scenario tick of a run (`RunObserver`).
 
-    :param run: what is known of it beforehand.
-    :param problems: (V) planning problems whose goals the vehicles' routes lead to; whoever has
-        none follows its lane.
+    :param run: what is known of it beforehand; who has no planning problem follows its lane.
     :param thresholds: what counts as critical.
+    :ivar vehicles: how many are driven.
+    :ivar ids: of everybody: driven vehicles, then objects.
+    :ivar n: simulation step that was measured last; -1 before the first.
+    :ivar latest: what each vehicle had left then.
+    :ivar new_crossings: crossings that are known since then.
     """
 
-    def __init__(self, run: ObservedRun, problems: Sequence[PlanningProblem | None] = (),
-                 thresholds: Thresholds = USUAL) -> None:
-        self._vehicles = len(run.vehicles)
+    def __init__(self, run: ObservedRun, thresholds: Thresholds = USUAL) -> None:
+        self.vehicles = len(run.vehicles)
         everybody = (*run.vehicles, *run.others)
         self.ids = tuple(item.id for item in everybody)
         self.thresholds = thresholds
@@ -164,10 +183,11 @@ class Criticality:
         roads = RoadNetwork(run.loaded.scenario.lanelet_network)
         self._paths = OwnPaths(roads, [
             frozenset() if problem is None else goal_lanelets(roads, problem)
-            for problem in problems or (None,) * self._vehicles])
-        self._crossings = CrossedWays(self._vehicles, self._radii)
+            for problem in run.problems or (None,) * self.vehicles])
+        self._crossings = CrossedWays(self.vehicles, self._radii)
         self._before: tuple[float, FloatArray] | None = None
         self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, []) for item in run.vehicles]
+        self.n = -1
         self.latest: tuple[TickMeasures, ...] = ()
         self.new_crossings: tuple[WayCrossed, ...] = ()
 
@@ -176,7 +196,7 @@ class Criticality:
         """Measure a published state, if it is that of a tick (`RunObserver`)."""
         if objects is None or since_tick_s != 0.0:
             return
-        time_s = n * self._scheduler.dt_s
+        self.n, time_s = n, n * self._scheduler.dt_s
         centers = shifted(vehicle_states[:, :3], self._rear_to_center)
         velocities = shifted_velocities(centers[:, 2], pose_rates(vehicle_states),
                                         self._rear_to_center)[:, :2]
@@ -186,7 +206,7 @@ class Criticality:
         placed_outlines = placed(self._outlines, poses)
         self.latest = tuple(
             self._measure(subject, poses, moves, accelerations, placed_outlines)
-            for subject in range(self._vehicles) if math.isfinite(poses[subject, 0]))
+            for subject in range(self.vehicles) if math.isfinite(poses[subject, 0]))
         self.new_crossings = tuple(self._crossings.observe(
             time_s, placed_outlines, poses[:, :2]))
         self._sum_up(time_s)
@@ -219,8 +239,8 @@ class Criticality:
         if self._before is not None and time_s > self._before[0]:
             lapse = time_s - self._before[0]
             result = np.nan_to_num((moves - self._before[1]) / lapse)
-        own, yaw = states[:, StateColumn.ACCELERATION], poses[:self._vehicles, 2]
-        result[:self._vehicles] = own[:, None] * np.column_stack((np.cos(yaw), np.sin(yaw)))
+        own, yaw = states[:, StateColumn.ACCELERATION], poses[:self.vehicles, 2]
+        result[:self.vehicles] = own[:, None] * np.column_stack((np.cos(yaw), np.sin(yaw)))
         self._before = (time_s, moves)
         return result
 
@@ -265,25 +285,21 @@ class Criticality:
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s
-        for subject, others, values in self.latest:
-            found = self._found[subject]
-            for column, (name, measure) in enumerate(MEASURES.items()):
-                defined = np.flatnonzero(values[:, column] != measure.undefined)
-                ranks = measure.worst * values[defined, column]
-                defined, ranks = defined[~np.isnan(ranks)], ranks[~np.isnan(ranks)]
-                if not len(ranks):
-                    continue
-                row = defined[np.argmax(ranks)]
-                value, known = float(values[row, column]), found.worst.get(name)
-                if known is None or measure.worst * (value - known.value) > 0.0:
-                    found.worst[name] = Worst(value, self.ids[others[row]], time_s)
-            short = self.thresholds.ttc_s - values[:, COLUMN['ttc']].min(initial=np.inf)
+        for tick in self.latest:
+            found = self._found[tick.subject]
+            values, others = (each.tolist() for each in tick.worst())
+            for name, value, other in zip(MEASURES, values, others, strict=True):
+                known = found.worst.get(name)
+                if other >= 0 and (known is None
+                                   or MEASURES[name].worst * (value - known.value) > 0.0):
+                    found.worst[name] = Worst(value, self.ids[other], time_s)
+            short = self.thresholds.ttc_s - values[COLUMN['ttc']]
             if short > 0.0:
                 found.tet_s += step_s
-                found.tit += step_s * float(short)
+                found.tit += step_s * short
         for crossing in self.new_crossings:
             for number in (crossing.first, crossing.second):
-                if number < self._vehicles:
+                if number < self.vehicles:
                     self._found[number].crossings.append(crossing)
 
 

@@ -21,29 +21,28 @@ from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.scenario.loading import parse_scenario
-from crgame_ros.simulation.observer import ObservedRun
+from crgame_ros.simulation.observer import documented_run
 
 
 def measure_log(log: RunLog, thresholds: Thresholds = USUAL,
-                progress: Callable[[float], object] = lambda _: None) -> Criticality:
+                progress: Callable[[float], object] = lambda _: None,
+                on_tick: Callable[[Criticality], object] = lambda _: None) -> Criticality:
     """
     Measure every scenario step of a run.
 
     :param log: of a recording (`read_run_log`) or of an offline run (`run_log_of`).
     :param progress: is told how much has been measured, from 0 to 1.
+    :param on_tick: is given the observer after each step, to take what it found there.
     :raises InputError: if the scenario in it cannot be used.
     """
     game = log.game
     loaded = parse_scenario(log.xml_text, '/scenario/xml')
-    problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
-    run = ObservedRun(log.vehicles, log.objects, loaded, game.scheduler, game.drivability, None,
-                      tuple(av.transform for av in game.avs), log.vehicle_states[0])
-    criticality = Criticality(
-        run, [*[None] * len(game.humans),
-              *[problems.get(av.planning_problem) for av in game.avs]], thresholds)
+    run = documented_run(game, loaded, log.descriptions)
+    criticality = Criticality(run, thresholds)
     for row, k in enumerate(log.ks.tolist()):
         n = (k - game.scheduler.k0) * game.scheduler.steps_per_tick
-        criticality.observe(n, 0.0, log.vehicle_states[row],
+        criticality.observe(n, 0.0, log.published_states[row],
                             ObjectStates(log.object_poses[row], log.object_velocities[row]))
+        on_tick(criticality)
         progress((row + 1) / len(log.ks))
     return criticality

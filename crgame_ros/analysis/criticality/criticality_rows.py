@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The rows of `/criticality`: what each driven vehicle has left to whom, tick by tick."""
+
+from collections.abc import Sequence
+
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, UNDEFINED
+from crgame_ros.errors import InputError
+import numpy as np
+from numpy.typing import NDArray
+
+CRITICALITY_TOPIC = '/criticality'
+PLACE_COLUMNS = ('epoch', 'n', 'subject', 'other')
+# What stands in a row; pet is there at the tick at which the second has come.
+COLUMNS = (*PLACE_COLUMNS, *MEASURES, 'pet')
+PET = COLUMNS.index('pet')
+
+FloatArray = NDArray[np.float64]
+
+
+def criticality_rows(criticality: Criticality, epoch: int, n: int) -> FloatArray:
+    """
+    Give the rows (P, `COLUMNS`) of what was observed last: one for each pair that is near.
+
+    :param epoch: counts resets.
+    :param n: simulation step of the tick.
+    """
+    blocks = []
+    for subject, others, values in criticality.latest:
+        block = np.full((len(others), len(COLUMNS)), np.nan)
+        block[:, :len(PLACE_COLUMNS)] = np.column_stack((
+            np.broadcast_to((epoch, n, subject), (len(others), 3)), others))
+        block[:, len(PLACE_COLUMNS):PET] = values
+        blocks.append(block)
+    rows = np.concatenate(blocks) if blocks else np.empty((0, len(COLUMNS)))
+    for crossing in criticality.new_crossings:
+        for subject, other in ((crossing.first, crossing.second),
+                               (crossing.second, crossing.first)):
+            if subject >= criticality.vehicles:
+                continue
+            known = np.flatnonzero((rows[:, 2] == subject) & (rows[:, 3] == other))
+            if not len(known):
+                # Whom one has crossed may be far away by now.
+                rows = np.concatenate((rows, [[epoch, n, subject, other, *UNDEFINED, np.nan]]))
+                known = np.array([len(rows) - 1])
+            rows[known, PET] = crossing.pet_s
+    return rows
+
+
+def read_criticality_rows(label: str, data: Sequence[float]) -> FloatArray:
+    """
+    Read the rows (P, `COLUMNS`) of a message.
+
+    :param label: of the second dimension: the columns, separated by commas.
+    :param data: the flattened rows.
+    :raises InputError: if columns are missing, or rows are not whole.
+    """
+    columns = label.split(',')
+    place = {name: index for index, name in enumerate(columns)}
+    missing = [name for name in COLUMNS if name not in place]
+    if missing or len(data) % len(columns):
+        raise InputError('has other columns: ' + ', '.join(columns)[:200], CRITICALITY_TOPIC,
+                         'record with this version')
+    rows = np.array(data, dtype=np.float64).reshape(-1, len(columns))
+    return rows[:, [place[name] for name in COLUMNS]]

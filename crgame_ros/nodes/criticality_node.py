@@ -1,0 +1,120 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""criticality_node: how much time, room and braking is left to every driven vehicle."""
+
+from array import array
+import time
+
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, TickMeasures
+from crgame_ros.analysis.criticality.criticality_rows import (
+    COLUMNS,
+    criticality_rows,
+    CRITICALITY_TOPIC,
+)
+from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.ros.node_main import run_node
+from crgame_ros.ros.number_parameters import declare_number
+from crgame_ros.ros.observer_node import ObserverNode
+from crgame_ros.simulation.observer import ObservedRun
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+HEARTBEAT_S = 1.0
+GREATEST = 1000.0
+
+
+class CriticalityNode(ObserverNode[Criticality]):
+    """
+    Measures each scenario tick, and publishes its rows.
+
+    On /diagnostics it tells of each vehicle when it becomes critical or no longer is, and every
+    second.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('criticality_node')
+        bounds = 0.0, GREATEST
+        self._thresholds = Thresholds(
+            declare_number(self, 'ttc', USUAL.ttc_s,
+                           'smaller times to collision are critical [s]', bounds),
+            declare_number(self, 'drac', USUAL.drac,
+                           'greater decelerations to avoid a crash are critical [m/s^2]', bounds),
+            declare_number(self, 'pet', USUAL.pet_s,
+                           'smaller post-encroachment times are critical [s]', bounds))
+        self._rows = self.endpoints.publisher(CRITICALITY_TOPIC)
+        self._message = Float64MultiArray()
+        self._message.layout.dim = [
+            MultiArrayDimension(label='pairs'),
+            MultiArrayDimension(label=','.join(COLUMNS), size=len(COLUMNS), stride=len(COLUMNS))]
+        self._told: dict[int, bool] = {}
+        self._heartbeat_s = 0.0
+        self._n = -1
+
+    def make(self, run: ObservedRun) -> Criticality:
+        """Make the observer of a run."""
+        self._told, self._n, self._heartbeat_s = {}, -1, 0.0
+        return Criticality(run, self._thresholds)
+
+    def tell(self, observer: Criticality, stamp_ns: int) -> None:
+        """Publish what a tick has brought."""
+        if observer.n == self._n:
+            return
+        self._n = observer.n
+        rows = criticality_rows(observer, self.epoch, observer.n)
+        self._message.layout.dim[0].size = len(rows)
+        self._message.layout.dim[0].stride = rows.size
+        self._message.data = array('d', rows.tobytes())
+        self._rows.publish(self._message)
+        beats = time.monotonic() - self._heartbeat_s > HEARTBEAT_S
+        if beats:
+            self._heartbeat_s = time.monotonic()
+        for tick in observer.latest:
+            self._tell_vehicle(observer, tick, stamp_ns, beats)
+
+    def _tell_vehicle(self, observer: Criticality, tick: TickMeasures, stamp_ns: int,
+                      beats: bool) -> None:
+        """Tell of one vehicle, if it is time."""
+        values, others = (each.tolist() for each in tick.worst())
+        now = {name: (value, other) for name, value, other in zip(
+            MEASURES, values, others, strict=True) if other >= 0}
+        critical = [f'{name} {value:.2f} {MEASURES[name].unit} to {observer.ids[other]}'
+                    for name, (value, other) in now.items()
+                    if self._thresholds.exceeded(name, value)]
+        if not beats and self._told.get(tick.subject, False) == bool(critical):
+            return
+        self._told[tick.subject] = bool(critical)
+        found = observer.report()[tick.subject]
+        told = {'n': observer.n, 'tet_s': f'{found.tet_s:.2f}', 'tit_s2': f'{found.tit:.2f}'}
+        for name, (value, other) in now.items():
+            told[name], told[f'{name}_of'] = f'{value:.3f}', observer.ids[other]
+        for name, worst in found.worst.items():
+            told[f'worst_{name}'] = f'{worst.value:.3f}'
+            told[f'worst_{name}_of'] = worst.other
+            told[f'worst_{name}_at'] = f'{worst.time_s:.2f}'
+        told |= {f'threshold_{name.removesuffix("_s")}': f'{value:g}'
+                 for name, value in self._thresholds._asdict().items()}
+        self.endpoints.diagnostics.publish(
+            f'criticality_node: {found.vehicle_id}',
+            DiagnosticStatus.WARN if critical else DiagnosticStatus.OK,
+            '; '.join(critical) or 'not critical', told, stamp_ns)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(CriticalityNode, args)
+
+
+if __name__ == '__main__':
+    main()
