@@ -29,6 +29,8 @@ PREDICTION_COLUMNS = 3
 ESTIMATE_WIDTH = 8
 # Of a scan before its ranges: x, y, yaw, first angle, increment, longest range, period.
 SCAN_WIDTH = 7
+# Of a vehicle's criticality: its index, then value and whom it is to, of ten measures.
+CRITICALITY_COLUMNS = 21
 
 _FLOAT = np.dtype('<f8')
 
@@ -44,6 +46,7 @@ class FrameKind(IntEnum):
     ESTIMATE = 6
     SEEN = 7
     OCCUPANCY = 8
+    CRITICALITY = 9
 
 
 def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> bytes:
@@ -198,6 +201,23 @@ def encode_occupancy(epoch: int, n: int, k: int, t: float, origin: tuple[float, 
     bits = np.packbits(occupied, axis=None, bitorder='little').tobytes()
     return _flat((FrameKind.OCCUPANCY, epoch, n, k, t, *origin, resolution,
                   *occupied.shape)) + bits + bytes(-len(bits) % _FLOAT.itemsize)
+
+
+def encode_criticality(epoch: int, n: int, k: int, t: float, rows: ArrayLike) -> bytes:
+    """
+    Write what is left to the driven vehicles.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    :param rows: (S, 21) index of the vehicle; then of gap [m], time_gap, thw, ttc, ttc_a [s],
+        drac, a_req [m/s^2], ttc_2d [s], min_distance [m] and pet [s] the most critical value and
+        whom it
+        is to: 0 to V - 1 are vehicles, objects follow from V, -1 is nobody.
+    :raises InputError: if the array has another width.
+    """
+    return _rows(FrameKind.CRITICALITY, epoch, n, k, t, (), rows, CRITICALITY_COLUMNS)
 
 
 def _flat(*parts: ArrayLike) -> bytes:

@@ -17,6 +17,11 @@
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+from crgame_ros.analysis.criticality.criticality_rows import (
+    CRITICALITY_TOPIC,
+    most_critical_rows,
+    read_criticality_rows,
+)
 from crgame_ros.cockpit import frames
 from crgame_ros.cockpit.perception_frames import estimate_frame, occupancy_frame, Place, scan_frame
 from crgame_ros.cockpit.sensor_mounts import SensorMounts
@@ -151,6 +156,23 @@ class MessageFrames:
         if scan is None or scan.av != av:
             return None
         return Frame(f'scan:{scan.column}:{scan.sensor}', scan.frame)
+
+    def criticality(self, message: Any) -> Frame | None:
+        """Make the frame of `/criticality`; None if it is of another run."""
+        if len(message.layout.dim) != 2:
+            raise InputError('has no two dimensions', CRITICALITY_TOPIC)
+        return self.criticality_of(
+            read_criticality_rows(message.layout.dim[1].label, message.data))
+
+    def criticality_of(self, rows: FloatArray) -> Frame | None:
+        """Make the frame of the rows of one step; None if nobody is near, or of another run."""
+        if not len(rows) or not (rows[:, :2] == (self._game.epoch, rows[0, 1])).all():
+            return None
+        numbers = rows[:, 2:4]
+        if not ((numbers >= 0) & (numbers < len(self.columns))).all() or rows[0, 1] < 0:
+            raise InputError('names somebody who takes no part', CRITICALITY_TOPIC)
+        return Frame('criticality', frames.encode_criticality(
+            *self.place(int(rows[0, 1])), most_critical_rows(rows)))
 
     def occupancy(self, place: Place, message: Any) -> Frame:
         """Make the frame of the map of permanent obstacles, which holds from a place on."""

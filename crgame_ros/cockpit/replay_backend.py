@@ -24,6 +24,7 @@ from typing import Any, Literal, TYPE_CHECKING
 
 from aiohttp import web
 from crgame_ros.cockpit.replay_chunks import ChunkBuilder
+from crgame_ros.cockpit.replay_criticality import criticality_frames
 from crgame_ros.cockpit.replay_index import index_run, RunIndex
 from crgame_ros.cockpit.replay_marks import Mark
 from crgame_ros.cockpit.scene import scene_document
@@ -82,6 +83,10 @@ class Replay:
             self._chunks[number] = data
         self._chunks.move_to_end(number)
         return self._chunks[number]
+
+    def criticality(self, path: Path) -> bytes:
+        """Give the CRITICALITY frames of the whole run, each after its length in bytes."""
+        return criticality_frames(self._reader, self.index.run, path)
 
     def info(self) -> dict[str, Any]:
         """Describe the run: its times, its marks and its documents over time."""
@@ -191,11 +196,15 @@ class ReplayBackend:
     def _outline(self, epoch: int | None) -> bytes:
         return self._run(self.epoch if epoch is None else epoch).index.outline.encoded()
 
+    def _criticality(self, epoch: int | None) -> bytes:
+        return self._run(self.epoch if epoch is None else epoch).criticality(self.path)
+
     def routes(self) -> list[web.RouteDef]:
         """Give what the server is to answer besides the page."""
         return [web.get('/api/replay/info', self._answer_info),
                 web.get('/api/replay/chunk', self._answer_chunk),
-                web.get('/api/replay/outline', self._answer_outline)]
+                web.get('/api/replay/outline', self._answer_outline),
+                web.get('/api/replay/criticality', self._answer_criticality)]
 
     async def _answer_info(self, request: web.Request) -> web.Response:
         content = await self._read(self._info, self._asked_epoch(request))
@@ -215,6 +224,10 @@ class ReplayBackend:
 
     async def _answer_outline(self, request: web.Request) -> web.Response:
         data = await self._read(self._outline, self._asked_epoch(request))
+        return web.Response(body=data, content_type='application/octet-stream')
+
+    async def _answer_criticality(self, request: web.Request) -> web.Response:
+        data = await self._read(self._criticality, self._asked_epoch(request))
         return web.Response(body=data, content_type='application/octet-stream')
 
     async def _read(self, what: Callable[..., Any], *arguments: Any) -> Any:

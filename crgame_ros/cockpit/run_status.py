@@ -24,6 +24,7 @@ from crgame_ros.messages.status_values import Status, status_truth
 OK, ERROR = 0, 2
 # Late traffic is told at each late tick, and never that it is in time again [s].
 LATE_TRAFFIC_S = 2.0
+_WORST, _OF, _THRESHOLD = 'worst_', '_of', 'threshold_'
 TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')
                  for name in ('lane', 'lateral', 'along', 'heading', 'speed'))
 
@@ -77,6 +78,7 @@ class RunStatus:
         self.timing: dict[str, Any] | None = None
         self.planners: dict[str, dict[str, Any]] = {}
         self.drivability: dict[str, dict[str, Any]] = {}
+        self.criticality: dict[str, dict[str, Any]] = {}
         self.seats_lost = {}
         self.contacts: list[dict[str, Any]] = []
         self.departures: list[dict[str, Any]] = []
@@ -125,6 +127,8 @@ class RunStatus:
         elif node == 'sim_node' and rest == 'seat':
             self.seats_lost[vehicle] = level != OK
             self._alarm('lost_device', vehicle, level != OK, 'nobody drives', t)
+        elif node == 'criticality_node':
+            self.criticality[vehicle] = _criticality(level, values)
         elif node == 'driver_node':
             self._alarm('lost_device', vehicle, level == ERROR, text, t)
 
@@ -142,7 +146,8 @@ class RunStatus:
                 'departures': self.departures,
                 'real_time_factor': self.real_time_factor, 'recording': self.recording,
                 'timing': self.timing, 'planners': self.planners,
-                'drivability': self.drivability, 'seats_lost': {} if over else self.seats_lost}
+                'drivability': self.drivability, 'criticality': self.criticality,
+                'seats_lost': {} if over else self.seats_lost}
 
     def alarms_document(self) -> dict[str, Any]:
         """Give the alarms document."""
@@ -233,6 +238,19 @@ def _tracking(values: Mapping[str, str]) -> dict[str, float | None] | None:
     if TRACKING[0] not in values:
         return None
     return {name: _number(values.get(name)) for name in TRACKING}
+
+
+def _criticality(level: int, values: Mapping[str, str]) -> dict[str, Any]:
+    """Read what is told of a vehicle's criticality: the worst so far, and what counts as it."""
+    worst = {name[len(_WORST):-len(_OF)]: other for name, other in values.items()
+             if name.startswith(_WORST) and name.endswith(_OF)}
+    return {'critical': level != OK, 'tet_s': _number(values.get('tet_s')),
+            'tit_s2': _number(values.get('tit_s2')),
+            'worst': {name: {'value': _number(values.get(f'{_WORST}{name}')), 'of': other,
+                             't': _number(values.get(f'{_WORST}{name}_at'))}
+                      for name, other in worst.items()},
+            'thresholds': {name.removeprefix(_THRESHOLD): _number(value)
+                           for name, value in values.items() if name.startswith(_THRESHOLD)}}
 
 
 def _number(text: str | None) -> float | None:

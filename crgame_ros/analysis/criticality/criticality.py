@@ -92,6 +92,27 @@ _OF_LEADER = COLUMN['ttc_2d']
 _SENSES = np.array([float(measure.worst) for measure in MEASURES.values()])
 
 
+def most_critical(values: FloatArray, others: NDArray[np.int64]
+                  ) -> tuple[FloatArray, NDArray[np.int64]]:
+    """
+    Choose the most critical value of each measure.
+
+    :param values: (P, measures) columns as in `MEASURES`.
+    :param others: (P) whom they are to.
+    :return: (measures) values, as undefined where there is none, and (measures) whom they are to,
+        -1 there.
+    """
+    if not len(others):
+        return UNDEFINED.copy(), np.full(len(UNDEFINED), -1)
+    ranks = values * _SENSES
+    ranks[(values == UNDEFINED) | np.isnan(values)] = -np.inf
+    rows = ranks.argmax(axis=0)
+    columns = np.arange(len(rows))
+    there = ranks[rows, columns] > -np.inf
+    return (np.where(there, values[rows, columns], UNDEFINED),
+            np.where(there, others[rows], -1))
+
+
 class TickMeasures(NamedTuple):
     """
     What a subject has left at a tick.
@@ -107,21 +128,8 @@ class TickMeasures(NamedTuple):
     values: FloatArray
 
     def worst(self) -> tuple[FloatArray, NDArray[np.int64]]:
-        """
-        Give the most critical value of each measure, and who it is of.
-
-        :return: (measures) values, as undefined where there is none, and (measures) numbers of
-            others, -1 there.
-        """
-        if not len(self.others):
-            return UNDEFINED.copy(), np.full(len(UNDEFINED), -1)
-        ranks = self.values * _SENSES
-        ranks[(self.values == UNDEFINED) | np.isnan(self.values)] = -np.inf
-        rows = ranks.argmax(axis=0)
-        columns = np.arange(len(rows))
-        there = ranks[rows, columns] > -np.inf
-        return (np.where(there, self.values[rows, columns], UNDEFINED),
-                np.where(there, self.others[rows], -1))
+        """Give the most critical value of each measure, and to whom (`most_critical`)."""
+        return most_critical(self.values, self.others)
 
 
 @dataclass

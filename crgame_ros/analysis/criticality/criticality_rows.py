@@ -15,8 +15,14 @@
 """The rows of `/criticality`: what each driven vehicle has left to whom, tick by tick."""
 
 from collections.abc import Sequence
+import math
 
-from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, UNDEFINED
+from crgame_ros.analysis.criticality.criticality import (
+    Criticality,
+    MEASURES,
+    most_critical,
+    UNDEFINED,
+)
 from crgame_ros.errors import InputError
 import numpy as np
 from numpy.typing import NDArray
@@ -75,3 +81,26 @@ def read_criticality_rows(label: str, data: Sequence[float]) -> FloatArray:
                          'record with this version')
     rows = np.array(data, dtype=np.float64).reshape(-1, len(columns))
     return rows[:, [place[name] for name in COLUMNS]]
+
+
+def most_critical_rows(rows: FloatArray) -> FloatArray:
+    """
+    Choose of each subject the most critical values of one tick.
+
+    :param rows: (P, `COLUMNS`)
+    :return: (S, 1 + 2 (measures + 1)) the subject's number; then of each measure, and of pet, the
+        value and the number of whom it is to, -1 where there is none.
+    """
+    subjects = np.unique(rows[:, 2])
+    chosen = np.empty((len(subjects), 1 + 2 * (len(MEASURES) + 1)))
+    for row, subject in zip(chosen, subjects.tolist(), strict=True):
+        mine = rows[rows[:, 2] == subject]
+        others = mine[:, 3].astype(np.int64)
+        row[0] = subject
+        row[1:-2:2], row[2:-2:2] = most_critical(mine[:, len(PLACE_COLUMNS):PET], others)
+        crossed = np.flatnonzero(np.isfinite(mine[:, PET]))
+        row[-2:] = math.nan, -1.0
+        if len(crossed):
+            soonest = crossed[np.argmin(mine[crossed, PET])]
+            row[-2:] = mine[soonest, PET], others[soonest]
+    return chosen

@@ -20,6 +20,7 @@ from dataclasses import asdict
 from pathlib import Path
 import time
 
+from crgame_ros.analysis.criticality.criticality_rows import CRITICALITY_TOPIC
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.message_frames import MessageFrames
@@ -77,6 +78,7 @@ class CockpitFeed:
         self._states = endpoints.polled('/vehicles/state', depth=1)
         self._objects = endpoints.polled('/traffic/objects', depth=1)
         self._cycles = endpoints.polled('/timing/cycle', depth=1)
+        self._criticality = endpoints.polled(CRITICALITY_TOPIC, depth=QUEUE)
         self._signals = endpoints.polled('/scenario/signals')
         self._fired = endpoints.polled('/scenario/events')
         self._frame_skip = endpoints.polled('/timing/frame_skip')
@@ -114,7 +116,7 @@ class CockpitFeed:
         if now_s - self._slow_s >= SLOW_PERIOD_S:
             self._slow_s = now_s
             for work in (self._poll_documents, self._poll_plans, self._poll_perception,
-                         self._poll_texts, self._poll_diagnostics):
+                         self._poll_texts, self._poll_criticality, self._poll_diagnostics):
                 _read(work, problems)
         for work in (self._poll_commands, self._poll_states, self._poll_objects):
             _read(work, problems)
@@ -202,6 +204,15 @@ class CockpitFeed:
             return
         with suppress(InputError):
             self._hub.send_frame(*frames.objects(place, message))
+
+    def _poll_criticality(self) -> None:
+        for _ in range(QUEUE):
+            message = self._criticality.take()
+            if message is None:
+                return
+            if self._frames is not None \
+                    and (frame := self._frames.criticality(message)) is not None:
+                self._hub.send_frame(*frame)
 
     def _poll_texts(self) -> None:
         if self.scenario is None:

@@ -5,6 +5,7 @@
 /** Frame kinds, the first value of a frame. */
 export const KIND = Object.freeze({
   STATE: 1, OBJECTS: 2, PLAN: 3, PREDICTION: 4, SCAN: 5, ESTIMATE: 6, SEEN: 7, OCCUPANCY: 8,
+  CRITICALITY: 9,
 });
 
 /** Columns of a vehicle's row in a STATE frame. */
@@ -17,6 +18,12 @@ export const VEHICLE = Object.freeze({
 export const VEHICLE_WIDTH = 12;
 export const OBJECT_WIDTH = 6;
 export const PLAN_WIDTH = 5;
+
+/** Measures of a vehicle's row in a CRITICALITY frame, each a value and whom it is to. */
+export const MEASURES = /** @type {const} */ ([
+  'gap', 'time_gap', 'thw', 'ttc', 'ttc_a', 'drac', 'a_req', 'ttc_2d', 'min_distance', 'pet',
+]);
+export const CRITICALITY_WIDTH = 1 + 2 * MEASURES.length;
 
 const HEADER = 5;
 
@@ -41,8 +48,10 @@ const HEADER = 5;
  * @typedef {Head & {kind: typeof KIND.SCAN} & Scan} ScanFrame
  * @typedef {Head & {kind: typeof KIND.ESTIMATE} & Estimate} EstimateFrame
  * @typedef {Head & {kind: typeof KIND.OCCUPANCY} & Occupancy} OccupancyFrame
+ * @typedef {Head & {kind: typeof KIND.CRITICALITY, rows: Float64Array}} CriticalityFrame
  * @typedef {ScanFrame|EstimateFrame|SeenFrame|OccupancyFrame} PerceptionFrame
- * @typedef {StateFrame|ObjectsFrame|PlanFrame|PredictionFrame|PerceptionFrame} Frame
+ * @typedef {StateFrame|ObjectsFrame|PlanFrame|PredictionFrame|PerceptionFrame|
+ *   CriticalityFrame} Frame
  */
 
 /**
@@ -126,6 +135,8 @@ export function decodeFrame(buffer) {
       };
     case KIND.OCCUPANCY:
       return { ...head, kind, ...occupancy(buffer, rows) };
+    case KIND.CRITICALITY:
+      return { ...head, kind, rows: rows(HEADER + 1, values[HEADER], CRITICALITY_WIDTH) };
     default:
       return null;
   }

@@ -22,6 +22,7 @@ const PARTS = [
   ['./panels/timing.js', 'createTiming', '#timekeeping', 'timing'],
   ['./panels/outcome.js', 'createOutcome', '#outcome', 'outcome'],
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
+  ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];

@@ -184,6 +184,17 @@ export {};
 /** @typedef {{vehicle: string, with: string, side: string, avoidable_by: string}} NamedContact */
 
 /**
+ * What has been worst so far, by measure, and what counts as critical.
+ *
+ * @typedef {object} Criticality
+ * @property {boolean} critical now
+ * @property {number|null} tet_s
+ * @property {number|null} tit_s2
+ * @property {Record<string, {value: number|null, of: string, t: number|null}>} worst
+ * @property {Record<string, number|null>} thresholds
+ */
+
+/**
  * @typedef {object} Status
  * @property {RunState} run
  * @property {string} [reason] why it ended
@@ -197,6 +208,7 @@ export {};
  * @property {Timing|null} timing
  * @property {Record<string, PlannerStatus>} planners
  * @property {Record<string, {collision: boolean, off_road: boolean, hit: string[]}>} drivability
+ * @property {Record<string, Criticality>} [criticality]
  * @property {Record<string, boolean>} seats_lost
  * @property {boolean} frames_skipped
  * @property {number} t [s]

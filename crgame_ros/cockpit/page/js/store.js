@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Everything the page knows: the server's documents, and the samples of the running epoch. */
 
+import { CriticalityLog } from './criticality.js';
 import { DisplayClock } from './display_clock.js';
 import { decodeFrame, KIND } from './frames.js';
 import { addToHistory, emptyHistory } from './history.js';
@@ -10,7 +11,7 @@ import { Perceived } from './perceived.js';
 import { SampleRing } from './samples.js';
 
 /** @import { ObjectsFrame, PerceptionFrame, PlanFrame, PredictionFrame } from './frames.js' */
-/** @import { StateFrame } from './frames.js' */
+/** @import { CriticalityFrame, StateFrame } from './frames.js' */
 /** @import { History } from './history.js' */
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
 /** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
@@ -52,6 +53,7 @@ const LATE_S = 0.1;
  * @property {PlanFrame} plan
  * @property {PredictionFrame} prediction
  * @property {PerceptionFrame} perception
+ * @property {CriticalityFrame} criticality
  * @property {number} epoch
  */
 
@@ -93,6 +95,8 @@ export class Store {
   predictions = new Map();
   /** What AVs perceive, and the map of permanent obstacles. */
   perceived = new Perceived();
+  /** What is left to the vehicles; of a replay, over the whole run. */
+  criticality = new CriticalityLog(HISTORY_S);
   // Received raw samples, a few seconds: states and scenario steps.
   /** @type {SampleRing<StateFrame>} */
   samples = new SampleRing(RAW_SAMPLES);
@@ -195,6 +199,10 @@ export class Store {
         this.predictions.set(frame.index, frame);
         this.#emit('prediction', frame);
         break;
+      case KIND.CRITICALITY:
+        this.criticality.take(frame);
+        this.#emit('criticality', frame);
+        break;
       default:
         this.perceived.take(frame);
         this.#emit('perception', frame);
@@ -214,6 +222,9 @@ export class Store {
     this.plans.clear();
     this.predictions.clear();
     this.perceived.clear();
+    if (this.mode !== 'replay') {
+      this.criticality.clear();
+    }
     this.clock.reset();
     this.#shownFor_ms = NaN;
     this.#emit('epoch', epoch);

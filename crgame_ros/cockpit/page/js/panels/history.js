@@ -1,7 +1,8 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The panel of scrolling plots (FastSim's history of the host vehicle). */
+/** A panel of scrolling plots (FastSim's history of the host vehicle). */
 
+import { limitsOf } from '../criticality.js';
 import { element, setAttribute, setText } from '../dom.js';
 import { onThemeChange, themeColor } from '../world/palette.js';
 import { Chart } from './chart.js';
@@ -15,7 +16,7 @@ import { HealthLog } from './series.js';
 /** @import { Store } from '../store.js' */
 /** @import { ChartView } from './chart.js' */
 /** @import { Plotly } from './plotly.js' */
-/** @import { PlotData } from './quantities.js' */
+/** @import { PlotData, Quantity } from './quantities.js' */
 
 const WINDOWS_S = [10, 30, 120];
 const KEPT_S = 120;
@@ -29,10 +30,10 @@ const AHEAD = 0.35;
 const COLOURS = {
   human: ['human', 'series-1', 'series-2'], autonomous: ['av', 'series-3', 'series-4'],
 };
-const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'text-dim', 'surface'];
+const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'text-dim', 'surface', 'alarm'];
 
 /** The panel's parts and what is chosen in it. */
-class HistoryPanel {
+export class HistoryPanel {
   /** Script time of the last redrawing of one plot [ms]. */
   cost_ms = 0;
   /** Redrawings so far. */
@@ -40,6 +41,7 @@ class HistoryPanel {
 
   #root;
   #store;
+  #quantities;
   #health = new HealthLog(KEPT_S);
   /** @type {Map<string, Chart>} */
   #charts = new Map();
@@ -71,12 +73,14 @@ class HistoryPanel {
   #body = element('div', { class: 'charts' });
 
   /**
-   * @param {HTMLElement} root
+   * @param {HTMLElement} root in a panel, or the panel
    * @param {Store} store
+   * @param {Quantity[]} quantities that are plotted
    */
-  constructor(root, store) {
+  constructor(root, store, quantities) {
     this.#root = root;
     this.#store = store;
+    this.#quantities = quantities;
     for (const seconds of WINDOWS_S) {
       this.#windows.append(element('button', {
         type: 'button', text: `${seconds} s`, 'data-seconds': seconds,
@@ -101,6 +105,11 @@ class HistoryPanel {
       requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
+  }
+
+  /** The vehicles that are plotted, in the scene's order. */
+  get selected() {
+    return (this.#store.scene?.vehicles ?? []).filter(({ id }) => this.#selected.has(id));
   }
 
   /** @param {boolean} on whether the plots stand still, to be looked at closely */
@@ -252,7 +261,7 @@ class HistoryPanel {
         observer.disconnect();
         this.#loading = false;
       });
-      observer.observe(this.#root, { attributeFilter: ['hidden'] });
+      observer.observe(panelOf(this.#root), { attributeFilter: ['hidden'] });
     }
   }
 
@@ -268,8 +277,8 @@ class HistoryPanel {
           this.#inView.delete(entry.target);
         }
       }
-    }, { root: this.#root });
-    for (const quantity of QUANTITIES) {
+    }, { root: panelOf(this.#root) });
+    for (const quantity of this.#quantities) {
       const chart = new Chart(library, quantity);
       this.#charts.set(quantity.key, chart);
       this.#body.append(chart.root);
@@ -300,6 +309,7 @@ class HistoryPanel {
     };
     chart.update(traces(chart.quantity, {
       vehicles, health: this.#health, runColor: this.#theme.accent,
+      limitColor: this.#theme.alarm, limits: limitsOf(this.#store.status),
     }, view), view);
   }
 
@@ -313,8 +323,17 @@ class HistoryPanel {
     const vehicles = this.#store.scene?.vehicles ?? [];
     return vehicles.flatMap(({ id, role }, index) => (this.#selected.has(id) ? [{
       id, role, color: colours.get(id) ?? '', past: this.#store.history(index, KEPT_S),
+      critical: (name) => this.#store.criticality.past(index, name),
     }] : []));
   }
+}
+
+/**
+ * @param {HTMLElement} root
+ * @returns {HTMLElement} what is hidden and scrolled together with it
+ */
+function panelOf(root) {
+  return root.closest('.panel') ?? root;
 }
 
 /**
@@ -333,5 +352,5 @@ function childrenOf(root) {
  * @returns {HistoryPanel}
  */
 export function createHistory(root, store) {
-  return new HistoryPanel(root, store);
+  return new HistoryPanel(root, store, QUANTITIES);
 }

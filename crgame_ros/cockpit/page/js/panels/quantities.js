@@ -4,6 +4,7 @@
 
 import { thin, unwrap } from './series.js';
 
+/** @import { Limits, MeasureName } from '../criticality.js' */
 /** @import { VEHICLE } from '../frames.js' */
 /** @import { History } from '../history.js' */
 /** @import { SceneVehicle } from '../messages.js' */
@@ -14,7 +15,8 @@ const DEGREES = 180 / Math.PI;
 const DASHES = ['solid', 'dot'];
 
 /**
- * A line: a column of vehicles' states, a figure of the run's health, or the latency of planners.
+ * A line: a column of vehicles' states, a figure of the run's health, the latency of planners, what
+ * is left to vehicles, or a limit.
  *
  * @typedef {object} ColumnLine
  * @property {keyof typeof VEHICLE} column
@@ -23,7 +25,9 @@ const DASHES = ['solid', 'dot'];
  * @property {boolean} [angle] whether whole turns are removed
  * @typedef {{name: string, health: 'lag'|'step_error'}} HealthLine
  * @typedef {{latency: true, name?: string}} LatencyLine
- * @typedef {ColumnLine|HealthLine|LatencyLine} Line
+ * @typedef {{critical: MeasureName, name?: string}} CriticalLine
+ * @typedef {{limit: keyof Limits, name: string}} LimitLine
+ * @typedef {ColumnLine|HealthLine|LatencyLine|CriticalLine|LimitLine} Line
  */
 
 /**
@@ -37,8 +41,10 @@ const DASHES = ['solid', 'dot'];
  */
 
 /**
- * @typedef {{id: string, role: SceneVehicle['role'], color: string, past: History}} PlottedVehicle
- * @typedef {{vehicles: PlottedVehicle[], health: HealthLog, runColor: string}} PlotData
+ * @typedef {{id: string, role: SceneVehicle['role'], color: string, past: History,
+ *   critical: (name: MeasureName) => {t: number[], values: number[]}}} PlottedVehicle
+ * @typedef {{vehicles: PlottedVehicle[], health: HealthLog, runColor: string,
+ *   limitColor: string, limits: Limits}} PlotData
  * @typedef {Pick<ChartView, 'from'|'to'|'shown'>} PlotWindow
  */
 
@@ -93,16 +99,34 @@ export function traces(quantity, data, view) {
       return [trace(line.name, data.runColor, DASHES[i], data.health.t,
         data.health.column(line.health), view)];
     }
+    if ('limit' in line) {
+      return [{
+        name: line.name, color: data.limitColor, dash: 'dash', x: [view.from, view.to],
+        y: [data.limits[line.limit], data.limits[line.limit]], now: data.limits[line.limit],
+      }];
+    }
     const vehicles = 'latency' in line
       ? data.vehicles.filter((vehicle) => vehicle.role === 'autonomous') : data.vehicles;
     return vehicles.map((vehicle) => {
       const name = line.name ? `${vehicle.id} ${line.name}` : vehicle.id;
-      const [t, values] = 'latency' in line
-        ? [data.health.t, data.health.latency(vehicle.id)]
-        : [vehicle.past.t, column(vehicle.past, line)];
+      const { t, values } = series(vehicle, line, data.health);
       return trace(name, vehicle.color, DASHES[i], t, values, view);
     });
   });
+}
+
+/**
+ * @param {PlottedVehicle} vehicle
+ * @param {ColumnLine|LatencyLine|CriticalLine} line
+ * @param {HealthLog} health
+ * @returns {{t: number[], values: number[]}}
+ */
+function series(vehicle, line, health) {
+  if ('critical' in line) {
+    return vehicle.critical(line.critical);
+  }
+  return 'latency' in line ? { t: health.t, values: health.latency(vehicle.id) }
+    : { t: vehicle.past.t, values: column(vehicle.past, line) };
 }
 
 /**

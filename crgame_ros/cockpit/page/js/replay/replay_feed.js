@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Feeds the store with a recorded run, as the connection does with a live one. */
 
+import { CriticalityLog } from '../criticality.js';
 import { decodeFrame, KIND } from '../frames.js';
 import { addToHistory, emptyHistory } from '../history.js';
 import { countWhile } from '../search.js';
@@ -51,11 +52,32 @@ export class ReplayFeed {
       this.#outline = unpack(await answer.arrayBuffer()).map(decodeFrame)
         .filter((frame) => frame?.kind === KIND.STATE);
     }).catch(refused);
+    this.#askCriticality(refused);
   }
 
   /** How many chunks are in memory. */
   get chunksHeld() {
     return this.#chunks.size;
+  }
+
+  /**
+   * Have the criticality of the whole run come; it takes a while where nobody recorded it.
+   *
+   * @param {(error: Error) => void} refused
+   */
+  async #askCriticality(refused) {
+    const log = new CriticalityLog(Infinity);
+    this.#store.criticality = log;
+    try {
+      const answer = await ask('criticality', { epoch: this.info.epoch });
+      for (const frame of unpack(await answer.arrayBuffer()).map(decodeFrame)) {
+        if (frame?.kind === KIND.CRITICALITY) {
+          log.take(frame);
+        }
+      }
+    } catch (error) {
+      refused(/** @type {Error} */ (error));
+    }
   }
 
   /**

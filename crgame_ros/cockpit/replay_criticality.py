@@ -1,0 +1,64 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The criticality of a recorded run as frames of the page: as it was told, or measured anew."""
+
+from pathlib import Path
+
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.criticality_rows import criticality_rows, CRITICALITY_TOPIC
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.cockpit.message_frames import MessageFrames
+from crgame_ros.cockpit.replay_outline import pack
+from crgame_ros.errors import InputError
+from crgame_ros.recording.epochs import Epoch
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_log import read_run_log
+
+
+def criticality_frames(reader: BagReader, run: Epoch, path: Path) -> bytes:
+    """
+    Give the frames of the whole run, each after its length in bytes.
+
+    :param reader: the recording.
+    :param run: in it.
+    :param path: of the recording, which is read once more where nobody recorded the measures.
+    :raises InputError: if there are none and the run cannot be measured.
+    """
+    frames = MessageFrames(run.game, run.descriptions)
+    if CRITICALITY_TOPIC in reader.topics:
+        found = []
+        for message in reader.readable([CRITICALITY_TOPIC]):
+            try:
+                frame = frames.criticality(message.message)
+            except (InputError, IndexError, OverflowError):
+                # Anybody may have published on it.
+                continue
+            if frame is not None:
+                found.append(frame.data)
+        if found:
+            return pack(found)
+    return pack(_measured(frames, run, path))
+
+
+def _measured(frames: MessageFrames, run: Epoch, path: Path) -> list[bytes]:
+    found: list[bytes] = []
+
+    def take(criticality: Criticality) -> None:
+        rows = criticality_rows(criticality, run.game.epoch, criticality.n)
+        if (frame := frames.criticality_of(rows)) is not None:
+            found.append(frame.data)
+
+    measure_log(read_run_log(path, run.game.epoch), on_tick=take)
+    return found
