@@ -213,8 +213,7 @@ def encode_criticality(epoch: int, n: int, k: int, t: float, rows: ArrayLike) ->
     :param t: time since the start of the run [s].
     :param rows: (S, 21) index of the vehicle; then of gap [m], time_gap, thw, ttc, ttc_a [s],
         drac, a_req [m/s^2], ttc_2d [s], min_distance [m] and pet [s] the most critical value and
-        whom it
-        is to: 0 to V - 1 are vehicles, objects follow from V, -1 is nobody.
+        whom it is to: 0 to V - 1 are vehicles, objects follow from V, -1 is nobody.
     :raises InputError: if the array has another width.
     """
     return _rows(FrameKind.CRITICALITY, epoch, n, k, t, (), rows, CRITICALITY_COLUMNS)

@@ -24,12 +24,12 @@ from typing import Any, Literal, TYPE_CHECKING
 
 from aiohttp import web
 from crgame_ros.cockpit.replay_chunks import ChunkBuilder
-from crgame_ros.cockpit.replay_criticality import criticality_frames
+from crgame_ros.cockpit.replay_criticality import measured_criticality, recorded_criticality
 from crgame_ros.cockpit.replay_index import index_run, RunIndex
 from crgame_ros.cockpit.replay_marks import Mark
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError
-from crgame_ros.recording.epochs import epoch_numbers, read_epoch
+from crgame_ros.recording.epochs import Epoch, epoch_numbers, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.scenario.loading import parse_scenario
@@ -84,9 +84,9 @@ class Replay:
         self._chunks.move_to_end(number)
         return self._chunks[number]
 
-    def criticality(self, path: Path) -> bytes:
-        """Give the CRITICALITY frames of the whole run, each after its length in bytes."""
-        return criticality_frames(self._reader, self.index.run, path)
+    def criticality(self) -> tuple[Epoch, bytes | None]:
+        """Give the run, and its CRITICALITY frames as somebody recorded them; None if nobody."""
+        return self.index.run, recorded_criticality(self._reader, self.index.run)
 
     def info(self) -> dict[str, Any]:
         """Describe the run: its times, its marks and its documents over time."""
@@ -133,6 +133,8 @@ class ReplayBackend:
         # SQLite and the chunks in memory belong to one thread.
         self._thread = ThreadPoolExecutor(1, 'replay')
         self._runs: OrderedDict[int, Replay] = OrderedDict()
+        self._measuring = asyncio.Lock()
+        self._measured: dict[int, bytes] = {}
         try:
             self._reader, self.epochs = self._thread.submit(self._open).result()
             self.epoch = self.epochs[-1] if epoch is None else epoch
@@ -196,8 +198,8 @@ class ReplayBackend:
     def _outline(self, epoch: int | None) -> bytes:
         return self._run(self.epoch if epoch is None else epoch).index.outline.encoded()
 
-    def _criticality(self, epoch: int | None) -> bytes:
-        return self._run(self.epoch if epoch is None else epoch).criticality(self.path)
+    def _criticality(self, epoch: int) -> tuple[Epoch, bytes | None]:
+        return self._run(epoch).criticality()
 
     def routes(self) -> list[web.RouteDef]:
         """Give what the server is to answer besides the page."""
@@ -227,13 +229,21 @@ class ReplayBackend:
         return web.Response(body=data, content_type='application/octet-stream')
 
     async def _answer_criticality(self, request: web.Request) -> web.Response:
-        data = await self._read(self._criticality, self._asked_epoch(request))
-        return web.Response(body=data, content_type='application/octet-stream')
+        epoch = self._asked_epoch(request)
+        async with self._measuring:
+            if epoch not in self._measured:
+                run, data = await self._read(self._criticality, epoch)
+                if data is None:
+                    # Beside the thread that reads, or nothing would be shown meanwhile.
+                    data = await self._read(measured_criticality, run, self.path, thread=None)
+                self._measured[epoch] = data
+        return web.Response(body=self._measured[epoch], content_type='application/octet-stream')
 
-    async def _read(self, what: Callable[..., Any], *arguments: Any) -> Any:
+    async def _read(self, what: Callable[..., Any], *arguments: Any,
+                    thread: ThreadPoolExecutor | None | Literal['own'] = 'own') -> Any:
         try:
             return await asyncio.get_running_loop().run_in_executor(
-                self._thread, what, *arguments)
+                self._thread if thread == 'own' else thread, what, *arguments)
         except CrgameError as error:
             raise _missing(str(error)) from error
 

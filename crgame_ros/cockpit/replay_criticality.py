@@ -27,32 +27,35 @@ from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_log import read_run_log
 
 
-def criticality_frames(reader: BagReader, run: Epoch, path: Path) -> bytes:
+def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
     """
-    Give the frames of the whole run, each after its length in bytes.
+    Give the frames of the whole run, each after its length in bytes; None if nobody recorded any.
 
     :param reader: the recording.
     :param run: in it.
-    :param path: of the recording, which is read once more where nobody recorded the measures.
-    :raises InputError: if there are none and the run cannot be measured.
+    """
+    if CRITICALITY_TOPIC not in reader.topics:
+        return None
+    frames, found = MessageFrames(run.game, run.descriptions), []
+    for message in reader.readable([CRITICALITY_TOPIC]):
+        try:
+            frame = frames.criticality(message.message)
+        except (InputError, IndexError, OverflowError):
+            # Anybody may have published on it.
+            continue
+        if frame is not None:
+            found.append(frame.data)
+    return pack(found) if found else None
+
+
+def measured_criticality(run: Epoch, path: Path) -> bytes:
+    """
+    Measure a run and give its frames, each after its length in bytes; takes seconds for minutes.
+
+    :param path: of the recording.
+    :raises InputError: if the run cannot be measured.
     """
     frames = MessageFrames(run.game, run.descriptions)
-    if CRITICALITY_TOPIC in reader.topics:
-        found = []
-        for message in reader.readable([CRITICALITY_TOPIC]):
-            try:
-                frame = frames.criticality(message.message)
-            except (InputError, IndexError, OverflowError):
-                # Anybody may have published on it.
-                continue
-            if frame is not None:
-                found.append(frame.data)
-        if found:
-            return pack(found)
-    return pack(_measured(frames, run, path))
-
-
-def _measured(frames: MessageFrames, run: Epoch, path: Path) -> list[bytes]:
     found: list[bytes] = []
 
     def take(criticality: Criticality) -> None:
@@ -61,4 +64,4 @@ def _measured(frames: MessageFrames, run: Epoch, path: Path) -> list[bytes]:
             found.append(frame.data)
 
     measure_log(read_run_log(path, run.game.epoch), on_tick=take)
-    return found
+    return pack(found)

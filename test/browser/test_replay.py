@@ -20,6 +20,8 @@ import sys
 from typing import Any
 
 from browser_support import Browser
+from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.recording.run_log import read_run_log, RunLog
 from crgame_ros.simulation.offline import OfflineResult
@@ -287,3 +289,27 @@ def test_another_run_of_the_recording(page: Browser, bag: Path) -> None:
     page.wait('crgame.replay.info.epoch === 0')
     assert seek(page, 1.2)['epoch'] == 0
     assert page.run('return crgame.store.scene.benchmark_id') == 'ZAM_ParkedCars-1_1_T-1'
+
+
+def test_criticality_is_measured_and_shown_at_any_time(page: Browser, log: RunLog) -> None:
+    """The panel has the smallest distance now and so far, as measured from the bag."""
+    found: dict[int, tuple[float, str]] = {}
+
+    def take(criticality: Criticality) -> None:
+        for tick in criticality.latest:
+            if tick.subject == 0:
+                values, others = tick.worst()
+                column = COLUMN['min_distance']
+                found[criticality.n] = values[column], criticality.ids[others[column]]
+
+    measure_log(log, on_tick=take)
+    seek(page, 6.0)
+    page.run("document.querySelector('#tab-criticality').click()")
+    cells = """[...document.querySelectorAll(
+        '#panel-criticality [data-id=hv0] [data-key=min_distance] td')].map((it) => it.textContent)
+    """
+    page.wait(f'({cells})[0] > ""  && ({cells})[0] !== "–"')
+    worst = min((value, n, other) for n, (value, other) in found.items() if n <= 600)
+    now, other = found[600]
+    assert page.run(f'return {cells}') == [
+        f'{now:.2f}', other, f'{worst[0]:.2f} ({worst[2]}, {worst[1] / 100:.1f} s)']

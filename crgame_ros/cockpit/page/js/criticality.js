@@ -28,10 +28,23 @@ export class CriticalityLog {
   /** @type {CriticalityFrame[]} */
   #frames = [];
   #keeps_s;
+  /** @type {(() => void)|null} */
+  #fetch;
 
-  /** @param {number} keeps_s how far back [s] */
-  constructor(keeps_s) {
+  /**
+   * @param {number} keeps_s how far back [s]
+   * @param {(() => void)|null} [fetch] has the frames come; null where they come by themselves
+   */
+  constructor(keeps_s, fetch = null) {
     this.#keeps_s = keeps_s;
+    this.#fetch = fetch;
+  }
+
+  /** Have the frames come, now that somebody looks. */
+  want() {
+    const fetch = this.#fetch;
+    this.#fetch = null;
+    fetch?.();
   }
 
   /** Forget everything. */

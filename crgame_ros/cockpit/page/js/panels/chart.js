@@ -41,9 +41,9 @@ export class Chart {
   constructor(library, quantity) {
     this.#plotly = library;
     this.quantity = quantity;
-    const lines = quantity.lines.length > 1 ? quantity.lines.map((line, i) => element('span', {
-      class: `line-name line-${i}`, text: line.name,
-    })) : [];
+    const lines = quantity.lines.flatMap((line, i) => (line.name ? [element('span', {
+      class: `line-name line-${'limit' in line ? 'limit' : i}`, text: line.name,
+    })] : []));
     this.root = element('div', { class: 'chart', 'data-key': quantity.key },
       element('div', { class: 'chart-head' },
         element('h3', { text: quantity.title }),

@@ -17,7 +17,7 @@ const PERIOD_MS = 200;
 /** @type {Quantity[]} */
 const QUANTITIES = [
   {
-    key: 'ttc', title: 'Time to collision', unit: 's', digits: 1, range: [0, 10],
+    key: 'ttc', title: 'TTC', unit: 's', digits: 1, range: [0, 10],
     lines: [{ critical: 'ttc' }, { critical: 'ttc_2d', name: 'any direction' },
       { limit: 'ttc', name: 'limit' }],
   },
@@ -26,7 +26,7 @@ const QUANTITIES = [
     lines: [{ critical: 'time_gap' }],
   },
   {
-    key: 'drac', title: 'Deceleration to avoid a crash', unit: 'm/s²', digits: 1,
+    key: 'drac', title: 'Braking needed', unit: 'm/s²', digits: 1,
     lines: [{ critical: 'drac' }, { limit: 'drac', name: 'limit' }],
   },
   {
@@ -43,10 +43,10 @@ const ROWS = [
   ['gap', 'Gap', 'm', 'bumper to bumper to the leader, along the own path'],
   ['time_gap', 'Time gap', 's', 'gap divided by the own speed'],
   ['ttc', 'TTC', 's', 'gap divided by the closing speed'],
-  ['ttc_a', 'TTC, accelerations held', 's', 'until either stands'],
+  ['ttc_a', 'TTC, accelerating', 's', 'with both accelerations held until either stands'],
   ['ttc_2d', 'TTC, any direction', 's', 'until footprints touch that keep velocity and yaw'],
   ['drac', 'DRAC', 'm/s²', 'deceleration to avoid a crash'],
-  ['a_req', 'Acceleration required', 'm/s²', 'constant, that just avoids contact'],
+  ['a_req', 'Required', 'm/s²', 'constant acceleration that just avoids contact'],
   ['min_distance', 'Distance', 'm', 'of the footprints'],
   ['pet', 'PET', 's', 'between one leaving the place where ways cross and the other entering it'],
 ];
@@ -70,6 +70,7 @@ export function createCriticality(root, store) {
     if (root.hidden || store.scene === null) {
       return;
     }
+    store.criticality.want();
     const ids = panel.selected.map(({ id }) => id);
     if (ids.join() !== [...shown.keys()].join()) {
       shown.clear();
@@ -123,7 +124,7 @@ class VehicleTable {
       setAttribute(now, 'data-late', isCritical(limits, name, found?.value));
       const past = worstOf(store, told, name, store.criticality.worst(t, index, name));
       setText(worst, past === null ? NONE
-        : `${fixed(past.value, 2)} to ${past.of} at ${clockTime(past.t)}`);
+        : `${fixed(past.value, 2)} (${past.of}, ${clockTime(past.t)})`);
       setAttribute(worst, 'data-late', isCritical(limits, name, past?.value));
     }
     setText(this.#sum, told && told.tet_s !== null

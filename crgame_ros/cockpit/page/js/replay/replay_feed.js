@@ -52,7 +52,8 @@ export class ReplayFeed {
       this.#outline = unpack(await answer.arrayBuffer()).map(decodeFrame)
         .filter((frame) => frame?.kind === KIND.STATE);
     }).catch(refused);
-    this.#askCriticality(refused);
+    const log = new CriticalityLog(Infinity, () => this.#askCriticality(log, refused));
+    store.criticality = log;
   }
 
   /** How many chunks are in memory. */
@@ -63,11 +64,10 @@ export class ReplayFeed {
   /**
    * Have the criticality of the whole run come; it takes a while where nobody recorded it.
    *
+   * @param {CriticalityLog} log gets it
    * @param {(error: Error) => void} refused
    */
-  async #askCriticality(refused) {
-    const log = new CriticalityLog(Infinity);
-    this.#store.criticality = log;
+  async #askCriticality(log, refused) {
     try {
       const answer = await ask('criticality', { epoch: this.info.epoch });
       for (const frame of unpack(await answer.arrayBuffer()).map(decodeFrame)) {

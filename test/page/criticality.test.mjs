@@ -1,0 +1,83 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What is left to vehicles: as it came, at a time, and at worst. */
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { CriticalityLog, limitsOf } from '../../crgame_ros/cockpit/page/js/criticality.js';
+import { CRITICALITY_WIDTH, decodeFrame, KIND, MEASURES } from
+  '../../crgame_ros/cockpit/page/js/frames.js';
+import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import { close, frameOf } from './support.mjs';
+
+const row = (index, values) => [index, ...MEASURES.flatMap(
+  (name) => (name in values ? [values[name], 2] : [NaN, -1]))];
+const frame = (n, ...rows) => frameOf(KIND.CRITICALITY, 0, n, n / 10, n / 100, rows.length,
+  ...rows.flat());
+const logOf = (keeps_s, ...frames) => {
+  const log = new CriticalityLog(keeps_s);
+  frames.forEach((each) => log.take(decodeFrame(each)));
+  return log;
+};
+
+test('a frame has a row for each vehicle, a value and somebody for each measure', () => {
+  const { kind, rows } = decodeFrame(frame(10, row(0, { ttc: 4 }), row(1, { drac: 2 })));
+  assert.deepEqual([kind, rows.length], [KIND.CRITICALITY, 2 * CRITICALITY_WIDTH]);
+});
+
+test('values over time are NaN where there is nothing', () => {
+  const log = logOf(100, frame(10, row(0, { ttc: 4 })), frame(20, row(1, { ttc: 9 })),
+    frame(30, row(0, { ttc: 3 })));
+  const { t, values } = log.past(0, 'ttc');
+  close(t, [0.1, 0.2, 0.3]);
+  close(values, [4, NaN, 3]);
+});
+
+test('at a time counts the step before it, unless it is long ago', () => {
+  const log = logOf(100, frame(10, row(0, { ttc: 4 })), frame(20, row(0, { ttc: 3 })));
+  assert.deepEqual(log.at(0.19, 0, 'ttc'), { value: 4, of: 2 });
+  assert.deepEqual(log.at(0.2, 0, 'ttc'), { value: 3, of: 2 });
+  assert.equal(log.at(0.05, 0, 'ttc'), null);
+  assert.equal(log.at(1.3, 0, 'ttc'), null);
+  assert.equal(log.at(0.2, 0, 'gap'), null);
+});
+
+test('the worst is the smallest, of decelerations the greatest, and not of the future', () => {
+  const log = logOf(100, frame(10, row(0, { ttc: 4, drac: 1 })),
+    frame(20, row(0, { ttc: 2, drac: 3 })), frame(30, row(0, { ttc: 1, drac: 5 })));
+  assert.deepEqual(log.worst(0.2, 0, 'ttc'), { value: 2, of: 2, t: 0.2 });
+  assert.deepEqual(log.worst(0.2, 0, 'drac'), { value: 3, of: 2, t: 0.2 });
+  assert.equal(log.worst(0.2, 1, 'ttc'), null);
+});
+
+test('a step that comes again replaces what was known from it on, old ones are forgotten', () => {
+  const log = logOf(0.15, ...[10, 20, 30, 20].map((n) => frame(n, row(0, { ttc: n }))));
+  close(log.past(0, 'ttc').values, [20]);
+  log.take(decodeFrame(frame(30, row(0, { ttc: 7 }))));
+  close(log.past(0, 'ttc').values, [20, 7]);
+});
+
+test('of a replay it comes when somebody looks, once', () => {
+  let asked = 0;
+  const log = new CriticalityLog(Infinity, () => { asked += 1; });
+  log.want();
+  log.want();
+  assert.equal(asked, 1);
+});
+
+test('a reset forgets it, a jump in a replay does not', () => {
+  for (const [mode, left] of [['live', 0], ['replay', 1]]) {
+    const store = new Store();
+    store.receive({ type: 'hello', client: 'c', name: '', mode, version: '' });
+    store.receiveFrame(frame(10, row(0, { ttc: 4 })), 0);
+    store.restart(1);
+    assert.equal(store.criticality.length, left, mode);
+  }
+});
+
+test('limits are those that the node tells, else the usual ones', () => {
+  assert.deepEqual(limitsOf(null), { ttc: 3, drac: 3, pet: 2 });
+  const told = { criticality: { hv0: { thresholds: { ttc: 2.5, drac: null } } } };
+  assert.deepEqual(limitsOf(told), { ttc: 2.5, drac: 3, pet: 2 });
+});
