@@ -15,17 +15,14 @@
 """
 Measures of a subject and somebody ahead of it on its path, from gap and speeds alone.
 
-All arrays have the same shape; speeds and accelerations count along the subject's path. What is
-undefined is NaN, inf or 0 as said of each.
+Speeds and accelerations count along the subject's path. What is undefined is NaN, inf or 0 as said
+of each.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
+import math
 
 
-def time_gap(gap: FloatArray, speed: FloatArray) -> FloatArray:
+def time_gap(gap: float, speed: float) -> float:
     """
     Give the time in which the subject drives the gap [s].
 
@@ -35,25 +32,25 @@ def time_gap(gap: FloatArray, speed: FloatArray) -> FloatArray:
     :param speed: of the subject [m/s]
     :return: inf for a subject that stands or goes back; NaN without a leader.
     """
-    moving = speed > 0.0
-    time = np.divide(gap, speed, out=np.full_like(gap, np.inf), where=moving)
-    return np.where(np.isnan(gap), np.nan, time)
+    if math.isnan(gap):
+        return math.nan
+    return gap / speed if speed > 0.0 else math.inf
 
 
-def time_to_collision(gap: FloatArray, speed: FloatArray, leader_speed: FloatArray) -> FloatArray:
+def time_to_collision(gap: float, speed: float, leader_speed: float) -> float:
     """
     Give gap / (v_s - v_o), the time to collision at constant speeds [s].
 
     :return: inf where the subject is not faster, or without a leader.
     """
     closing = speed - leader_speed
-    return np.divide(np.maximum(gap, 0.0), closing, out=np.full_like(gap, np.inf),
-                     where=(closing > 0.0) & ~np.isnan(gap))
+    if math.isnan(gap) or not closing > 0.0:
+        return math.inf
+    return max(gap, 0.0) / closing
 
 
-def time_to_collision_accelerating(gap: FloatArray, speed: FloatArray, leader_speed: FloatArray,
-                                   acceleration: FloatArray,
-                                   leader_acceleration: FloatArray) -> FloatArray:
+def time_to_collision_accelerating(gap: float, speed: float, leader_speed: float,
+                                   acceleration: float, leader_acceleration: float) -> float:
     """
     Give the time to collision where each keeps its acceleration until it stands [s].
 
@@ -62,66 +59,67 @@ def time_to_collision_accelerating(gap: FloatArray, speed: FloatArray, leader_sp
     :return: the smallest positive time; 0 where they touch already, inf without one or without a
         leader.
     """
-    ends = np.stack((_standstill(speed, acceleration),
-                     _standstill(leader_speed, leader_acceleration)))
-    known = ~np.isnan(gap)
-    remaining = np.where(known, gap, 1.0)
-    time, start = np.full_like(gap, np.inf), np.zeros_like(gap)
-    own, other = np.array(speed), np.array(leader_speed)
-    for end in (*np.sort(ends, axis=0), np.full_like(gap, np.inf)):
-        own_a = np.where(start < ends[0], acceleration, 0.0)
-        other_a = np.where(start < ends[1], leader_acceleration, 0.0)
-        length = np.subtract(end, start, out=np.full_like(gap, np.inf), where=np.isfinite(start))
-        root = _smallest_root(remaining, other - own, other_a - own_a)
-        found = np.isinf(time) & (root <= length) & np.isfinite(root)
-        time = np.where(found, start + root, time)
-        # What no longer moves on in time keeps what it has.
-        lapse = np.where(np.isfinite(length), length, 0.0)
-        remaining = remaining + (other - own) * lapse + 0.5 * (other_a - own_a) * lapse ** 2
-        own = np.where(end >= ends[0], 0.0, own + own_a * lapse)
-        other = np.where(end >= ends[1], 0.0, other + other_a * lapse)
+    if math.isnan(gap):
+        return math.inf
+    if gap <= 0.0:
+        return 0.0
+    own_end = _standstill(speed, acceleration)
+    leader_end = _standstill(leader_speed, leader_acceleration)
+    start = 0.0
+    for end in (*sorted((own_end, leader_end)), math.inf):
+        own_a = acceleration if start < own_end else 0.0
+        leader_a = leader_acceleration if start < leader_end else 0.0
+        slope, bend = leader_speed - speed, leader_a - own_a
+        lapse = end - start
+        root = _smallest_root(gap, slope, bend)
+        if root <= lapse and root < math.inf:
+            return start + root
+        if lapse == math.inf:
+            break
+        gap += slope * lapse + 0.5 * bend * lapse ** 2
+        speed = 0.0 if end >= own_end else speed + own_a * lapse
+        leader_speed = 0.0 if end >= leader_end else leader_speed + leader_a * lapse
         start = end
-    return np.where(known, np.where(gap <= 0.0, 0.0, time), np.inf)
+    return math.inf
 
 
-def deceleration_to_avoid_crash(gap: FloatArray, speed: FloatArray,
-                                leader_speed: FloatArray) -> FloatArray:
+def deceleration_to_avoid_crash(gap: float, speed: float, leader_speed: float) -> float:
     """
     Give the DRAC, ½ (v_s - v_o)² / gap [m/s²].
 
     :return: 0 where the subject is not faster or without a leader, inf where they touch.
     """
     closing = speed - leader_speed
-    open_gap = gap > 0.0
-    drac = np.divide(0.5 * closing ** 2, gap, out=np.full_like(gap, np.inf), where=open_gap)
-    return np.where(np.isnan(gap) | ~(closing > 0.0), 0.0, drac)
+    if math.isnan(gap) or not closing > 0.0:
+        return 0.0
+    return 0.5 * closing ** 2 / gap if gap > 0.0 else math.inf
 
 
-def required_acceleration(gap: FloatArray, speed: FloatArray, leader_speed: FloatArray,
-                          leader_acceleration: FloatArray) -> FloatArray:
+def required_acceleration(gap: float, speed: float, leader_speed: float,
+                          leader_acceleration: float) -> float:
     """
     Give the constant acceleration that just avoids contact, min(a_o - DRAC, 0) [m/s²].
 
     :return: 0 where the subject is not faster or without a leader, -inf where they touch.
     """
-    drac = deceleration_to_avoid_crash(gap, speed, leader_speed)
-    closing = ~np.isnan(gap) & (speed > leader_speed)
-    return np.where(closing, np.minimum(leader_acceleration - drac, 0.0), 0.0)
+    if math.isnan(gap) or not speed > leader_speed:
+        return 0.0
+    return min(leader_acceleration - deceleration_to_avoid_crash(gap, speed, leader_speed), 0.0)
 
 
-def _standstill(speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+def _standstill(speed: float, acceleration: float) -> float:
     """Give the time after which a braking vehicle stands; inf for one that does not brake."""
-    braking = (speed * acceleration < 0.0) | ((speed == 0.0) & (acceleration < 0.0))
-    return np.divide(-speed, acceleration, out=np.full_like(speed, np.inf), where=braking)
+    brakes = speed * acceleration < 0.0 or (speed == 0.0 and acceleration < 0.0)
+    return -speed / acceleration if brakes else math.inf
 
 
-def _smallest_root(gap: FloatArray, slope: FloatArray, bend: FloatArray) -> FloatArray:
+def _smallest_root(gap: float, slope: float, bend: float) -> float:
     """Give the smallest root >= 0 of gap + slope t + ½ bend t², inf without one."""
     discriminant = slope ** 2 - 2.0 * bend * gap
-    root = np.sqrt(np.maximum(discriminant, 0.0))
+    if not discriminant >= 0.0:
+        return math.inf
     # The form without cancellation; both roots, whatever the signs.
-    q = -(slope + np.where(slope >= 0.0, root, -root))
-    with np.errstate(divide='ignore', invalid='ignore'):
-        candidates = np.stack((2.0 * gap / q, q / bend))
-    valid = np.isfinite(candidates) & (candidates >= 0.0) & (discriminant >= 0.0)
-    return np.where(valid, candidates, np.inf).min(axis=0)
+    q = -(slope + math.copysign(math.sqrt(discriminant), slope))
+    roots = [numerator / denominator for numerator, denominator in ((2.0 * gap, q), (q, bend))
+             if denominator != 0.0]
+    return min((root for root in roots if 0.0 <= root < math.inf), default=math.inf)

@@ -276,8 +276,8 @@ class Criticality:
             here, there = (np.array((math.cos(yaw), math.sin(yaw)))
                            for yaw in (leader.own_heading, leader.heading))
             values[leader.number, :_OF_LEADER] = _of_leader(
-                leader.gap, moves[subject] @ here, moves[other] @ there,
-                accelerations[subject] @ here, accelerations[other] @ there)
+                leader.gap, float(moves[subject] @ here), float(moves[other] @ there),
+                float(accelerations[subject] @ here), float(accelerations[other] @ there))
         return TickMeasures(subject, others, values)
 
     def _approach(self, subject: int, others: NDArray[np.int64], moves: FloatArray,
@@ -312,17 +312,14 @@ class Criticality:
 
 
 def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: float,
-               leader_acceleration: float) -> FloatArray:
+               leader_acceleration: float) -> tuple[float, ...]:
     """Give the measures of car following, in the order of `MEASURES`."""
-    arrays = [np.array([value]) for value in (gap, speed, leader_speed, acceleration,
-                                              leader_acceleration)]
-    gaps, own, other, own_a, other_a = arrays
-    headway = time_gap(gaps, own)
-    return np.concatenate((
-        gaps, headway, headway, time_to_collision(gaps, own, other),
-        time_to_collision_accelerating(gaps, own, other, own_a, other_a),
-        deceleration_to_avoid_crash(gaps, own, other),
-        required_acceleration(gaps, own, other, other_a)))
+    headway = time_gap(gap, speed)
+    return (gap, headway, headway, time_to_collision(gap, speed, leader_speed),
+            time_to_collision_accelerating(gap, speed, leader_speed, acceleration,
+                                           leader_acceleration),
+            deceleration_to_avoid_crash(gap, speed, leader_speed),
+            required_acceleration(gap, speed, leader_speed, leader_acceleration))
 
 
 def _convex(corners: FloatArray) -> FloatArray:

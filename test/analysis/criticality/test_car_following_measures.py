@@ -14,6 +14,8 @@
 # limitations under the License.
 """Measures of car following against closed forms and integration in small steps."""
 
+import math
+
 from crgame_ros.analysis.criticality.car_following_measures import (
     deceleration_to_avoid_crash,
     required_acceleration,
@@ -22,45 +24,32 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     time_to_collision_accelerating,
 )
 import numpy as np
-from numpy.typing import NDArray
 import pytest
-
-Array = NDArray[np.float64]
-
-
-def _row(*values: float) -> tuple[Array, ...]:
-    return tuple(np.array([value]) for value in values)
 
 
 def test_twenty_behind_ten() -> None:
     """45.5 m of gap: 4.55 s, 2.275 s, DRAC 100 / 91 m/s^2; a leader braking with 3: 3.10 s."""
-    gap, speed, leader, still, brakes = _row(45.5, 20.0, 10.0, 0.0, -3.0)
-    assert time_to_collision(gap, speed, leader)[0] == pytest.approx(4.55, abs=1e-9)
-    assert time_gap(gap, speed)[0] == pytest.approx(2.275, abs=1e-9)
-    assert deceleration_to_avoid_crash(gap, speed, leader)[0] == pytest.approx(100 / 91, abs=1e-9)
-    assert required_acceleration(gap, speed, leader, brakes)[0] == pytest.approx(
-        -3.0 - 100 / 91, abs=1e-9)
-    assert time_to_collision_accelerating(gap, speed, leader, still, still)[0] == pytest.approx(
-        4.55, abs=1e-9)
-    assert time_to_collision_accelerating(gap, speed, leader, still, brakes)[0] == pytest.approx(
+    cars = 45.5, 20.0, 10.0
+    assert time_to_collision(*cars) == pytest.approx(4.55, abs=1e-9)
+    assert time_gap(*cars[:2]) == pytest.approx(2.275, abs=1e-9)
+    assert deceleration_to_avoid_crash(*cars) == pytest.approx(100 / 91, abs=1e-9)
+    assert required_acceleration(*cars, -3.0) == pytest.approx(-3.0 - 100 / 91, abs=1e-9)
+    assert time_to_collision_accelerating(*cars, 0.0, 0.0) == pytest.approx(4.55, abs=1e-9)
+    assert time_to_collision_accelerating(*cars, 0.0, -3.0) == pytest.approx(
         (np.sqrt(373.0) - 10.0) / 3.0, abs=1e-9)
 
 
 def test_what_is_undefined() -> None:
     """NaN, inf and 0 as the table of definitions says."""
-    gap = np.array([np.nan, 10.0, 10.0, 0.0])
-    speed, leader = np.array([10.0, 0.0, 5.0, 10.0]), np.array([0.0, 0.0, 5.0, 5.0])
-    still = np.zeros(4)
-    np.testing.assert_array_equal(time_gap(gap, speed), [np.nan, np.inf, 2.0, 0.0])
-    np.testing.assert_array_equal(time_to_collision(gap, speed, leader),
-                                  [np.inf, np.inf, np.inf, 0.0])
-    np.testing.assert_array_equal(
-        time_to_collision_accelerating(gap, speed, leader, still, still),
-        [np.inf, np.inf, np.inf, 0.0])
-    np.testing.assert_array_equal(deceleration_to_avoid_crash(gap, speed, leader),
-                                  [0.0, 0.0, 0.0, np.inf])
-    np.testing.assert_array_equal(required_acceleration(gap, speed, leader, still),
-                                  [0.0, 0.0, 0.0, -np.inf])
+    cars = [(math.nan, 10.0, 0.0), (10.0, 0.0, 0.0), (10.0, 5.0, 5.0), (0.0, 10.0, 5.0)]
+    inf = math.inf
+    np.testing.assert_array_equal([time_gap(*each[:2]) for each in cars],
+                                  [math.nan, inf, 2.0, 0.0])
+    assert [time_to_collision(*each) for each in cars] == [inf, inf, inf, 0.0]
+    assert [time_to_collision_accelerating(*each, 0.0, 0.0) for each in cars] == [
+        inf, inf, inf, 0.0]
+    assert [deceleration_to_avoid_crash(*each) for each in cars] == [0.0, 0.0, 0.0, inf]
+    assert [required_acceleration(*each, 0.0) for each in cars] == [0.0, 0.0, 0.0, -inf]
 
 
 def test_accelerating_against_small_steps() -> None:
@@ -71,7 +60,8 @@ def test_accelerating_against_small_steps() -> None:
     speed = np.where(random.random(count) < 0.1, 0.0, random.uniform(-3.0, 30.0, count))
     leader = np.where(random.random(count) < 0.2, 0.0, random.uniform(-10.0, 30.0, count))
     a, b = random.uniform(-8.0, 4.0, (2, count)) * (random.random((2, count)) < 0.8)
-    found = time_to_collision_accelerating(gap, speed, leader, a, b)
+    found = np.array([time_to_collision_accelerating(*each) for each in zip(
+        *(column.tolist() for column in (gap, speed, leader, a, b)), strict=True)])
     expected = np.full(count, np.inf)
     place, own, other = np.array(gap), np.array(speed), np.array(leader)
     held = [np.zeros(count, dtype=bool) for _ in range(2)]
