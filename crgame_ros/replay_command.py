@@ -20,27 +20,34 @@ import gc
 import json
 from pathlib import Path
 import re
+import subprocess
 import sys
 from typing import Any, TYPE_CHECKING
 
 from crgame_ros.analysis.measure_command import TOLD_S
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import numbered
 
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
+    from crgame_ros.analysis.counterfactual import Alternative
     from crgame_ros.recording.run_log import RunLog
-    from crgame_ros.simulation.setup import Setup
 
 DESCRIPTION = """\
 Drive the human of a recording again, against one planner after the other, and compare.
 
   crgame replay runs/NAME --planner idm --planner reactive --planner my.py:Mine
+  crgame replay runs/NAME --planner idm --planner reactive --live
 
 The human does what was recorded, to the last bit; the seeds of perception and traffic are the
 same. Each run becomes a CommonRoad scenario; comparison.json has all numbers. Where traffic
-reacts, the table says from when on the world around the human is another than it was."""
+reacts, the table says from when on the world around the human is another than it was.
+
+With --human trajectory the human takes the recorded way itself, for recordings that lack cycles or
+inputs. With --live each run is driven in real time, with the page, and recorded."""
 FOLDER = 'replays'
 NEVER = '-'
+# The folder of the comparison, and its runs one by one.
+_Runs = tuple[Path, Iterator['Alternative']]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,6 +59,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='planner of all AVs, or FILE.py:Class; may be repeated')
     parser.add_argument('--latency', type=int, default=0, metavar='L',
                         help='simulation steps between a request and its plan (default: 0)')
+    parser.add_argument('--human', choices=('inputs', 'trajectory'), default='inputs',
+                        help='what of the human is repeated: what it did, or where it was '
+                        '(default: inputs)')
+    parser.add_argument('--live', action='store_true',
+                        help='drive in real time, with the page, one run after the other')
+    parser.add_argument('--headless', action='store_true', help='live without the page')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='new folder to write (default: "replays" in the folder of the run)')
     parser.set_defaults(command=replay)
@@ -60,13 +73,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def replay(values: argparse.Namespace) -> int:
     """Drive against every planner, write the runs and print the comparison."""
     from crgame_ros.analysis.criticality.recorded_criticality import measure_log
-    from crgame_ros.launcher.arguments import RunRequest
-    from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.planner.planner_registry import planner_class
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_log import read_run_log
-    if values.latency < 0:
-        raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
+    _check(values)
     bag = recording_in(values.run)
     recorded = read_run_log(bag)
     if not recorded.game.humans or not recorded.game.avs:
@@ -74,31 +84,74 @@ def replay(values: argparse.Namespace) -> int:
     # Every planner is known before the first of them drives.
     for name in values.planner:
         planner_class(name)
-    setups = {name: effective_setup(RunRequest(driver=f'replay:{bag}', planners=(name,)))
-              for name in values.planner}
-    folder = _make_folder(values.out, values.run)
+    drive = _live if values.live else _offline
     found: list[dict[str, Any]] = [
         {'planner': 'recorded', 'criticality': measure_log(recorded).as_dict()}]
-    for name, setup in setups.items():
-        print(f'driving against {name} …', file=sys.stderr, flush=True)
-        found.append(_drive(name, setup, recorded, values.latency,
-                            folder / f'{_file_name(name, setups)}.xml'))
+    folder, runs = drive(values, bag, recorded)
+    for alternative in runs:
+        found.append(alternative.as_dict())
+        # After each, so that one that fails costs none of the others.
+        (folder / 'comparison.json').write_text(
+            json.dumps(found, indent=2) + '\n', encoding='utf-8')
     # What planners hold in circles compiled packages would complain of at the end.
     gc.collect()
-    (folder / 'comparison.json').write_text(json.dumps(found, indent=2) + '\n', encoding='utf-8')
     print('\n'.join(_table(found)))
     print(f'files are in {folder}')
     return 0
 
 
-def _drive(planner: str, setup: 'Setup', recorded: 'RunLog', latency_steps: int,
-           file: Path) -> dict[str, Any]:
-    """Drive against one planner, write the run, and say what came of it."""
+def _check(values: argparse.Namespace) -> None:
+    """Refuse what does not go together."""
+    if values.latency < 0:
+        raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
+    if values.live and (values.latency or values.human != 'inputs'):
+        raise InputError('repeats the inputs, and planners take the time they take', '--live',
+                         'leave --latency and --human out')
+    if values.headless and not values.live:
+        raise InputError('goes with --live', '--headless')
+
+
+def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunLog') -> _Runs:
+    """Drive against each planner as fast as it goes, and write the runs as scenarios."""
     from crgame_ros.analysis.counterfactual import drive_against
+    from crgame_ros.launcher.arguments import RunRequest
+    from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.recording.export import write_scenario
-    alternative = drive_against(planner, setup, recorded, latency_steps)
-    write_scenario(alternative.log, file)
-    return alternative.as_dict()
+    from crgame_ros.recording.recorded_states import recorded_states
+    setups = {name: effective_setup(RunRequest(driver=f'replay:{bag}', planners=(name,)))
+              for name in values.planner}
+    traces = recorded_states(bag) if values.human == 'trajectory' else None
+    folder = _make_folder(values.out, values.run)
+
+    def runs() -> Iterator['Alternative']:
+        for name, setup in setups.items():
+            print(f'driving against {name} …', file=sys.stderr, flush=True)
+            alternative = drive_against(name, setup, recorded, values.latency, traces)
+            write_scenario(alternative.log, folder / f'{_file_name(name, setups)}.xml')
+            yield alternative
+
+    return folder, runs()
+
+
+def _live(values: argparse.Namespace, bag: Path, recorded: 'RunLog') -> _Runs:
+    """Drive against each planner in real time, one graph after the other."""
+    from crgame_ros.analysis.counterfactual import driven_live
+    folder = _make_folder(values.out, values.run)
+    duration_s = (len(recorded.ks) - 1) * recorded.game.scheduler.time_step_s
+
+    def runs() -> Iterator['Alternative']:
+        for name in values.planner:
+            run = folder / _file_name(name, values.planner)
+            done = subprocess.run([
+                sys.executable, '-m', 'crgame_ros.launcher.main', '--driver', f'replay:{bag}',
+                '--planner', name, '--duration', repr(duration_s), '--out', str(run),
+                *(['--headless'] if values.headless else [])], stdin=subprocess.DEVNULL)
+            if done.returncode:
+                raise CrgameError(f'the run against {name} ended with {done.returncode}; '
+                                  f'what it said is above, its files are in {run}')
+            yield driven_live(name, run, recorded)
+
+    return folder, runs()
 
 
 def _make_folder(out: Path | None, run: Path) -> Path:
@@ -131,13 +184,13 @@ def _table(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         for vehicle_id, vehicle in each['criticality']['vehicles'].items():
             worst = {name: f'{entry["value"]:.2f}' for name, entry in vehicle['worst'].items()
                      if entry['unit'] != 's' or entry['value'] < TOLD_S}
-            touched = [item for item in each.get('contacts', ())
+            touched = [item for item in each.get('contacts') or ()
                        if vehicle_id in (item['vehicle'], item['with'])]
             rows.append((
                 each['planner'], vehicle_id,
                 *(worst.get(name, NEVER) for name in ('gap', 'ttc', 'a_req', 'min_distance')),
                 f'{vehicle["tet_s"]:.1f}',
-                str(len(touched)) if 'contacts' in each else NEVER,
+                str(len(touched)) if each.get('contacts') is not None else NEVER,
                 *(NEVER if each.get(name) is None else f'from {each[name]:.1f} s'
                   for name in ('human_differs_s', 'others_differ_s'))))
     widths = [max(len(row[column]) for row in rows) for column in range(len(head))]

@@ -14,22 +14,27 @@
 # limitations under the License.
 """A recorded human again, against another planner: what came of it, and what differs when."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 import time
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
 from crgame_ros.recording.recorded_inputs import recorded_inputs
-from crgame_ros.recording.run_log import run_log_of, RunLog
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 
-# Coordinates that differ by no more are the same: what messages round [m, rad].
+FloatArray = NDArray[np.float64]
 SAME = 1e-9
 
 
@@ -39,34 +44,38 @@ class Alternative:
     A run of a recorded human against a planner.
 
     :param planner: as it was asked for.
-    :param result: the run.
     :param log: the run on the scenario's grid.
     :param criticality: of it.
     :param human_differs_s: when a human first is elsewhere than in the recording; None: never [s]
     :param others_differ_s: when anybody but the driven vehicles first is: what reacts to the AV
         makes a world in which the human's inputs may no longer fit; None: never [s]
+    :param accepted_ratio: by AV the share of its planner's answers that were accepted and no
+        fallback; None where it is not known.
+    :param contacts: the first contact of each pair, as entries of `timing.json`; None where they
+        are not known.
+    :param state_hash: over all states of an offline run.
     """
 
     planner: str
-    result: OfflineResult
     log: RunLog
     criticality: Criticality
     human_differs_s: float | None
     others_differ_s: float | None
+    accepted_ratio: Mapping[str, float | None]
+    contacts: Sequence[Mapping[str, Any]] | None
+    state_hash: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Say what came of it, as JSON has it."""
         return {
-            'planner': self.planner, 'state_hash': self.result.state_hash,
+            'planner': self.planner, 'state_hash': self.state_hash,
             'human_differs_s': self.human_differs_s, 'others_differ_s': self.others_differ_s,
-            'accepted_ratio': {av: record.accepted_ratio
-                               for av, record in self.result.planners.items()},
-            'contacts': [item.as_dict() for item in contacts_of(self.result)],
+            'accepted_ratio': self.accepted_ratio, 'contacts': self.contacts,
             'criticality': self.criticality.as_dict()}
 
 
-def drive_against(planner: str, setup: Setup, recorded: RunLog,
-                  latency_steps: int = 0) -> Alternative:
+def drive_against(planner: str, setup: Setup, recorded: RunLog, latency_steps: int = 0,
+                  traces: Mapping[str, FloatArray] | None = None) -> Alternative:
     """
     Drive a recorded human against the planner of a setup, for as long as was recorded.
 
@@ -76,21 +85,63 @@ def drive_against(planner: str, setup: Setup, recorded: RunLog,
     :param setup: of the recorded game, its human's driver the recording, with that planner.
     :param recorded: the run that was recorded.
     :param latency_steps: simulation steps between a request and its plan.
+    :param traces: recorded states by vehicle (`recorded_states`), which the humans take instead of
+        being driven; an AV that somebody had taken over follows its planner then.
     :raises InputError: if the recording's inputs cannot be used in the setup.
     """
+    result = _drive_inputs(setup, latency_steps) if traces is None \
+        else _drive_trajectory(setup, latency_steps, traces)
+    return _compare(
+        planner, run_log_of(result), recorded,
+        {av: record.accepted_ratio for av, record in result.planners.items()},
+        [item.as_dict() for item in contacts_of(result)], result.state_hash)
+
+
+def driven_live(planner: str, folder: Path, recorded: RunLog) -> Alternative:
+    """
+    Compare a live run of a recorded human against a planner, from the run's folder.
+
+    :raises InputError: if its recording cannot be used.
+    """
+    bag = recording_in(folder)
+    log = read_run_log(bag)
+    report = timing_report(bag, log=log)
+    return _compare(planner, log, recorded, {
+        av: None if told['accepted'] is None or not told['plans'] else
+        max(0, told['accepted'] - (told['fallback'] or 0)) / told['plans']
+        for av, told in report['planners'].items()}, report['contacts'])
+
+
+def _drive_inputs(setup: Setup, latency_steps: int) -> OfflineResult:
     drivers, intervals_s = recorded_inputs(setup)
     if intervals_s is None:
         raise InputError('nobody in it is driven by a recording', 'driver', 'give replay:BAG')
-    duration_s = len(intervals_s) * setup.scheduler.dt_s
-    result = run_offline(setup, duration_s=duration_s, latency_steps=latency_steps,
-                         drivers=drivers, intervals_s=intervals_s, clock_s=time.perf_counter)
-    log = run_log_of(result)
-    humans = len(setup.humans)
+    return run_offline(setup, duration_s=len(intervals_s) * setup.scheduler.dt_s,
+                       latency_steps=latency_steps, drivers=drivers, intervals_s=intervals_s,
+                       clock_s=time.perf_counter)
+
+
+def _drive_trajectory(setup: Setup, latency_steps: int,
+                      traces: Mapping[str, FloatArray]) -> OfflineResult:
+    humans = {human.id: traces[human.id] for human in setup.humans}
+    steps = min(map(len, humans.values())) - 1
+    return run_offline(setup, duration_s=steps * setup.scheduler.dt_s,
+                       latency_steps=latency_steps, traces=humans,
+                       drivers={human: IdleDriver() for human in humans},
+                       clock_s=time.perf_counter)
+
+
+def _compare(planner: str, log: RunLog, recorded: RunLog,
+             accepted_ratio: Mapping[str, float | None],
+             contacts: Sequence[Mapping[str, Any]] | None,
+             state_hash: str | None = None) -> Alternative:
+    humans = len(recorded.game.humans)
     return Alternative(
-        planner, result, log, measure_log(log),
-        _differs_s(log, recorded, log.vehicle_states[:, :humans, :3],
-                   recorded.vehicle_states[:, :humans, :3]),
-        _differs_s(log, recorded, log.object_poses, recorded.object_poses))
+        planner, log, measure_log(log),
+        _differs_s(log, recorded, log.published_states[:, :humans, :3],
+                   recorded.published_states[:, :humans, :3]),
+        _differs_s(log, recorded, log.object_poses, recorded.object_poses),
+        accepted_ratio, contacts, state_hash)
 
 
 def _differs_s(log: RunLog, recorded: RunLog, found: NDArray[np.float64],

@@ -40,7 +40,9 @@ from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.traced_vehicle import TracedVehicle
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -78,15 +80,18 @@ class Simulation:
     :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param feed: moves the agents of traffic; None moves them in process.
+    :param traces: (N, 8) states by human, from step 0 on, who takes these instead of being driven.
     """
 
-    def __init__(self, setup: Setup, clock_offset_ns: int = 0,
-                 feed: TrafficFeed | None = None) -> None:
+    def __init__(self, setup: Setup, clock_offset_ns: int = 0, feed: TrafficFeed | None = None,
+                 traces: Mapping[str, NDArray[np.float64]] | None = None) -> None:
         self.setup = setup
         self.scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
         self.n = 0
         dt_s = self.scheduler.dt_s
+        traces = traces or {}
         self.humans = [
+            TracedVehicle(traces[human.id]) if human.id in traces else
             HumanVehicle(human.vehicle, human.state, make_vehicle_model(
                 human.dynamics, human.vehicle, f'{human.id}: dynamics'))
             for human in setup.humans]

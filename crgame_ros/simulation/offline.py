@@ -160,6 +160,7 @@ def run_offline(
     intervals_s: NDArray[np.float64] | None = None, check_drivability: bool = True,
     clock_s: Callable[[], float] | None = None, triggers: Sequence[tuple[int, str]] = (),
     observers: Sequence[RunObserver] = (),
+    traces: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> OfflineResult:
     """
     Run a game as fast as it can.
@@ -175,9 +176,10 @@ def run_offline(
     :param triggers: simulation step n and name of the events that somebody triggers; each takes
         effect at the first tick from n on.
     :param observers: are given every state that a live run publishes.
+    :param traces: (N, 8) states by human, from step 0 on, who takes these instead of being driven.
     :raises InputError: if a human's driver needs a person or a device, or a trigger is refused.
     """
-    simulation = Simulation(setup)
+    simulation = Simulation(setup, traces=traces)
     steps = simulation.scheduler.steps_for(_duration(setup, duration_s))
     drivers = drivers or {}
     hands = [drivers.get(human.id) or offline_driver(human) for human in setup.humans]

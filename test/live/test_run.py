@@ -30,6 +30,7 @@ from crgame_ros.analysis.criticality.criticality_rows import (
     read_criticality_rows,
 )
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.cli import main
 from crgame_ros.game.game_file import load_game
 from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.recording.reader import BagReader
@@ -126,6 +127,18 @@ def test_criticality_is_the_same_live_and_from_the_bag(finished: Launcher) -> No
     # Others' accelerations, differences from step to step, are known from its second step on.
     assert np.array_equal(live[live[:, 1] > first], again[again[:, 1] > first], equal_nan=True)
     assert {'criticality_node: hv0', 'criticality_node: av0'} <= told
+
+
+def test_the_human_drives_live_against_another_planner(finished: Launcher, tmp_path: Path) -> None:
+    """In real time, recorded; the human does what it did, to the last bit."""
+    assert main(['replay', str(finished.out), '--planner', 'constant-velocity', '--live',
+                 '--headless', '--out', str(tmp_path / 'out')]) == 0
+    recorded, found = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    assert found['human_differs_s'] is None
+    assert found['accepted_ratio']['av0'] > 0.5
+    assert found['criticality']['vehicles'].keys() == recorded['criticality']['vehicles'].keys()
+    again = read_run_log(tmp_path / 'out' / 'constant_velocity' / 'bag')
+    assert len(again.ks) == len(read_run_log(finished.out / 'bag').ks)
 
 
 def test_the_timing_report_has_table_one(finished: Launcher) -> None:

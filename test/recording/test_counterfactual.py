@@ -135,9 +135,30 @@ def test_folders_are_new_and_files_have_names_of_their_own(
     assert str(folder / 'replays_2') in capsys.readouterr().out
 
 
+def test_a_human_without_inputs_takes_its_recorded_way(
+        record: Any, recorder: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a recording without cycles the inputs are not known, the ways are."""
+    _, result = record('cut_in')
+    messages = [each for each in recorder.messages(result) if each[0] != '/timing/cycle']
+    bag = recorder.ours(tmp_path / 'run' / 'bag', messages)
+    words = ['replay', str(bag), '--planner', 'idm', '--planner', 'constant-velocity', '--out']
+    assert main([*words, str(tmp_path / 'inputs')]) == 2
+    assert '/timing/cycle' in capsys.readouterr().err
+    assert main([*words, str(tmp_path / 'out'), '--human', 'trajectory']) == 0
+    recorded, same, other = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    assert same['human_differs_s'] is other['human_differs_s'] is None
+    gaps = [each['criticality']['vehicles']['av0']['worst']['gap']
+            for each in (recorded, same, other)]
+    assert gaps[1]['value'] == pytest.approx(gaps[0]['value'], abs=1e-9)
+    assert gaps[2]['value'] > gaps[0]['value'] + 1.0
+
+
 @pytest.mark.parametrize('words', [
     ('missing', '--planner', 'idm'), ('{run}', '--planner', 'nobody'), ('{run}',),
     ('{run}', '--planner', 'idm', '--latency', '-1'),
+    ('{run}', '--planner', 'idm', '--live', '--latency', '3'),
+    ('{run}', '--planner', 'idm', '--live', '--human', 'trajectory'),
+    ('{run}', '--planner', 'idm', '--headless'),
     ('{run}', '--planner', 'idm', '--out', '/proc/none')])
 def test_what_cannot_be_replayed_is_told_in_a_line(
         words: tuple[str, ...], record: Any, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,59 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The recorded states of driven vehicles, simulation step by simulation step."""
+
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.messages.joints import VEHICLE_JOINTS, vehicles_from_joints
+from crgame_ros.messages.world_messages import VEHICLES_TOPIC
+from crgame_ros.recording.bridging import farthest, piece_around
+from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.resampling import resample
+from crgame_ros.recording.run_points import read_points
+from crgame_ros.vehicle.state import STATE_WIDTH
+import numpy as np
+from numpy.typing import NDArray
+
+
+def recorded_states(path: Path, epoch: int | None = None) -> dict[str, NDArray[np.float64]]:
+    """
+    Read what was published of each driven vehicle at the steps n = 0, 1, … of a run.
+
+    What was not recorded, up to a second, is cubic between the states around it.
+
+    :param path: of a recording.
+    :param epoch: which run, where it holds several; None for the last.
+    :return: by vehicle (N, 8) rear-axle states, columns as in `StateColumn`.
+    :raises InputError: if the beginning is missing, or no state was recorded.
+    """
+    with BagReader(path, parts=True) as reader:
+        run = read_epoch(reader, epoch)
+        vehicles = [item.id for item in run.descriptions if item.role.is_ego]
+        points = read_points(reader, run, {VEHICLES_TOPIC: vehicles})[VEHICLES_TOPIC]
+    scheduler = run.game.scheduler
+    if not points or min(points) > farthest(scheduler):
+        raise InputError(f'the beginning of {VEHICLES_TOPIC} was not recorded', str(path),
+                         'record from before the start of the run')
+    known = {n: vehicles_from_joints(*point.reshape(3, -1, len(VEHICLE_JOINTS)))
+             for n, point in points.items()}
+    known.setdefault(0, np.array([item.state for item in run.game.vehicles]).reshape(
+        -1, STATE_WIDTH))
+    ns = piece_around(np.array(sorted(known), dtype=np.int64), 0, scheduler)
+    nominal_s = np.full((int(ns[-1]) + 1, len(vehicles)), scheduler.dt_s)
+    states = resample(np.array([known[n] for n in ns.tolist()]), ns, nominal_s, scheduler.dt_s,
+                      np.arange(ns[-1] + 1))
+    return {vehicle: states[:, column] for column, vehicle in enumerate(vehicles)}

@@ -1,0 +1,43 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A human's vehicle that takes a recorded way, whatever its driver does."""
+
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+
+class TracedVehicle:
+    """
+    Stands for a `HumanVehicle` whose states are known.
+
+    :param states: (N, 8) rear-axle states of step 0, 1, …, columns as in `StateColumn`; after the
+        last one it stays there.
+    """
+
+    def __init__(self, states: NDArray[np.float64]) -> None:
+        self._states = [VehicleState(*row) for row in states.tolist()]
+        self._n = 0
+
+    @property
+    def state(self) -> VehicleState:
+        """State of the present step, rear axle."""
+        return self._states[self._n]
+
+    def step(self, _command: DriverCommand, _dt_s: float) -> VehicleState:
+        """Go on to the next step; command and interval change nothing."""
+        self._n = min(self._n + 1, len(self._states) - 1)
+        return self.state
