@@ -39,6 +39,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame replay    the recorded human against other planners
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
+  crgame validate  whether files are valid: scenarios, games, recordings, tables
   crgame rasterize draw curbs and obstacles of a scenario as an occupancy map
   crgame roads     turn way-points (CSV) into a scenario to drive on, or back
   crgame schema    what a game file and other files may say, for editors
@@ -99,6 +100,7 @@ def _build_parser() -> argparse.ArgumentParser:
     info = commands.add_parser('info', help='what is in a recording')
     info.add_argument('bag', type=Path, help='folder or file of the recording')
     info.set_defaults(command=_info)
+    _add_validate(commands.add_parser('validate', help='whether files are what they should be'))
     _add_rasterize(commands.add_parser('rasterize', help='scenario to occupancy map'))
     _add_roads(commands.add_parser('roads', help='way-points to scenario, or back'))
     _add_schema(commands.add_parser('schema', help='JSON Schema of games and other files'))
@@ -116,6 +118,11 @@ def _add_measure(parser: argparse.ArgumentParser) -> None:
 
 def _add_replay(parser: argparse.ArgumentParser) -> None:
     from crgame_ros.replay_command import add_arguments
+    add_arguments(parser)
+
+
+def _add_validate(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.analysis.validate_command import add_arguments
     add_arguments(parser)
 
 

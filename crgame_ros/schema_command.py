@@ -15,12 +15,11 @@
 """The command `crgame schema`: JSON Schema of the files that users write."""
 
 import argparse
-import importlib
 import json
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.errors import InputError
+from crgame_ros.schema.file_kinds import FILE_KINDS
 
 DESCRIPTION = """\
 Write the JSON Schema (draft 2020-12) of a kind of file, with which editors complete and check it.
@@ -32,29 +31,11 @@ A YAML file names its schema in its first line, for editors with the YAML langua
   # yaml-language-server: $schema=game.schema.json"""
 
 
-# Module and class that declare each kind of file, and the file's title.
-KINDS = {
-    'game': ('crgame_ros.game.game', 'Game', 'Game file'),
-    'vehicle': ('crgame_ros.vehicle.parameters', 'VehicleParameters', 'Vehicle'),
-    'steering': ('crgame_ros.vehicle.steering', 'SteeringRatioTable', 'Table of steering ratios'),
-    'device': ('crgame_ros.driver.device_file', 'DeviceFile', 'Device map'),
-    'timeline': ('crgame_ros.driver.timeline_file', 'TimelineFile', 'Scripted driver'),
-    'occupancy': ('crgame_ros.occupancy.occupancy_map_file', 'MapEntry', 'Occupancy map'),
-    'control': ('crgame_ros.vehicle.control_settings', 'ControlSettings', 'Gains and lags')}
-
-
-def schema_of(kind: str) -> dict[str, Any]:
-    """Give the JSON Schema of a kind of file."""
-    from crgame_ros.schema.json_schema import json_schema
-    module, name, title = KINDS[kind]
-    return json_schema(getattr(importlib.import_module(module), name), title)
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.description = DESCRIPTION
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument('kind', nargs='?', default='game', choices=tuple(KINDS),
+    parser.add_argument('kind', nargs='?', default='game', choices=tuple(FILE_KINDS),
                         help='kind of file (default: game)')
     parser.add_argument('--out', type=Path, metavar='FILE', help='write it there, not to stdout')
     parser.set_defaults(command=run)
@@ -66,7 +47,7 @@ def run(values: argparse.Namespace) -> int:
 
     :raises InputError: if the file cannot be written.
     """
-    text = json.dumps(schema_of(values.kind), indent=2, ensure_ascii=False) + '\n'
+    text = json.dumps(FILE_KINDS[values.kind].schema(), indent=2, ensure_ascii=False) + '\n'
     if values.out is None:
         print(text, end='')
         return 0

@@ -42,9 +42,9 @@ from crgame_ros.schema.declaration import (
     split,
     wanted,
 )
+from crgame_ros.schema.file_kinds import FILE_KINDS
 from crgame_ros.schema.marks import Folder, Keyed, Meaning, Numbered, OnlyWith
 from crgame_ros.schema.writing import write
-from crgame_ros.schema_command import KINDS
 
 DOCS = Path(__file__).resolve().parent.parent / 'docs'
 REFERENCE = DOCS / 'keys.md'
@@ -60,9 +60,9 @@ _TABLE = re.compile(r'(<!-- keys: ([\w.]+):(\w+) -->\n).*?(<!-- keys: end -->)',
 def reference() -> str:
     """Give the page of every key."""
     parts, done = [NOTICE], set[Any]()
-    for module, name, title in KINDS.values():
-        top = getattr(importlib.import_module(module), name)
-        for label, kind in sections(title, top):
+    for file_kind in FILE_KINDS.values():
+        top = file_kind.declared
+        for label, kind in sections(file_kind.title, top):
             if kind not in done:
                 done.add(kind)
                 parts += [f'{"##" if kind is top else "###"} {label}', summary(kind), table(kind)]

@@ -36,6 +36,11 @@ import numpy as np
 from shapely.errors import GEOSException
 
 _DIAGNOSTICS = '/diagnostics'
+# Besides table I, what stands in every report.
+REPORT_KEYS = frozenset((
+    'gaps', 'scenario_steps', 'planners', 'drivability', 'contacts', 'benchmark_id', 'epoch',
+    'notices', 'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',
+    'real_time_ratio', 'time_efficiency', 'precision_ratio'))
 # Counts of a status `sim_node: <av> plans`, as the engine keeps them.
 _PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
                 'steps_without_plan')

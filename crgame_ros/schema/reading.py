@@ -79,6 +79,15 @@ def read(kind: type[T], values: Any, where: str, base: Path = _HERE) -> T:
         raise InputError(first.what, first.where, remedy) from error
 
 
+def faults_of(kind: type[Any], values: Any, where: str, base: Path) -> tuple[InputError, ...]:
+    """Give everything that `read` would refuse, each by itself."""
+    try:
+        _Reader(base).value(kind, (), values, '', where)
+    except InputError as error:
+        return error.wrong if isinstance(error, _SeveralError) else (error,)
+    return ()
+
+
 class _SeveralError(InputError):
     """Everything that is wrong with one value, in the order in which it was found."""
 

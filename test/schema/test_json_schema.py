@@ -26,7 +26,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.game_file import dump_game, load_game, parse_game
 from crgame_ros.occupancy.occupancy_map_file import map_text
 from crgame_ros.paths import config_directory, scenarios_directory
-from crgame_ros.schema_command import KINDS, schema_of
+from crgame_ros.schema.file_kinds import FILE_KINDS
 from jsonschema import Draft202012Validator
 import pytest
 import yaml
@@ -86,7 +86,7 @@ VALUES: list[Any] = [None, True, 0, -1, 0.5, 7, 1e9 + 0.5, 'x', '', 'reactive', 
 
 def validator(kind: str) -> Draft202012Validator:
     """Make one that checks by the schema alone."""
-    schema = schema_of(kind)
+    schema = FILE_KINDS[kind].schema()
     Draft202012Validator.check_schema(schema)
     return Draft202012Validator(schema)
 
@@ -155,8 +155,8 @@ def test_reader_and_schema_refuse_the_same() -> None:
 
 def test_every_key_is_described() -> None:
     """By its sentence in the docstring, which the tables of the documentation have too."""
-    for kind in KINDS:
-        schema = schema_of(kind)
+    for kind in FILE_KINDS:
+        schema = FILE_KINDS[kind].schema()
         for name, part in {'': schema, **schema['$defs']}.items():
             part = part['anyOf'][1] if 'anyOf' in part and 'type' not in part else part
             for key, entry in part.get('properties', {}).items():
@@ -167,9 +167,10 @@ def test_every_key_is_described() -> None:
 def test_the_command_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """To standard output or into a file; a folder that is none is told in one line."""
     assert main(['schema']) == 0
-    assert json.loads(capsys.readouterr().out) == schema_of('game')
+    assert json.loads(capsys.readouterr().out) == FILE_KINDS['game'].schema()
     assert main(['schema', 'vehicle', '--out', str(tmp_path / 'v.json')]) == 0
-    assert json.loads((tmp_path / 'v.json').read_text(encoding='utf-8')) == schema_of('vehicle')
+    written = json.loads((tmp_path / 'v.json').read_text(encoding='utf-8'))
+    assert written == FILE_KINDS['vehicle'].schema()
     assert main(['schema', '--out', str(tmp_path / 'none' / 'v.json')]) == 2
     assert 'cannot be written (No such file' in capsys.readouterr().err
     assert main(['schema', 'cake']) == 2

@@ -1,0 +1,64 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The command `crgame validate`: whether files are what they should be."""
+
+import argparse
+from pathlib import Path
+import sys
+
+from crgame_ros.errors import InputError
+
+DESCRIPTION = """\
+Check files as the program itself does before it reads or after it writes them, and say what is
+wrong.
+
+  crgame validate runs/NAME scenarios/cut_in.yaml my_scenario.xml
+
+It knows CommonRoad scenarios and solutions, games and the other YAML files of this program,
+recordings, the folder of a run, and tables with their datapackage.json. Exit code 0:
+all are valid; 2: something is wrong with one of them."""
+INVALID = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument('files', nargs='+', type=Path, metavar='FILE', help='file or folder')
+    parser.set_defaults(command=validate_files)
+
+
+def validate_files(values: argparse.Namespace) -> int:
+    """Check each file, and say what was found; what is wrong goes to stderr."""
+    from crgame_ros.analysis.validation import parts_of, validate
+    from crgame_ros.recording.progress import Progress
+    code = 0
+    for path in [part for file in values.files for part in parts_of(file)]:
+        progress = Progress(lambda line: print(line, file=sys.stderr, flush=True),
+                            f'reading {path}')
+        try:
+            verdict = validate(path, progress)
+        except InputError as error:
+            print(f'error: {error}', file=sys.stderr)
+            code = INVALID
+            continue
+        state = 'not valid' if verdict.faults else 'valid'
+        print(f'{path}: {verdict.kind}, {state}', flush=True)
+        for remark in verdict.remarks:
+            print(f'  note: {remark}')
+        for fault in verdict.faults:
+            print(f'  error: {fault}', file=sys.stderr)
+            code = INVALID
+    return code

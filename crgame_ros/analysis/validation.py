@@ -1,0 +1,188 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Whether files are what they should be: each kind checked as the program itself checks it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import CrgameError, InputError, one_line
+from crgame_ros.game.game import Game
+from crgame_ros.recording.epochs import epoch_numbers
+from crgame_ros.recording.exceptions import RunTooShortError
+from crgame_ros.recording.info import describe
+from crgame_ros.recording.metadata import METADATA_FILE
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.timing_report import REPORT_KEYS
+from crgame_ros.scenario import guard
+from crgame_ros.scenario.export_network import schema_errors
+from crgame_ros.scenario.loading import parse_scenario
+from crgame_ros.schema.file_kinds import FILE_KINDS, FileKind
+from crgame_ros.schema.reading import faults_of
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.yaml_text import read_text, read_yaml
+
+Progress = Callable[[float], object]
+_RECORDINGS = ('.mcap', '.db3')
+_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """
+    What was found in a file.
+
+    :param kind: what it is, in a few words.
+    :param faults: what is wrong, one line each; none of a valid file.
+    :param remarks: what is worth knowing of a valid one.
+    """
+
+    kind: str
+    faults: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def validate(path: Path, progress: Progress | None = None) -> Verdict:
+    """
+    Check a file, or the folder of a recording, a run or tables.
+
+    :param progress: is told how much has been read, from 0 to 1, where it takes long.
+    :raises InputError: if there is no such file, or it is of no known kind.
+    """
+    if not path.exists():
+        raise InputError('no such file or folder', str(path), 'check the name')
+    check = _check_of(path)
+    try:
+        return check(path, progress)
+    except CrgameError as error:
+        return Verdict(_name_of(path), (str(error),))
+
+
+def parts_of(path: Path) -> list[Path]:
+    """Give what is to be checked of a path: of the folder of a run all its files."""
+    if not path.is_dir() or recording_in(path) == path:
+        return [path]
+    return [recording_in(path), *sorted(file for file in path.iterdir()
+                                        if file.suffix in ('.xml', '.yaml', '.json'))]
+
+
+def _check_of(path: Path) -> Callable[[Path, Progress | None], Verdict]:
+    if path.is_dir():
+        bag = recording_in(path)
+        if (bag / METADATA_FILE).exists() or any(
+                file.suffix in _RECORDINGS for file in bag.iterdir()):
+            return _recording
+        raise InputError('holds neither a recording nor tables', str(path),
+                         'name a file, or the folder of a run, of a recording or of tables')
+    known = {'.xml': _scenario, '.json': _timing, '.yaml': _yaml, '.yml': _yaml,
+             **dict.fromkeys(_RECORDINGS, _recording)}
+    if path.suffix.lower() not in known:
+        raise InputError(f'no kind of file is known by "{path.suffix}"', str(path),
+                         'name one of .xml, .yaml, .json, .mcap or .db3')
+    return known[path.suffix.lower()]
+
+
+def _name_of(path: Path) -> str:
+    names = {'.xml': 'XML file', '.yaml': 'YAML file', '.yml': 'YAML file', '.json': 'JSON file'}
+    return names.get(path.suffix.lower(), 'recording')
+
+
+def _scenario(path: Path, _progress: Progress | None) -> Verdict:
+    """Check a scenario by the schema of its version, where that is known, and by reading it."""
+    source = str(path)
+    root = guard.parse_hardened(guard.read_text(path), source)
+    version = root.get('commonRoadVersion') or 'unknown'
+    kind = f'CommonRoad scenario of version {version}'
+    errors = schema_errors(root) if version == '2020a' else []
+    faults = [f'{source}: {one_line(each)}' for each in errors[:_SHOWN]]
+    if len(errors) > _SHOWN:
+        faults.append(f'{source}: {len(errors) - _SHOWN} more by the schema')
+    remarks = [] if version == '2020a' else [
+        f'only the schema of 2020a is at hand: read, and not checked by that of {version}']
+    try:
+        remarks += parse_scenario(guard.read_text(path), source).notices
+    except InputError as error:
+        faults.append(str(error))
+    return Verdict(kind, tuple(faults), tuple(remarks))
+
+
+def _yaml(path: Path, _progress: Progress | None) -> Verdict:
+    """Check a file that users write; a game with its scenario, as before a run."""
+    values = read_yaml(path, 'file')
+    file_kind, wrong = _yaml_kind(values, path)
+    faults = [str(error) for error in wrong]
+    remarks: tuple[str, ...] = ()
+    if file_kind.declared is Game and not faults:
+        from crgame_ros.game.game_file import parse_game
+        try:
+            remarks = build_setup(parse_game(values, str(path), path.parent)).notices
+        except InputError as error:
+            faults.append(str(error))
+    return Verdict(file_kind.title.lower(), tuple(faults[:_SHOWN]), remarks)
+
+
+def _yaml_kind(values: Any, path: Path) -> tuple[FileKind, tuple[InputError, ...]]:
+    """Choose the kind of file that has most of the keys, and least that is wrong with it."""
+    shares = {name: len(kind.keys() & values.keys()) if isinstance(values, dict) else 0
+              for name, kind in FILE_KINDS.items()}
+    most = max(shares.values())
+    if not most:
+        raise InputError('has no keys of a game or of any other kind of file', str(path),
+                         'see `crgame schema --help` for the kinds')
+    found = [(kind, faults_of(kind.declared, values, str(path), path.parent))
+             for name, kind in FILE_KINDS.items() if shares[name] == most]
+    return min(found, key=lambda each: len(each[1]))
+
+
+def _timing(path: Path, _progress: Progress | None) -> Verdict:
+    """Check a timing report by what every one of them has."""
+    try:
+        content = json.loads(read_text(path, 'JSON file'))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f'is no JSON ({error})', str(path)) from error
+    missing = sorted(REPORT_KEYS - content.keys()) if isinstance(content, dict) else ['everything']
+    return Verdict('timing report', tuple(
+        [f'{path}: lacks {", ".join(missing)}'] if missing else ()))
+
+
+def _recording(path: Path, progress: Progress | None) -> Verdict:
+    """Check that a recording is finished, explains itself and misses nothing."""
+    bag = recording_in(path)
+    info = describe(bag)
+    kind = f'recording of {info.duration_s:.1f} s in {info.storage}'
+    faults, remarks = [], list(info.notices)
+    if not info.complete:
+        faults.append(f'{bag}: was cut off; `crgame recover` finishes it')
+    if info.game is None:
+        faults.append(f'{bag}: no /scenario/game in it: record from before the start of the run')
+        return Verdict(kind, tuple(faults), tuple(remarks))
+    if info.cycles is not None and info.cycles.missing:
+        faults.append(f'{bag}: {info.cycles.missing} cycles are missing: it cannot be repeated to '
+                      'the last bit')
+    with BagReader(bag, parts=True) as reader:
+        epochs = epoch_numbers(reader)
+    for number, epoch in enumerate(epochs):
+        try:
+            log = read_run_log(bag, epoch, progress)
+            remarks += [f'run {number + 1}: {notice}' for notice in log.notices]
+        except RunTooShortError as error:
+            remarks.append(str(error))
+        except InputError as error:
+            faults.append(f'run {number + 1}: {error}')
+    return Verdict(kind, tuple(faults), tuple(dict.fromkeys(remarks)))

@@ -1,0 +1,62 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The kinds of YAML files that users write, and the classes that declare them."""
+
+import importlib
+from typing import Any, NamedTuple
+
+from crgame_ros.schema.json_schema import json_schema
+
+
+class FileKind(NamedTuple):
+    """
+    A kind of file.
+
+    :param module: that declares it.
+    :param name: of the class there.
+    :param title: for people.
+    """
+
+    module: str
+    name: str
+    title: str
+
+    @property
+    def declared(self) -> type[Any]:
+        """Give the class that declares it."""
+        kind: type[Any] = getattr(importlib.import_module(self.module), self.name)
+        return kind
+
+    def schema(self) -> dict[str, Any]:
+        """Give its JSON Schema."""
+        return json_schema(self.declared, self.title)
+
+    def keys(self) -> frozenset[str]:
+        """Give the keys that a file of it may begin with."""
+        schema = self.schema()
+        root = schema['$defs'][schema['$ref'].rpartition('/')[2]]
+        return frozenset(root.get('properties', ()))
+
+
+FILE_KINDS = {
+    'game': FileKind('crgame_ros.game.game', 'Game', 'Game file'),
+    'vehicle': FileKind('crgame_ros.vehicle.parameters', 'VehicleParameters', 'Vehicle'),
+    'steering': FileKind('crgame_ros.vehicle.steering', 'SteeringRatioTable',
+                         'Table of steering ratios'),
+    'device': FileKind('crgame_ros.driver.device_file', 'DeviceFile', 'Device map'),
+    'timeline': FileKind('crgame_ros.driver.timeline_file', 'TimelineFile', 'Scripted driver'),
+    'occupancy': FileKind('crgame_ros.occupancy.occupancy_map_file', 'MapEntry', 'Occupancy map'),
+    'control': FileKind('crgame_ros.vehicle.control_settings', 'ControlSettings',
+                        'Gains and lags')}

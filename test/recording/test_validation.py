@@ -1,0 +1,117 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""`crgame validate`: what is wrong with a file is said, and nothing of one that is right."""
+
+from pathlib import Path
+import shutil
+from typing import Any
+
+from crgame_ros.cli import main
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory, share_directory
+from crgame_ros.recording.finish import finish_run
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+import pytest
+
+
+@pytest.fixture(scope='module')
+def run(recorder: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Record a second of a game, with all files of a run."""
+    folder = tmp_path_factory.mktemp('runs') / 'run'
+    setup = build_setup(load_game(scenarios_directory() / 'parked_cars.yaml'))
+    result = run_offline(setup, duration_s=1.0)
+    recorder.ours(folder / 'bag', recorder.messages(result))
+    assert finish_run(folder, print) == 0
+    return folder
+
+
+def _told(path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    code = main(['validate', str(path)])
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+@pytest.mark.parametrize(('name', 'kind'), [
+    ('scenarios/cut_in.yaml', 'game file'), ('scenarios/cut_in.keys.yaml', 'scripted driver'),
+    ('config/control.yaml', 'gains and lags'), ('config/vehicles/bmw_320i.yaml', 'vehicle'),
+    ('config/devices/keyboard.yaml', 'device map'),
+    ('config/vehicles/steering_ratio.yaml', 'table of steering ratios'),
+    ('scenarios/ZAM_CutIn-1_1_T-1.xml', 'CommonRoad scenario of version 2020a')])
+def test_own_files_are_valid_and_of_their_kind(name: str, kind: str,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    path = share_directory() / name
+    assert _told(path, capsys) == (0, f'{path}: {kind}, valid\n', '')
+
+
+def test_the_folder_of_a_run_is_all_its_files(run: Path,
+                                              capsys: pytest.CaptureFixture[str]) -> None:
+    """Recording, scenario and timing report, each by itself."""
+    code, out, err = _told(run, capsys)
+    assert (code, err) == (0, '')
+    lines = [line.partition(': ')[2] for line in out.splitlines() if not line.startswith('  ')]
+    assert len(lines) == 3 and all(line.endswith(', valid') for line in lines)
+    assert {line.split(' of ')[0].split(',')[0] for line in lines} == {
+        'recording', 'CommonRoad scenario', 'timing report'}
+
+
+def test_all_that_is_wrong_with_a_game_is_told(tmp_path: Path,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'game.yaml'
+    file.write_text('scenario: none.xml\nseed: many\nduration: -3\ncolour: red\n')
+    code, out, err = _told(file, capsys)
+    assert code == 2 and out == f'{file}: game file, not valid\n'
+    assert len(err.splitlines()) == 3
+    assert all(word in err for word in ('seed', 'duration', 'colour'))
+    file.write_text('scenario: none.xml\n')
+    assert 'none.xml' in _told(file, capsys)[2]
+
+
+def test_a_scenario_is_checked_by_the_schema(tmp_path: Path,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    """An element that the schema does not know, and a document type that nobody reads."""
+    text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
+    file = tmp_path / 'changed.xml'
+    file.write_text(text.replace('</commonRoad>', '<weather/></commonRoad>'))
+    code, out, err = _told(file, capsys)
+    assert code == 2 and 'not valid' in out and 'weather' in err
+    start = text.index('<commonRoad')
+    file.write_text(text[:start] + '<!DOCTYPE a [<!ENTITY b "c">]>' + text[start:])
+    code, _, err = _told(file, capsys)
+    assert code == 2 and len(err.splitlines()) == 1 and 'document type' in err.lower()
+
+
+def test_a_recording_that_was_cut_off_is_none(run: Path, tmp_path: Path,
+                                              capsys: pytest.CaptureFixture[str]) -> None:
+    """It says what finishes it."""
+    shutil.copytree(run / 'bag', tmp_path / 'bag')
+    (file,) = (tmp_path / 'bag').glob('*.mcap')
+    file.write_bytes(file.read_bytes()[:-100])
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    code, _, err = _told(tmp_path / 'bag', capsys)
+    assert code == 2 and 'crgame recover' in err
+
+
+@pytest.mark.parametrize(('name', 'content', 'words'), [
+    ('missing.xml', None, 'no such file'), ('a.txt', 'hello', 'no kind of file'),
+    ('a.yaml', 'weather: fine\n', 'no keys of a game'), ('a.json', '{"gaps": 0}', 'lacks'),
+    ('b.json', '[' * 100_000, 'no JSON'), ('a.xml', '<html/>', '<html>')])
+def test_what_is_nothing_is_said_in_a_line(name: str, content: str | None, words: str,
+                                           tmp_path: Path,
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    code, _, err = _told(tmp_path / name, capsys)
+    assert code == 2 and words in err and len(err.splitlines()) == 1
