@@ -44,7 +44,7 @@ _SHOWN = 20
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FileVerdict:
     """
     What was found in a file.
 
@@ -58,7 +58,7 @@ class Verdict:
     remarks: tuple[str, ...] = ()
 
 
-def validate(path: Path, progress: Progress | None = None) -> Verdict:
+def validate(path: Path, progress: Progress | None = None) -> FileVerdict:
     """
     Check a file, or the folder of a recording, a run or tables.
 
@@ -71,7 +71,7 @@ def validate(path: Path, progress: Progress | None = None) -> Verdict:
     try:
         return check(path, progress)
     except CrgameError as error:
-        return Verdict(_name_of(path), (str(error),))
+        return FileVerdict(_name_of(path), (str(error),))
 
 
 def parts_of(path: Path) -> list[Path]:
@@ -82,7 +82,7 @@ def parts_of(path: Path) -> list[Path]:
                                         if file.suffix in ('.xml', '.yaml', '.json'))]
 
 
-def _check_of(path: Path) -> Callable[[Path, Progress | None], Verdict]:
+def _check_of(path: Path) -> Callable[[Path, Progress | None], FileVerdict]:
     if path.is_dir():
         bag = recording_in(path)
         if (bag / METADATA_FILE).exists() or any(
@@ -103,7 +103,7 @@ def _name_of(path: Path) -> str:
     return names.get(path.suffix.lower(), 'recording')
 
 
-def _scenario(path: Path, _progress: Progress | None) -> Verdict:
+def _scenario(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check a scenario by the schema of its version, where that is known, and by reading it."""
     source = str(path)
     root = guard.parse_hardened(guard.read_text(path), source)
@@ -119,10 +119,10 @@ def _scenario(path: Path, _progress: Progress | None) -> Verdict:
         remarks += parse_scenario(guard.read_text(path), source).notices
     except InputError as error:
         faults.append(str(error))
-    return Verdict(kind, tuple(faults), tuple(remarks))
+    return FileVerdict(kind, tuple(faults), tuple(remarks))
 
 
-def _yaml(path: Path, _progress: Progress | None) -> Verdict:
+def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check a file that users write; a game with its scenario, as before a run."""
     values = read_yaml(path, 'file')
     file_kind, wrong = _yaml_kind(values, path)
@@ -134,7 +134,7 @@ def _yaml(path: Path, _progress: Progress | None) -> Verdict:
             remarks = build_setup(parse_game(values, str(path), path.parent)).notices
         except InputError as error:
             faults.append(str(error))
-    return Verdict(file_kind.title.lower(), tuple(faults[:_SHOWN]), remarks)
+    return FileVerdict(file_kind.title.lower(), tuple(faults[:_SHOWN]), remarks)
 
 
 def _yaml_kind(values: Any, path: Path) -> tuple[FileKind, tuple[InputError, ...]]:
@@ -150,18 +150,18 @@ def _yaml_kind(values: Any, path: Path) -> tuple[FileKind, tuple[InputError, ...
     return min(found, key=lambda each: len(each[1]))
 
 
-def _timing(path: Path, _progress: Progress | None) -> Verdict:
+def _timing(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check a timing report by what every one of them has."""
     try:
         content = json.loads(read_text(path, 'JSON file'))
     except (ValueError, RecursionError) as error:
         raise InputError(f'is no JSON ({error})', str(path)) from error
     missing = sorted(REPORT_KEYS - content.keys()) if isinstance(content, dict) else ['everything']
-    return Verdict('timing report', tuple(
+    return FileVerdict('timing report', tuple(
         [f'{path}: lacks {", ".join(missing)}'] if missing else ()))
 
 
-def _recording(path: Path, progress: Progress | None) -> Verdict:
+def _recording(path: Path, progress: Progress | None) -> FileVerdict:
     """Check that a recording is finished, explains itself and misses nothing."""
     bag = recording_in(path)
     info = describe(bag)
@@ -171,7 +171,7 @@ def _recording(path: Path, progress: Progress | None) -> Verdict:
         faults.append(f'{bag}: was cut off; `crgame recover` finishes it')
     if info.game is None:
         faults.append(f'{bag}: no /scenario/game in it: record from before the start of the run')
-        return Verdict(kind, tuple(faults), tuple(remarks))
+        return FileVerdict(kind, tuple(faults), tuple(remarks))
     if info.cycles is not None and info.cycles.missing:
         faults.append(f'{bag}: {info.cycles.missing} cycles are missing: it cannot be repeated to '
                       'the last bit')
@@ -185,4 +185,4 @@ def _recording(path: Path, progress: Progress | None) -> Verdict:
             remarks.append(str(error))
         except InputError as error:
             faults.append(f'run {number + 1}: {error}')
-    return Verdict(kind, tuple(faults), tuple(dict.fromkeys(remarks)))
+    return FileVerdict(kind, tuple(faults), tuple(dict.fromkeys(remarks)))
