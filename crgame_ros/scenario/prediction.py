@@ -25,7 +25,7 @@ from typing import Protocol
 
 from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.roads.lane_line import LaneLine
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.roads.lane_lookup import LaneLookup
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles
@@ -236,7 +236,7 @@ class LanePrediction:
             where = np.flatnonzero(found == lane)
             line = self._network.line(self._network.lanelet_ids[lane])
             s, d = line.project(poses[where, :2])
-            yaw = np.interp(s, line.s, line.headings)
+            yaw = line.heading_at(s)
             along = np.abs(wrap_pi_array(poses[where, 2] - yaw)) <= limits[where]
             where = where[along]
             lanes[where] = self._number(lane)
@@ -263,7 +263,7 @@ class LanePrediction:
         tables = []
         for lane in self._used:
             lanelet_id = self._network.lanelet_ids[lane]
-            line = LaneLine(self._network.lane_path(lanelet_id, self._reach))
+            line = Curve(self._network.lane_path(lanelet_id, self._reach))
             end = self._network.line(lanelet_id).length + self._reach
             s = np.arange(-_BEHIND, end + 2.0 * _SPACING, _SPACING)
             tables.append(line.poses(s, np.zeros_like(s)))

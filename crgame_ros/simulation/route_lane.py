@@ -17,8 +17,8 @@
 from math import cos, sin
 
 from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
-from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.vehicle.state import VehicleState
@@ -46,7 +46,7 @@ class RouteLane:
         self._transform = transform
         lanelet, s = start_lanelet(roads, *self._on_map(start))
         route = find_route(roads, lanelet, s, goal_lanelets(roads, problem), BEYOND_GOAL)
-        self._lines = [LaneLine(np.concatenate([roads.line(item).points for item in leg]))
+        self._lines = [Curve(np.concatenate([roads.line(item).points for item in leg]))
                        for leg in route.legs]
         # Finds the nearest place of a long line fastest.
         self._strings = [shapely.LineString(line.points) for line in self._lines]

@@ -19,8 +19,8 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.polyline import resample
-from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import find_route, in_lane
 import numpy as np
@@ -46,15 +46,15 @@ class OwnPath(NamedTuple):
     :param curvatures: (n + 1) of its n segments, with the straight parts before and behind [1/m]
     """
 
-    line: LaneLine
+    line: Curve
     samples: FloatArray
     curvatures: FloatArray
 
     @classmethod
     def along(cls, points: FloatArray) -> 'OwnPath':
         """Make it of a polyline (n, 2) [m]."""
-        line = LaneLine(points)
-        bends = np.diff(line.headings) / np.diff(line.s)
+        line = Curve(points)
+        bends = np.diff(line.heading) / np.diff(line.s)
         return cls(line, resample(points, SPACING), np.concatenate(([0.0], bends, [0.0])))
 
     def near(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -111,7 +111,7 @@ class OwnPaths:
         if lanelet is not None:
             path = self._on_lane(self._goals[vehicle], lanelet)
             s = path.near(np.array([[x, y]]))[1]
-            heading = float(np.interp(s, path.line.s, path.line.headings)[0])
+            heading = float(path.line.heading_at(s)[0])
             if abs(wrap_pi(yaw - heading)) <= MAX_ANGLE:
                 return path
         ahead = (x + REACH * math.cos(yaw), y + REACH * math.sin(yaw))
