@@ -22,35 +22,54 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Positions times segments handled at once, which bounds the memory of a projection.
+# Points times segments handled at once, which bounds the memory of a projection.
 _CHUNK = 2_000_000
 
 
 class Curve:
     """
-    A polyline with arc length s and offset d to the left; straight beyond both ends.
+    Points by their arc lengths s, and offsets d to the left; straight beyond both ends.
 
-    The heading is interpolated between the vertices, so that lines of constant d are continuous
-    where the polyline bends.
+    Positions are linear between the points, and headings too, so that lines of constant d are
+    continuous where the curve bends.
 
-    :param points: (n, 2) vertices [m], n >= 2, not all equal; repeated ones are dropped.
+    :param points: (n, 2), n >= 2, no two of them in a row the same [m]
+    :param s: (n) their arc lengths, the first 0 [m]
+    :param heading: (n) the directions there, unwrapped: no jumps of 2 pi [rad]
     """
 
-    def __init__(self, points: FloatArray) -> None:
-        step = np.hypot(*np.diff(points, axis=0).T)
-        self.points: FloatArray = points[np.concatenate(([True], step > 1e-6))]
-        chord = np.diff(self.points, axis=0)
-        self.steps: FloatArray = np.hypot(*chord.T)
-        self.directions: FloatArray = chord / self.steps[:, None]
-        self.s: FloatArray = np.concatenate(([0.0], np.cumsum(self.steps)))
+    def __init__(self, points: FloatArray, s: FloatArray, heading: FloatArray) -> None:
+        self.points = points
+        self.s = s
+        self.heading = heading
+
+    @classmethod
+    def from_polyline(cls, points: FloatArray) -> 'Curve':
+        """
+        Make a curve of vertices, at which the heading is between those of the segments.
+
+        :param points: (n, 2), n >= 2, not all equal; repeated ones are dropped [m]
+        """
+        points = points[np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > 1e-6))]
+        chord = np.diff(points, axis=0)
         angle = np.unwrap(np.arctan2(chord[:, 1], chord[:, 0]))
         middle = 0.5 * (angle[1:] + angle[:-1])
-        self.heading: FloatArray = np.concatenate((angle[:1], middle, angle[-1:]))
+        return cls(points, arc_length(points), np.concatenate((angle[:1], middle, angle[-1:])))
 
     @property
     def length(self) -> float:
         """Length [m]."""
         return float(self.s[-1])
+
+    @cached_property
+    def steps(self) -> FloatArray:
+        """Lengths of the segments, (n - 1) [m]."""
+        return np.asarray(np.hypot(*np.diff(self.points, axis=0).T))
+
+    @cached_property
+    def directions(self) -> FloatArray:
+        """Unit vectors along the segments, (n - 1, 2)."""
+        return np.asarray(np.diff(self.points, axis=0) / self.steps[:, None])
 
     @cached_property
     def _bends(self) -> FloatArray:
@@ -112,3 +131,43 @@ class Curve:
             if not np.any(better & (np.abs(along) > 1e-9)):
                 break
         return s, d
+
+    def refine(self, points: FloatArray, guess: FloatArray, rounds: int = 3,
+               exact: float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """
+        Project points whose arc length is nearly known, by Newton's method.
+
+        :param points: (N, 2); NaN gives NaN [m]
+        :param guess: (N) arc lengths [m]
+        :param rounds: of correction.
+        :param exact: ends them earlier when all points are so near to their normals [m]
+        :return: arc lengths s and offsets d to the left, both (N) [m]
+        """
+        s = np.asarray(guess, dtype=np.float64)
+        aside = np.zeros_like(s)
+        for left in range(rounds, -1, -1):
+            s = self._within(s)
+            pose = self.pose_at(s)
+            along, aside = seen_from(pose, points)
+            if exact and np.abs(along).max() < exact:
+                break
+            # Beyond the centre of curvature Newton's step would point the wrong way.
+            stretch = np.maximum(1.0 - pose[:, 3] * aside, 0.3)
+            s = s + along / (stretch if left or exact else 1.0)
+        return s, aside
+
+    def _within(self, s: FloatArray) -> FloatArray:
+        """Give the arc lengths from which points beyond the ends are seen: their own."""
+        return s
+
+
+def arc_length(points: FloatArray) -> FloatArray:
+    """Sum the lengths of the segments of a polyline (n, 2): (n) from 0 [m]."""
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    return np.concatenate(([0.0], np.cumsum(lengths)))
+
+
+def nearest(points: FloatArray, samples: FloatArray) -> NDArray[np.intp]:
+    """Give the row of the sample (M, 2) that is nearest to each of points (N, 2)."""
+    return np.argmin((points[:, :1] - samples[:, 0]) ** 2
+                     + (points[:, 1:] - samples[:, 1]) ** 2, axis=1)

@@ -19,6 +19,7 @@ import functools
 import math
 
 from crgame_ros.errors import InputError
+from crgame_ros.geometry.curve import arc_length
 import numpy as np
 from numpy.typing import NDArray
 
@@ -156,12 +157,6 @@ class ReferencePath:
         """Give the samples and the differences to the next ones."""
         table = np.column_stack((self.points, self.heading, self.curvature))
         return table, np.diff(table, axis=0)
-
-
-def arc_length(points: Array) -> Array:
-    """Sum the lengths of the segments of a polyline (n, 2): (n) from 0 [m]."""
-    lengths = np.hypot(*np.diff(points, axis=0).T)
-    return np.concatenate(([0.0], np.cumsum(lengths)))
 
 
 def resample(points: Array, step: float) -> Array:

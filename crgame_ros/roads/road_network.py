@@ -71,8 +71,8 @@ class RoadNetwork:
         """
         line = self._lines.get(lanelet_id)
         if line is None:
-            line = Curve(np.asarray(self._lanelet(lanelet_id).center_vertices[:, :2]))
-            self._lines[lanelet_id] = line
+            vertices = np.asarray(self._lanelet(lanelet_id).center_vertices)
+            line = self._lines[lanelet_id] = Curve.from_polyline(vertices[:, :2])
         return line
 
     def lanelet_at(self, x: float, y: float, yaw: float | None = None) -> int | None:

@@ -263,7 +263,7 @@ class LanePrediction:
         tables = []
         for lane in self._used:
             lanelet_id = self._network.lanelet_ids[lane]
-            line = Curve(self._network.lane_path(lanelet_id, self._reach))
+            line = Curve.from_polyline(self._network.lane_path(lanelet_id, self._reach))
             end = self._network.line(lanelet_id).length + self._reach
             s = np.arange(-_BEHIND, end + 2.0 * _SPACING, _SPACING)
             tables.append(line.poses(s, np.zeros_like(s)))

@@ -222,7 +222,8 @@ def _road_starts(network: RoadNetwork,
     reach: list[tuple[float, int]] = []
     for lanelet in network.lanelet_ids:
         if network.is_for_cars(lanelet) and network.straightest_predecessor(lanelet) is None:
-            reach.append((-Curve(network.lane_path(lanelet, 1000.0)).length, lanelet))
+            line = Curve.from_polyline(network.lane_path(lanelet, 1000.0))
+            reach.append((-line.length, lanelet))
     for _, lanelet in sorted(reach):
         yield from ((lanelet, s) for s in np.arange(0.5 * parameters.length + _MARGIN, min(
             50.0, network.line(lanelet).length), 5.0).tolist())
@@ -266,7 +267,7 @@ def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scen
         parts.insert(0, network.line(before).points)
         back += network.line(before).length
         before = network.straightest_predecessor(before)
-    line = Curve(np.concatenate(parts))
+    line = Curve.from_polyline(np.concatenate(parts))
     s_obj, d_obj = line.project(scene.centers)
     yaw = line.heading_at(s_obj)
     along = scene.velocities[:, 0] * np.cos(yaw) + scene.velocities[:, 1] * np.sin(yaw)

@@ -46,8 +46,9 @@ class RouteLane:
         self._transform = transform
         lanelet, s = start_lanelet(roads, *self._on_map(start))
         route = find_route(roads, lanelet, s, goal_lanelets(roads, problem), BEYOND_GOAL)
-        self._lines = [Curve(np.concatenate([roads.line(item).points for item in leg]))
-                       for leg in route.legs]
+        self._lines = [
+            Curve.from_polyline(np.concatenate([roads.line(item).points for item in leg]))
+            for leg in route.legs]
         # Finds the nearest place of a long line fastest.
         self._strings = [shapely.LineString(line.points) for line in self._lines]
         self.error: float | None = None

@@ -16,11 +16,12 @@
 
 import math
 
-from crgame_ros.geometry.curve import Curve
+from crgame_ros.geometry.curve import Curve, nearest
 from crgame_ros.geometry.pose_frame import beside, seen_from
 import numpy as np
 from numpy.typing import NDArray
 import pytest
+from scipy.spatial import cKDTree
 import shapely
 import shapely.affinity
 
@@ -43,7 +44,7 @@ def zigzag() -> Array:
 
 
 def test_positions_are_those_of_the_polyline() -> None:
-    curve, line = Curve(zigzag()), shapely.LineString(zigzag())
+    curve, line = Curve.from_polyline(zigzag()), shapely.LineString(zigzag())
     assert curve.length == pytest.approx(line.length, abs=1e-9)
     assert len(curve.points) == 12
     s = np.linspace(0.0, curve.length, 101)
@@ -52,7 +53,7 @@ def test_positions_are_those_of_the_polyline() -> None:
 
 
 def test_poses_have_any_shape() -> None:
-    curve = Curve(arc())
+    curve = Curve.from_polyline(arc())
     s = np.linspace(-5.0, curve.length + 5.0, 12)
     flat = curve.pose_at(s)
     assert np.array_equal(curve.pose_at(s.reshape(3, 4)), flat.reshape(3, 4, 4))
@@ -60,7 +61,7 @@ def test_poses_have_any_shape() -> None:
 
 
 def test_a_circle_has_its_heading_and_its_curvature() -> None:
-    curve = Curve(arc())
+    curve = Curve.from_polyline(arc())
     pose = curve.pose_at(np.linspace(5.0, curve.length - 5.0, 50))
     angle = np.arctan2(pose[:, 0], RADIUS - pose[:, 1])
     assert pose[:, 2] == pytest.approx(angle, abs=1e-4)
@@ -68,7 +69,7 @@ def test_a_circle_has_its_heading_and_its_curvature() -> None:
 
 
 def test_it_is_straight_beyond_its_ends() -> None:
-    curve = Curve(arc())
+    curve = Curve.from_polyline(arc())
     before, behind = curve.pose_at(np.array([-7.0, curve.length + 4.0]))
     for pose, end, s in ((before, 0, -7.0), (behind, -1, 4.0)):
         heading = float(curve.heading[end])
@@ -77,14 +78,14 @@ def test_it_is_straight_beyond_its_ends() -> None:
 
 
 def test_headings_do_not_jump_over_a_whole_turn() -> None:
-    curve = Curve(arc(2.5, 1000))
+    curve = Curve.from_polyline(arc(2.5, 1000))
     assert curve.heading[-1] - curve.heading[0] == pytest.approx(5.0 * math.pi, abs=0.02)
     assert np.array_equal(curve.heading_at(curve.s), curve.heading)
 
 
 @pytest.mark.parametrize('d', [-4.0, 0.0, 5.0])
 def test_projection_is_the_inverse_of_poses(d: float) -> None:
-    curve = Curve(arc())
+    curve = Curve.from_polyline(arc())
     s = np.linspace(-8.0, curve.length + 8.0, 60)
     points = curve.poses(s, np.full_like(s, d))[:, :2]
     found_s, found_d = curve.project(points)
@@ -97,7 +98,7 @@ def test_projection_is_the_inverse_of_poses(d: float) -> None:
 
 
 def test_projection_finds_the_nearest_place_that_shapely_finds() -> None:
-    curve, line = Curve(arc()), shapely.LineString(arc())
+    curve, line = Curve.from_polyline(arc()), shapely.LineString(arc())
     random = np.random.default_rng(1)
     points = random.uniform((-5.0, -5.0), (25.0, 65.0), (200, 2))
     # Near the middle of a circle everything is equally far.
@@ -111,8 +112,37 @@ def test_projection_finds_the_nearest_place_that_shapely_finds() -> None:
     assert np.abs(d[inside]) == pytest.approx(away, abs=0.01)
 
 
+@pytest.mark.parametrize('d', [-8.0, 0.5, 12.0])
+def test_refining_a_rough_guess_is_exact_on_a_circle(d: float) -> None:
+    """Points at an offset d are at the arc length that they were made of."""
+    curve = Curve.from_polyline(arc(points=2000))
+    s = np.linspace(3.0, curve.length - 3.0, 40)
+    points = curve.poses(s, np.full_like(s, d))[:, :2]
+    guess = s + np.where(np.arange(len(s)) % 2, 2.0, -2.0)
+    rough, _ = curve.refine(points, guess, 0)
+    found_s, found_d = curve.refine(points, guess, 19, 1e-11)
+    assert found_s == pytest.approx(s, abs=1e-9) and found_d == pytest.approx(d, abs=1e-9)
+    # Newton's method: two rounds take two metres to less than a millimetre.
+    assert curve.refine(points, guess, 2)[0] == pytest.approx(s, abs=1e-3)
+    assert np.abs(rough - s).max() > 0.01
+
+
+def test_refining_goes_straight_on_beyond_the_ends() -> None:
+    curve = Curve.from_polyline(np.array([[0.0, 0.0], [10.0, 0.0]]))
+    points = np.array([[-6.0, 1.0], [17.0, -2.0], [np.nan, 0.0]])
+    s, d = curve.refine(points, np.array([1.0, 9.0, 5.0]))
+    assert s[:2] == pytest.approx((-6.0, 17.0)) and d[:2] == pytest.approx((1.0, -2.0))
+    assert np.isnan((s[2], d[2])).all()
+
+
+def test_the_nearest_sample_is_that_of_a_tree() -> None:
+    random = np.random.default_rng(4)
+    points, samples = random.uniform(-9.0, 9.0, (70, 2)), random.uniform(-9.0, 9.0, (30, 2))
+    assert np.array_equal(nearest(points, samples), cKDTree(samples).query(points)[1])
+
+
 def test_many_points_are_projected_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
-    curve = Curve(arc())
+    curve = Curve.from_polyline(arc())
     points = np.random.default_rng(2).uniform(-10.0, 40.0, (50, 2))
     whole = curve.project(points)
     monkeypatch.setattr('crgame_ros.geometry.curve._CHUNK', 7 * len(curve.steps))

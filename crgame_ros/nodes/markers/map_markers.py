@@ -157,7 +157,7 @@ def line_segments(points: FloatArray, aside: float, dashed: bool) -> list[FloatA
     """
     if not np.ptp(points, axis=0).any():
         return []
-    line = Curve(points)
+    line = Curve.from_polyline(points)
     if dashed:
         pieces = []
         for start in np.arange(0.0, line.length, DASH + GAP).tolist():
