@@ -67,6 +67,29 @@ def test_projection_of_nan_is_nan() -> None:
     assert np.isnan([s[0], d[0]]).all() and np.isfinite([s[1], d[1]]).all()
 
 
+def test_one_pose_is_located_as_many_are() -> None:
+    path = circle()
+    for angle, d in ((0.8, -2.0), (1.5, 0.0), (2.4, 4.0)):
+        x, y = (RADIUS - d) * math.sin(angle), RADIUS - (RADIUS - d) * math.cos(angle)
+        s, aside, heading = path.locate(x, y, RADIUS * angle + 2.0)
+        assert (s, aside) == pytest.approx((RADIUS * angle, d), abs=0.05)
+        assert heading == pytest.approx(angle, abs=0.005)
+        many = path.refine(np.array([[x, y]]), np.array([RADIUS * angle + 2.0]))
+        assert (s, aside) == pytest.approx((many[0][0], many[1][0]), abs=1e-4)
+        assert path.curvature_at(s) == pytest.approx(1.0 / RADIUS, rel=0.02)
+        assert path.curvature_at(s) == pytest.approx(path.pose_at(np.array(s))[3], abs=1e-12)
+
+
+def test_a_path_ends_at_its_ends() -> None:
+    path = ReferencePath.from_polyline(np.array([[0.0, 0.0], [20.0, 0.0]]))
+    assert path.pose_at(np.array([-3.0, 99.0, np.nan]))[:, 0] == pytest.approx(
+        (0.0, path.length, 0.0), abs=1e-4)
+    # Points beyond them have arc lengths all the same.
+    s, d = path.project(np.array([[-4.0, 1.0], [25.0, -2.0]]))
+    assert s == pytest.approx((-4.0, 25.0), abs=1e-4) and d == pytest.approx((1.0, -2.0))
+    assert path.locate(25.0, -2.0, 15.0) == pytest.approx((25.0, -2.0, 0.0), abs=1e-4)
+
+
 def test_window_separates_the_laps_of_a_loop() -> None:
     path = circle(2.0)
     lap = 2.0 * math.pi * RADIUS
