@@ -152,7 +152,7 @@ def _blend(points: Array, s: Array, target: Curve, first: float,
     at = first + u * (last - first)
     here = np.column_stack((np.interp(at, s, points[:, 0]), np.interp(at, s, points[:, 1])))
     along, _ = target.project(here)
-    there = target.poses(along, np.zeros_like(along))[:, :2]
+    there = target.pose_at(along)[:, :2]
     weight = (u ** 3 * (10.0 - 15.0 * u + 6.0 * u ** 2))[:, None]
     return here * (1.0 - weight) + there * weight, float(along[-1])
 

@@ -237,7 +237,7 @@ def _grid(network: RoadNetwork, lanelet: int) -> list[tuple[float, NDArray[np.fl
     if not network.is_for_cars(lanelet):
         return []
     s = np.arange(0.0, line.length, 5.0)
-    return list(zip(s.tolist(), line.poses(s, np.zeros_like(s))[:, :2], strict=True))
+    return list(zip(s.tolist(), line.pose_at(s)[:, :2], strict=True))
 
 
 def _try(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,

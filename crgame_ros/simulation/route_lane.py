@@ -60,7 +60,7 @@ class RouteLane:
         here = shapely.Point(own_x, own_y)
         line, string = min(zip(self._lines, self._strings, strict=True),
                            key=lambda pair: here.distance(pair[1]))
-        x, y, yaw = line.poses(np.array([string.project(here)]), np.zeros(1))[0].tolist()
+        x, y, yaw, _ = line.pose_at(np.array(string.project(here))).tolist()
         self.error = (own_y - y) * cos(yaw) - (own_x - x) * sin(yaw)
         self.worst = max(self.worst, abs(self.error))
 
