@@ -12,11 +12,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""A curve in the plane by its arc length."""
+"""A curve in the plane, and the curvilinear coordinates (s, d) along it (CRG 1)."""
 
 from functools import cached_property
 
-from crgame_ros.geometry.pose_frame import beside, seen_from
+from crgame_ros.geometry.reference_point import beside, seen_from
 import numpy as np
 from numpy.typing import NDArray
 

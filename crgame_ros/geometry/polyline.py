@@ -92,6 +92,11 @@ class ReferencePath(Curve):
         share = (position - index)[..., None]
         return self._table.take(index, 0) + self._slopes.take(index, 0) * share
 
+    def rows(self, first: float, last: float, least: int = 1) -> slice:
+        """Give the samples between two arc lengths [m], `least` segments or more."""
+        low = int(np.clip(first / self.step, 0, len(self.s) - 1 - least))
+        return slice(low, int(np.clip(last / self.step, low + least, len(self.s) - 1)) + 1)
+
     def project(self, points: Array, first: float = -math.inf,
                 last: float = math.inf) -> tuple[Array, Array]:
         """
@@ -102,12 +107,11 @@ class ReferencePath(Curve):
         :param last: arc length at which it ends [m]
         :return: arc lengths s and offsets d to the left of the path, both (...) [m]
         """
-        low = int(np.clip(first / self.step, 0, len(self.heading) - 2))
-        high = int(np.clip(last / self.step, low + 1, len(self.heading) - 1)) + 1
-        coarse = self.points[low:high:COARSE]
+        rows = self.rows(first, last)
+        coarse = slice(rows.start, rows.stop, COARSE)
         shape = points.shape[:-1]
         flat = points.reshape(-1, 2)
-        guess = self.s[low:high:COARSE][nearest(flat, coarse)]
+        guess = self.s[coarse][nearest(flat, self.points[coarse])]
         s, d = self.refine(flat, guess)
         return s.reshape(shape), d.reshape(shape)
 

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import math
 
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.geometry.pose_frame import seen_from
+from crgame_ros.geometry.reference_point import seen_from
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree

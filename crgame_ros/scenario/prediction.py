@@ -26,7 +26,7 @@ from typing import Protocol
 from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.pose_frame import beside
+from crgame_ros.geometry.reference_point import beside
 from crgame_ros.roads.lane_lookup import LaneLookup
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles

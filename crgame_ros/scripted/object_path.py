@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.curve import nearest
-from crgame_ros.geometry.pose_frame import seen_from
+from crgame_ros.geometry.reference_point import seen_from
 from crgame_ros.waypoints.waypoints import WaypointLane
 import numpy as np
 from numpy.typing import NDArray

@@ -17,7 +17,7 @@
 import math
 
 from crgame_ros.geometry.curve import Curve, nearest
-from crgame_ros.geometry.pose_frame import beside, seen_from
+from crgame_ros.geometry.reference_point import beside, seen_from
 import numpy as np
 from numpy.typing import NDArray
 import pytest
