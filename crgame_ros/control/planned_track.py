@@ -19,6 +19,7 @@ from math import cos, sin
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.vehicle.standstill import PLANNED_REST
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
 import numpy as np
@@ -101,7 +102,7 @@ class PlannedTrack:
         self._accelerations: list[float] = (np.diff(speeds) / time_step_s).tolist()
         self._steps: list[list[float]] = steps.tolist()
         self._lengths: list[float] = lengths.tolist()
-        self._ways: list[float] = np.concatenate(((0.0,), np.cumsum(lengths))).tolist()
+        self._ways: list[float] = arc_length(states[:, :2]).tolist()
         self._signs: list[float] = signs.tolist()
         self._curvatures: list[float] = _curvatures(yaws, signs * lengths).tolist()
         self._stops = [i for i, speed in enumerate(self._speeds[1:], 1)

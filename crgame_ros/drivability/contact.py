@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import math
 from typing import Literal, TypeAlias
 
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.vehicle.standstill import REST
@@ -116,7 +117,7 @@ def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
         return False
     end = min(len(mine.poses), step + round(_AFTER_S / dt_s) + 1)
     driven = mine.poses[start:end]
-    moved = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(driven[:, :2], axis=0).T))))
+    moved = arc_length(driven[:, :2])
     time = dt_s * np.arange(len(driven))
     speed = abs(float(mine.speeds[start]))
     braked = np.clip(time - mine.reaction_s, 0.0, speed / mine.braking)

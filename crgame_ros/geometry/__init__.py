@@ -12,4 +12,4 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Rigid transforms, angles, footprints and the curvilinear frame."""
+"""Rigid transforms, angles, footprints, and curves by their arc length."""

@@ -14,11 +14,10 @@
 # limitations under the License.
 """Polylines in the plane, and the smooth, uniformly sampled path that is made of them."""
 
-from dataclasses import dataclass
-import functools
 import math
 
 from crgame_ros.errors import InputError
+from crgame_ros.geometry.curve import arc_length, Curve, nearest
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,10 +29,9 @@ COARSE = 4
 WIDTHS = (2.5, 4.0, 6.0, 9.0)
 
 
-@dataclass(frozen=True)
-class ReferencePath:
+class ReferencePath(Curve):
     """
-    A smooth path, sampled uniformly over its arc length.
+    A smooth curve, tabulated uniformly over its arc length; it ends at both its ends.
 
     :param step: distance between samples [m]
     :param points: (N, 2) positions [m]
@@ -41,10 +39,14 @@ class ReferencePath:
     :param curvature: (N) derivative of the heading, positive to the left [1/m]
     """
 
-    step: float
-    points: Array
-    heading: Array
-    curvature: Array
+    def __init__(self, step: float, points: Array, heading: Array, curvature: Array) -> None:
+        super().__init__(points, step * np.arange(len(heading), dtype=np.float64), heading)
+        self.step = step
+        self.curvature = curvature
+        self._table: Array = np.column_stack((points, heading, curvature))
+        self._slopes: Array = np.diff(self._table, axis=0)
+        # Scalar code reads lists fastest.
+        self._rows: list[list[float]] = self._table.tolist()
 
     @classmethod
     def from_polyline(cls, points: Array, step: float = 0.5,
@@ -77,22 +79,6 @@ class ReferencePath:
                                           np.interp(grid, s, smooth[:, 1]))),
                    np.interp(grid, s, heading), np.interp(grid, s, curvature))
 
-    @property
-    def length(self) -> float:
-        """Length of the path [m]."""
-        return self.step * (len(self.heading) - 1)
-
-    @functools.cached_property
-    def s(self) -> Array:
-        """Arc length of every sample, (N) [m]."""
-        return self.step * np.arange(len(self.heading), dtype=np.float64)
-
-    @functools.cached_property
-    def rows(self) -> tuple[list[float], list[float], list[float], list[float]]:
-        """Give x, y, heading and curvature as lists, which scalar code reads fastest."""
-        return (self.points[:, 0].tolist(), self.points[:, 1].tolist(), self.heading.tolist(),
-                self.curvature.tolist())
-
     def pose_at(self, s: Array) -> Array:
         """
         Interpolate the path.
@@ -103,8 +89,13 @@ class ReferencePath:
         # fmax and fmin prefer a number to NaN.
         position = np.fmin(np.fmax(s / self.step, 0.0), len(self.heading) - 1.000001)
         index = position.astype(np.intp)
-        table, slope = self._table
-        return table.take(index, 0) + slope.take(index, 0) * (position - index)[..., None]
+        share = (position - index)[..., None]
+        return self._table.take(index, 0) + self._slopes.take(index, 0) * share
+
+    def rows(self, first: float, last: float, least: int = 1) -> slice:
+        """Give the samples between two arc lengths [m], `least` segments or more."""
+        low = int(np.clip(first / self.step, 0, len(self.s) - 1 - least))
+        return slice(low, int(np.clip(last / self.step, low + least, len(self.s) - 1)) + 1)
 
     def project(self, points: Array, first: float = -math.inf,
                 last: float = math.inf) -> tuple[Array, Array]:
@@ -116,52 +107,44 @@ class ReferencePath:
         :param last: arc length at which it ends [m]
         :return: arc lengths s and offsets d to the left of the path, both (...) [m]
         """
-        low = int(np.clip(first / self.step, 0, len(self.heading) - 2))
-        high = int(np.clip(last / self.step, low + 1, len(self.heading) - 1)) + 1
-        coarse = self.points[low:high:COARSE]
+        rows = self.rows(first, last)
+        coarse = slice(rows.start, rows.stop, COARSE)
         shape = points.shape[:-1]
         flat = points.reshape(-1, 2)
-        known = np.nan_to_num(flat)
-        distance = ((known[:, 0, None] - coarse[None, :, 0]) ** 2
-                    + (known[:, 1, None] - coarse[None, :, 1]) ** 2)
-        guess = self.step * (low + COARSE * np.argmin(distance, axis=1))
+        guess = self.s[coarse][nearest(flat, self.points[coarse])]
         s, d = self.refine(flat, guess)
         return s.reshape(shape), d.reshape(shape)
 
-    def refine(self, points: Array, guess: Array, iterations: int = 3) -> tuple[Array, Array]:
+    def _within(self, s: Array) -> Array:
+        """Give arc lengths on the path: points beyond it are seen from its ends."""
+        return np.minimum(np.maximum(s, 0.0), self.length)
+
+    def locate(self, x: float, y: float, guess: float) -> tuple[float, float, float]:
         """
-        Project points whose arc length is nearly known, by Newton's method.
+        Refine one arc length as `refine` does, but beyond the ends along the last segments.
 
-        :param points: (n, 2) [m]
-        :param guess: (n) arc lengths [m]
-        :return: s and d, both (n) [m]; beyond the ends of the path along its end tangents.
+        :return: s [m], d [m] and the heading of the path there [rad]
         """
-        absent = np.isnan(points[:, 0])
-        points = np.nan_to_num(points)
-        s = np.asarray(guess, dtype=np.float64)
-        lateral = np.zeros_like(s)
-        for remaining in range(iterations, -1, -1):
-            inside = np.minimum(np.maximum(s, 0.0), self.length)
-            pose = self.pose_at(inside)
-            cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-            dx, dy = points[:, 0] - pose[:, 0], points[:, 1] - pose[:, 1]
-            along, lateral = dx * cos + dy * sin, dy * cos - dx * sin
-            # Beyond the centre of curvature Newton's step would point the wrong way.
-            stretch = np.maximum(1.0 - pose[:, 3] * lateral, 0.3)
-            s = inside + along / (stretch if remaining else 1.0)
-        return np.where(absent, np.nan, s), np.where(absent, np.nan, lateral)
+        s = guess
+        for last in (False, False, True):
+            index = min(max(int(s / self.step), 0), len(self._rows) - 2)
+            f = s / self.step - index
+            here, after = self._rows[index], self._rows[index + 1]
+            heading = here[2] + f * (after[2] - here[2])
+            cos, sin = math.cos(heading), math.sin(heading)
+            dx = x - here[0] - f * (after[0] - here[0])
+            dy = y - here[1] - f * (after[1] - here[1])
+            d = dy * cos - dx * sin
+            along = dx * cos + dy * sin
+            s += along if last else along / max(0.3, 1.0 - here[3] * d)
+        return s, d, heading
 
-    @functools.cached_property
-    def _table(self) -> tuple[Array, Array]:
-        """Give the samples and the differences to the next ones."""
-        table = np.column_stack((self.points, self.heading, self.curvature))
-        return table, np.diff(table, axis=0)
-
-
-def arc_length(points: Array) -> Array:
-    """Sum the lengths of the segments of a polyline (n, 2): (n) from 0 [m]."""
-    lengths = np.hypot(*np.diff(points, axis=0).T)
-    return np.concatenate(([0.0], np.cumsum(lengths)))
+    def curvature_at(self, s: float) -> float:
+        """Interpolate the curvature at one arc length [m], clipped to the path [1/m]."""
+        index = min(max(int(s / self.step), 0), len(self._rows) - 2)
+        f = min(max(s / self.step - index, 0.0), 1.0)
+        here, after = self._rows[index][3], self._rows[index + 1][3]
+        return here + f * (after - here)
 
 
 def resample(points: Array, step: float) -> Array:

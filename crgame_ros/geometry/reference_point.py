@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Points along a pose's heading: from a vehicle's rear axle to its centre, and back."""
+"""Points ahead of a pose and beside it: from a vehicle's rear axle to its centre, and back."""
 
 import math
 
@@ -43,6 +43,32 @@ def shifted(poses: Array, distance: Array | float) -> Array:
     yaw = poses[..., 2]
     return np.stack((poses[..., 0] + distance * np.cos(yaw),
                      poses[..., 1] + distance * np.sin(yaw), yaw), axis=-1)
+
+
+def beside(poses: Array, d: Array) -> Array:
+    """
+    Move poses to their left.
+
+    :param poses: (..., 3 or more) x [m], y [m], yaw [rad]
+    :param d: (...) offsets [m]
+    :return: (..., 3), the yaw unchanged
+    """
+    yaw = poses[..., 2]
+    return np.stack((poses[..., 0] - d * np.sin(yaw), poses[..., 1] + d * np.cos(yaw), yaw),
+                    axis=-1)
+
+
+def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
+    """
+    Give how far points are ahead of poses, and how far to their left.
+
+    :param poses: (..., 3 or more) x [m], y [m], yaw [rad]
+    :param points: (..., 2) [m]
+    :return: both (...) [m]
+    """
+    dx, dy = points[..., 0] - poses[..., 0], points[..., 1] - poses[..., 1]
+    cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    return dx * cos + dy * sin, dy * cos - dx * sin
 
 
 def shifted_velocities(yaw: Array, velocities: Array, distance: Array | float) -> Array:

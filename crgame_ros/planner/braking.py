@@ -16,6 +16,7 @@
 
 import math
 
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.rollout import Rollout
 from crgame_ros.vehicle.parameters import VehicleParameters
@@ -68,8 +69,7 @@ def _steering_over_distance(request: PlanRequest, last_plan: Plan | None,
     states = last_plan.states
     elapsed = (request.stamp_ns - last_plan.stamp_ns) * 1e-9 / request.time_step_s
     position = min(max(elapsed, 0.0), len(states) - 1.0)
-    lengths = np.hypot(*np.diff(states[:, :2], axis=0).T)
-    along = np.concatenate(([0.0], np.cumsum(lengths)))
+    along = arc_length(states[:, :2])
     origin = float(np.interp(position, np.arange(len(states)), along))
     # Slower states do not say where the plan leads.
     ahead = along > origin + REST * request.time_step_s

@@ -67,33 +67,11 @@ class PathFollower:
     def __init__(self, path: ReferencePath, vehicle: VehicleParameters) -> None:
         self.path = path
         self._vehicle = vehicle
-        self._rows = path.rows
-        self._last_index = len(path.heading) - 2
 
     def locate(self, x: float, y: float, yaw: float, guess: float) -> PathPosition:
         """Project a pose whose arc length is known to a few metres [m]."""
-        xs, ys, headings, curvatures = self._rows
-        step = self.path.step
-        s = guess
-        for last in (False, False, True):
-            index = min(max(int(s / step), 0), self._last_index)
-            f = s / step - index
-            heading = headings[index] + f * (headings[index + 1] - headings[index])
-            curvature = curvatures[index]
-            cos, sin = math.cos(heading), math.sin(heading)
-            dx = x - xs[index] - f * (xs[index + 1] - xs[index])
-            dy = y - ys[index] - f * (ys[index + 1] - ys[index])
-            d = dy * cos - dx * sin
-            along = dx * cos + dy * sin
-            s += along if last else along / max(0.3, 1.0 - curvature * d)
+        s, d, heading = self.path.locate(x, y, guess)
         return PathPosition(s, d, wrap_pi(yaw - heading))
-
-    def curvature(self, s: float) -> float:
-        """Interpolate the curvature of the path [1/m]."""
-        index = min(max(int(s / self.path.step), 0), self._last_index)
-        f = min(max(s / self.path.step - index, 0.0), 1.0)
-        row = self._rows[3]
-        return row[index] + f * (row[index + 1] - row[index])
 
     def correction_length(self, position: PathPosition, speed: float) -> float:
         """Choose the length L over which the offset is taken back [m]."""
@@ -142,13 +120,13 @@ class PathFollower:
         if abs(moved) < 1e-4 or time_s <= 0.0:
             return 0.0
         vehicle = self._vehicle
-        path_curvature = self.curvature(position.s)
+        path_curvature = self.path.curvature_at(position.s)
         curvature = math.tan(steering) / vehicle.wheelbase
         cos = max(math.cos(position.heading_error), 0.2)
         bend = curvature - path_curvature * cos / max(0.3, 1.0 - path_curvature * position.d)
         third = -(gains[0] * position.d + gains[1] * math.sin(position.heading_error)
                   + gains[2] * cos * bend)
-        change = self.curvature(position.s + moved) - path_curvature + third * moved
+        change = self.path.curvature_at(position.s + moved) - path_curvature + third * moved
         limit = vehicle.max_steering_angle
         wanted = math.atan(vehicle.wheelbase * (curvature + change))
         wanted = min(max(wanted, -limit), limit)

@@ -30,7 +30,7 @@ from commonroad_rp.utility.config import ReactivePlannerConfiguration  # noqa: E
 from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem  # noqa: E402
 from crgame_ros.errors import PlanningError  # noqa: E402
 from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
-from crgame_ros.geometry.curvilinear import CurvilinearFrame  # noqa: E402
+from crgame_ros.geometry.polyline import ReferencePath  # noqa: E402
 from crgame_ros.messages.plan import PlanRequest  # noqa: E402
 from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
 from crgame_ros.planner.interface import PlannerContext  # noqa: E402
@@ -48,6 +48,16 @@ Array = NDArray[np.float64]
 FRAME_BEHIND = 30.0
 FRAME_LENGTH = 500.0
 FRAME_RESERVE = 300.0
+# Its heading must stay within ±2 pi; the margin covers how the library prolongs it [rad].
+HEADING_LIMIT = 2.0 * np.pi - 0.2
+
+
+def frame_rows(path: ReferencePath, s: float) -> slice:
+    """Choose the points of a path around s [m] that a frame may have: loops come in pieces."""
+    rows = path.rows(s - FRAME_BEHIND, s + FRAME_LENGTH, 3)
+    turn = np.floor(path.heading[rows.start] / (2.0 * np.pi) + 0.5) * 2.0 * np.pi
+    outside = np.flatnonzero(np.abs(path.heading[rows] - turn) > HEADING_LIMIT)
+    return slice(rows.start, rows.start + max(int(outside[0]), 4)) if len(outside) else rows
 
 
 def configuration(context: PlannerContext, steps: int) -> ReactivePlannerConfiguration:
@@ -129,7 +139,7 @@ class ReactiveCore:
         ego = request.ego
         if ego.speed < -REST:
             raise PlanningError('the vehicle rolls backwards, which the package cannot plan')
-        if driving is not self._driving or position.s > self._frame.last - FRAME_RESERVE:
+        if driving is not self._driving or position.s > self._end_s - FRAME_RESERVE:
             self._build_frame(driving, position.s)
         self.slices.update(request, self._steps + 1)
         system = self._system
@@ -182,8 +192,9 @@ class ReactiveCore:
     def _build_frame(self, driving: DrivingPath, s: float) -> None:
         """Build the coordinate system of the path from behind the vehicle on."""
         self._driving = driving
-        self._frame = CurvilinearFrame(driving.path, s - FRAME_BEHIND, s + FRAME_LENGTH)
-        self._system = CoordinateSystem(self._frame.points, preprocess_reference=False,
+        rows = frame_rows(driving.path, s)
+        self._end_s = float(driving.path.s[rows.stop - 1])
+        self._system = CoordinateSystem(driving.path.points[rows], preprocess_reference=False,
                                         clcs_params=CLCSParams())
 
     def _states(self, found: list[ReactivePlannerState]) -> Array:

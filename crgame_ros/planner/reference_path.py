@@ -20,8 +20,9 @@ from itertools import pairwise
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import CrgameError, PlanningError
-from crgame_ros.geometry.polyline import arc_length, ReferencePath
-from crgame_ros.roads.road_network import LaneLine, RoadNetwork
+from crgame_ros.geometry.curve import arc_length, Curve
+from crgame_ros.geometry.polyline import ReferencePath
+from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, in_lane, Route, start_lanelet
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -145,13 +146,13 @@ def _changes_in_row(route: Route, index: int) -> int:
     return count
 
 
-def _blend(points: Array, s: Array, target: LaneLine, first: float,
+def _blend(points: Array, s: Array, target: Curve, first: float,
            last: float) -> tuple[Array, float]:
     u = np.linspace(0.0, 1.0, max(8, int(last - first)))
     at = first + u * (last - first)
     here = np.column_stack((np.interp(at, s, points[:, 0]), np.interp(at, s, points[:, 1])))
     along, _ = target.project(here)
-    there = target.poses(along, np.zeros_like(along))[:, :2]
+    there = target.pose_at(along)[:, :2]
     weight = (u ** 3 * (10.0 - 15.0 * u + 6.0 * u ** 2))[:, None]
     return here * (1.0 - weight) + there * weight, float(along[-1])
 

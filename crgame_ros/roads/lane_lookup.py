@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import math
 
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.reference_point import seen_from
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -65,8 +66,5 @@ class LaneLookup:
         rows = np.arange(len(poses))
         found = np.isfinite(cost[rows, best])
         nearest = known[rows, best]
-        offset = poses[:, :2] - self._poses[nearest, :2]
-        yaw = self._poses[nearest, 2]
-        along = offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)
-        aside = offset[:, 1] * np.cos(yaw) - offset[:, 0] * np.sin(yaw)
+        along, aside = seen_from(self._poses[nearest], poses[:, :2])
         return np.where(found, self._lane[nearest], -1), self._s[nearest] + along, aside

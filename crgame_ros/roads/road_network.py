@@ -21,7 +21,7 @@ from commonroad.common.common_lanelet import LaneletType, RoadUser
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
-from crgame_ros.roads.lane_line import LaneLine
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.roads.road_surface import lanelet_areas
 from crgame_ros.roads.signs import MAX_SPEED, sign_elements
 import numpy as np
@@ -60,10 +60,10 @@ class RoadNetwork:
         self._index = {lanelet_id: i for i, lanelet_id in enumerate(self.lanelet_ids)}
         self._areas = lanelet_areas(self._lanelets)
         self._tree = shapely.STRtree(self._areas)
-        self._lines: dict[int, LaneLine] = {}
+        self._lines: dict[int, Curve] = {}
         self._drivable = np.array([_is_for_cars(x) for x in self._lanelets])
 
-    def line(self, lanelet_id: int) -> LaneLine:
+    def line(self, lanelet_id: int) -> Curve:
         """
         Give the centre line of a lanelet.
 
@@ -71,8 +71,8 @@ class RoadNetwork:
         """
         line = self._lines.get(lanelet_id)
         if line is None:
-            line = LaneLine(np.asarray(self._lanelet(lanelet_id).center_vertices[:, :2]))
-            self._lines[lanelet_id] = line
+            vertices = np.asarray(self._lanelet(lanelet_id).center_vertices)
+            line = self._lines[lanelet_id] = Curve.from_polyline(vertices[:, :2])
         return line
 
     def lanelet_at(self, x: float, y: float, yaw: float | None = None) -> int | None:
@@ -111,11 +111,6 @@ class RoadNetwork:
         first = np.unique(rows[order], return_index=True)
         result[first[0]] = lanes[order][first[1]]
         return result
-
-    def center_line(self, lanelet_id: int) -> tuple[FloatArray, FloatArray]:
-        """Give the centre line: points (n, 2) [m] and their arc lengths (n) [m]."""
-        line = self.line(lanelet_id)
-        return line.points, line.s
 
     def pose_on(self, lanelet_id: int, s: float, d: float = 0.0) -> tuple[float, float, float]:
         """
@@ -254,7 +249,7 @@ class RoadNetwork:
         if not self._drivable[index]:
             score = score + _NOT_FOR_CARS_PENALTY
         if yaws is not None:
-            score = score + np.abs(wrap_pi_array(yaws - np.interp(s, line.s, line.headings)))
+            score = score + np.abs(wrap_pi_array(yaws - line.heading_at(s)))
         return np.asarray(score, dtype=np.float64)
 
     def _straightest(self, lanelet_id: int, candidates: Sequence[int], end: int) -> int | None:
@@ -264,7 +259,7 @@ class RoadNetwork:
         for candidate in candidates:
             other = self.line(candidate)
             gap = np.hypot(*(other.points[-1 - end] - line.points[end]))
-            turn = abs(wrap_pi(float(other.headings[end] - line.headings[end])))
+            turn = abs(wrap_pi(float(other.heading[end] - line.heading[end])))
             if gap <= _MAX_GAP and candidate != lanelet_id:
                 scored.append((not self.is_for_cars(candidate), turn, candidate))
         return min(scored)[2] if scored else None

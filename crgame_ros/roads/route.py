@@ -164,9 +164,9 @@ def _onward(roads: RoadNetwork, lanelet: int) -> int | None:
     for successor in network.find_lanelet_by_id(lanelet).successor:
         if successor not in roads.lanelet_ids:
             continue
-        headings = roads.line(successor).headings
+        headings = roads.line(successor).heading
         turn = abs(float(headings[-1] - headings[0]))
-        turn += abs(wrap_pi(float(headings[0] - roads.line(lanelet).headings[-1])))
+        turn += abs(wrap_pi(float(headings[0] - roads.line(lanelet).heading[-1])))
         ends = not network.find_lanelet_by_id(successor).successor
         scored.append((not roads.is_for_cars(successor), turn + 0.5 * ends, successor))
     return min(scored)[2] if scored else None

@@ -19,6 +19,7 @@ import math
 
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +85,7 @@ class Braking(ObjectCourse):
         self._k, self._time_step_s = k, time_step_s
         self._speed, self._deceleration = speed, deceleration
         self._final_speed = min(speed, final_speed)
-        step = np.hypot(*np.diff(path[:, :2], axis=0).T)
-        self._s = np.concatenate(([0.0], np.cumsum(step)))
+        self._s = arc_length(path[:, :2])
         self._path = path.copy()
         self._path[:, 2] = np.unwrap(path[:, 2])
         self._stops = self._final_speed == 0.0

@@ -25,7 +25,8 @@ from typing import Protocol
 
 from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.roads.lane_line import LaneLine
+from crgame_ros.geometry.curve import Curve
+from crgame_ros.geometry.reference_point import beside
 from crgame_ros.roads.lane_lookup import LaneLookup
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles
@@ -209,10 +210,8 @@ class LanePrediction:
         # The direction must not turn on where a line ends and goes straight on.
         yaw = before[..., 2] + np.clip(fraction[..., 0], 0.0, 1.0) * (
             self._table[cell + 1, 2] - before[..., 2])
-        poses[..., 0] -= d * np.sin(yaw)
-        poses[..., 1] += d * np.cos(yaw)
         poses[..., 2] = yaw
-        return poses
+        return beside(poses, d)
 
     def _assign_lanes(self) -> None:
         poses = self._obstacles.poses
@@ -236,7 +235,7 @@ class LanePrediction:
             where = np.flatnonzero(found == lane)
             line = self._network.line(self._network.lanelet_ids[lane])
             s, d = line.project(poses[where, :2])
-            yaw = np.interp(s, line.s, line.headings)
+            yaw = line.heading_at(s)
             along = np.abs(wrap_pi_array(poses[where, 2] - yaw)) <= limits[where]
             where = where[along]
             lanes[where] = self._number(lane)
@@ -246,7 +245,7 @@ class LanePrediction:
     def _lane_samples(self, lane: int) -> FloatArray:
         line = self._network.line(self._network.lanelet_ids[lane])
         s = np.arange(0.0, line.length + _SPACING, _SPACING)
-        return line.poses(s, np.zeros_like(s))
+        return line.pose_at(s)[:, :3]
 
     def _number(self, lane: int) -> int:
         """Find the number of a lane; a new one is tabulated before it is used."""
@@ -263,10 +262,10 @@ class LanePrediction:
         tables = []
         for lane in self._used:
             lanelet_id = self._network.lanelet_ids[lane]
-            line = LaneLine(self._network.lane_path(lanelet_id, self._reach))
+            line = Curve.from_polyline(self._network.lane_path(lanelet_id, self._reach))
             end = self._network.line(lanelet_id).length + self._reach
             s = np.arange(-_BEHIND, end + 2.0 * _SPACING, _SPACING)
-            tables.append(line.poses(s, np.zeros_like(s)))
+            tables.append(line.pose_at(s)[:, :3])
         self._counts = np.array([len(t) for t in tables])
         self._starts = np.concatenate(([0], np.cumsum(self._counts)[:-1]))
         self._table: FloatArray = np.concatenate(tables)

@@ -23,10 +23,10 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.game import HumanSpec, LaneletSpawn, PoseSpawn
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import exact_position, exact_value
 from crgame_ros.vehicle.parameters import VehicleParameters
@@ -222,7 +222,8 @@ def _road_starts(network: RoadNetwork,
     reach: list[tuple[float, int]] = []
     for lanelet in network.lanelet_ids:
         if network.is_for_cars(lanelet) and network.straightest_predecessor(lanelet) is None:
-            reach.append((-LaneLine(network.lane_path(lanelet, 1000.0)).length, lanelet))
+            line = Curve.from_polyline(network.lane_path(lanelet, 1000.0))
+            reach.append((-line.length, lanelet))
     for _, lanelet in sorted(reach):
         yield from ((lanelet, s) for s in np.arange(0.5 * parameters.length + _MARGIN, min(
             50.0, network.line(lanelet).length), 5.0).tolist())
@@ -236,7 +237,7 @@ def _grid(network: RoadNetwork, lanelet: int) -> list[tuple[float, NDArray[np.fl
     if not network.is_for_cars(lanelet):
         return []
     s = np.arange(0.0, line.length, 5.0)
-    return list(zip(s.tolist(), line.poses(s, np.zeros_like(s))[:, :2], strict=True))
+    return list(zip(s.tolist(), line.pose_at(s)[:, :2], strict=True))
 
 
 def _try(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,
@@ -266,9 +267,9 @@ def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scen
         parts.insert(0, network.line(before).points)
         back += network.line(before).length
         before = network.straightest_predecessor(before)
-    line = LaneLine(np.concatenate(parts))
+    line = Curve.from_polyline(np.concatenate(parts))
     s_obj, d_obj = line.project(scene.centers)
-    yaw = np.interp(s_obj, line.s, line.headings)
+    yaw = line.heading_at(s_obj)
     along = scene.velocities[:, 0] * np.cos(yaw) + scene.velocities[:, 1] * np.sin(yaw)
     ahead = s_obj - (s + back + parameters.rear_to_center)
     gaps = np.abs(ahead) - 0.5 * (scene.lengths + parameters.length)

@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.game.object_spec import MoverType
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.outline import half_extents
 from crgame_ros.scripted.object_surroundings import ObjectSurroundings
 from crgame_ros.vehicle.standstill import QUEUEING
@@ -71,16 +72,13 @@ class Crossing:
     go, he stops again only in front of a vehicle that would hit him. In front of standing bodies
     he stops in any case and waits until they are gone.
 
-    :param points: (P, 2) of his path [m]
+    :param path: of the pedestrian.
     :param walker: radius, speed, acceleration, accepted gap and kept distance.
     """
 
-    def __init__(self, points: FloatArray, walker: MoverType) -> None:
-        self._points, self._walker = points, walker
-        chord = np.diff(points, axis=0)
-        self._lengths: FloatArray = np.hypot(*chord.T)
-        self._starts: FloatArray = np.concatenate(([0.0], np.cumsum(self._lengths)[:-1]))
-        self._directions: FloatArray = chord / self._lengths[:, None]
+    def __init__(self, path: Curve, walker: MoverType) -> None:
+        self._path, self._walker = path, walker
+        self._starts = path.s[:-1]
         # Arc length up to which he has decided to go on.
         self._decided = 0.0
 
@@ -170,17 +168,17 @@ class Crossing:
         :param along: their extents on their x axes, (O,) and (O,) [m]
         :param wide: (O,) to either side [m]
         """
-        delta = self._points[None, :-1] - frames[:, None, :2]
+        delta = self._path.points[None, :-1] - frames[:, None, :2]
         axes = np.stack((np.cos(frames[:, 2]), np.sin(frames[:, 2])), axis=-1)
         across = np.stack((-axes[:, 1], axes[:, 0]), axis=-1)
         start = np.stack([np.einsum('opk,ok->op', delta, axis) for axis in (axes, across)])
-        direction = np.stack([axis @ self._directions.T for axis in (axes, across)])
+        direction = np.stack([axis @ self._path.directions.T for axis in (axes, across)])
         # A direction of 0 on an axis makes the bounds infinite: always or never within.
         direction = np.where(np.abs(direction) < 1e-12, 1e-12, direction)
         bounds = [(np.stack(pair)[:, :, None] - start) / direction
                   for pair in ((along[0], -wide), (along[1], wide))]
         enter = np.maximum(np.minimum(*bounds).max(axis=0), np.maximum(s - self._starts, 0.0))
-        leave = np.minimum(np.maximum(*bounds).min(axis=0), self._lengths)
+        leave = np.minimum(np.maximum(*bounds).min(axis=0), self._path.steps)
         within = enter < leave
         ends = np.stack((start[0] + enter * direction[0], start[0] + leave * direction[0]))
         least = [np.where(within, values, np.inf).min(axis=1)

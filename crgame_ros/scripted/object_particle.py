@@ -18,15 +18,13 @@ from collections.abc import Sequence
 import math
 
 from crgame_ros.game.object_spec import ObjectSpec
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.scripted.object_crossing import Crossing
 from crgame_ros.scripted.object_motion import ABSENT, Integrated
 from crgame_ros.scripted.object_surroundings import ObjectSurroundings
 from crgame_ros.vehicle.speed_envelope import SpeedEnvelope
 from crgame_ros.vehicle.standstill import REST
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 # How far the way may pass a corner, which decides the speed there [m].
 CORNER_OFFSET = 0.1
@@ -50,14 +48,11 @@ class ParticleMotion(Integrated):
     def __init__(self, spec: ObjectSpec) -> None:
         super().__init__(spec.start)
         self._spec, self._type = spec, spec.mover
-        self._points = np.array(spec.path)
-        chord = np.diff(self._points, axis=0)
-        lengths = np.hypot(*chord.T)
-        self._corners: FloatArray = np.concatenate(([0.0], np.cumsum(lengths)))
-        self._directions: FloatArray = chord / lengths[:, None]
-        self._goal = float(self._corners[-1])
+        self._path = Curve.from_polyline(np.array(spec.path))
+        self._corners, self._directions = self._path.s, self._path.directions
+        self._goal = self._path.length
         self._profile = self._planned_speeds()
-        self._crossing = Crossing(self._points, self._type)
+        self._crossing = Crossing(self._path, self._type)
         self._s, self._stop = 0.0, math.inf
         speed = self._profile.at(0.0) if spec.start == 0.0 else 0.0
         self._position: tuple[float, float] = (spec.path[0][0], spec.path[0][1])
@@ -112,7 +107,7 @@ class ParticleMotion(Integrated):
         segment = min(int(np.searchsorted(self._corners, s, side='right')) - 1,
                       len(self._directions) - 1)
         along = s - float(self._corners[segment])
-        x, y = self._points[segment].tolist()
+        x, y = self._path.points[segment].tolist()
         dx, dy = self._directions[segment].tolist()
         return x + along * dx, y + along * dy
 
@@ -123,7 +118,7 @@ class ParticleMotion(Integrated):
         for segment in range(present, min(present + 2, len(self._directions))):
             start, end = self._corners[segment:segment + 2].tolist()
             dx, dy = self._directions[segment].tolist()
-            x, y = self._points[segment].tolist()
+            x, y = self._path.points[segment].tolist()
             px, py = self._position[0] - x, self._position[1] - y
             along = min(max(px * dx + py * dy, 0.0), end - start)
             distance = math.hypot(px - along * dx, py - along * dy)

@@ -18,6 +18,8 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.curve import nearest
+from crgame_ros.geometry.reference_point import seen_from
 from crgame_ros.waypoints.waypoints import WaypointLane
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +65,8 @@ class ObjectPath:
         here = lane.at(self._u)
         self.curvature: FloatArray = here.curvature
         self.speed_limit: FloatArray = here.speed_limit
-        self.points: FloatArray = np.stack((here.x, here.y), axis=-1)
-        self._yaw: FloatArray = here.yaw
+        self._poses: FloatArray = np.column_stack(here[:3])
+        self.points: FloatArray = self._poses[:, :2]
 
     def _speeds(self, u: FloatArray) -> FloatArray:
         """Give |X'| at stations of any shape."""
@@ -99,12 +101,7 @@ class ObjectPath:
         """
         first, last = np.searchsorted(self.s, (low, high)).tolist()
         first, last = max(first - 1, 0), min(last + 1, len(self.s))
-        delta = points[:, None, :] - self.points[None, first:last]
-        nearest = first + np.argmin(np.einsum('ijk,ijk->ij', delta, delta), axis=1)
-        delta = points - self.points[nearest]
-        yaw = self._yaw[nearest]
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        along = delta[:, 0] * cos + delta[:, 1] * sin
-        d = delta[:, 1] * cos - delta[:, 0] * sin
-        return Encounters(self.s[nearest] + along, d,
-                          wrap_pi_array(yaw + self.curvature[nearest] * along))
+        row = first + nearest(points, self.points[first:last])
+        along, d = seen_from(self._poses[row], points)
+        return Encounters(self.s[row] + along, d,
+                          wrap_pi_array(self._poses[row, 2] + self.curvature[row] * along))

@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from crgame_ros.errors import InputError
 from crgame_ros.game.object_spec import ObjectSpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scripted.object_bicycle import BicycleMotion, check_bends
 from crgame_ros.scripted.object_motion import ObjectMotion, Predetermined, Standstill
@@ -129,7 +130,7 @@ def _motion(spec: ObjectSpec, network: RoadNetwork | None, time_step_s: float,
 
 def _path_motion(spec: ObjectSpec, where: str) -> ObjectMotion:
     given = np.array(spec.path)
-    corners = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(given, axis=0).T))))
+    corners = arc_length(given)
     stations = graded(corners, PATH_RATIO)
     x, y = (np.interp(stations, corners, column) for column in given.T)
     lane = WaypointLane(x, y, np.zeros(len(x)), np.full(len(x), np.inf))

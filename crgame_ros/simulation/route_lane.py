@@ -17,8 +17,8 @@
 from math import cos, sin
 
 from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
-from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.vehicle.state import VehicleState
@@ -46,8 +46,9 @@ class RouteLane:
         self._transform = transform
         lanelet, s = start_lanelet(roads, *self._on_map(start))
         route = find_route(roads, lanelet, s, goal_lanelets(roads, problem), BEYOND_GOAL)
-        self._lines = [LaneLine(np.concatenate([roads.line(item).points for item in leg]))
-                       for leg in route.legs]
+        self._lines = [
+            Curve.from_polyline(np.concatenate([roads.line(item).points for item in leg]))
+            for leg in route.legs]
         # Finds the nearest place of a long line fastest.
         self._strings = [shapely.LineString(line.points) for line in self._lines]
         self.error: float | None = None
@@ -59,7 +60,7 @@ class RouteLane:
         here = shapely.Point(own_x, own_y)
         line, string = min(zip(self._lines, self._strings, strict=True),
                            key=lambda pair: here.distance(pair[1]))
-        x, y, yaw = line.poses(np.array([string.project(here)]), np.zeros(1))[0].tolist()
+        x, y, yaw, _ = line.pose_at(np.array(string.project(here))).tolist()
         self.error = (own_y - y) * cos(yaw) - (own_x - x) * sin(yaw)
         self.worst = max(self.worst, abs(self.error))
 

@@ -94,7 +94,7 @@ class LaneGraph:
         parts: list[FloatArray] = []
         for i, line in enumerate(lines):
             s = np.linspace(0.0, line.length, int(self.count[i]))
-            x, y, yaw = line.poses(s, np.zeros_like(s)).T
+            x, y, yaw, _ = line.pose_at(s).T
             yaw = smooth(yaw, SMOOTHING / float(self.step[i]))
             lanelet = network.lanelet_network.find_lanelet_by_id(self.ids[i])
             across = (lanelet.left_vertices - lanelet.right_vertices)[:, :2]

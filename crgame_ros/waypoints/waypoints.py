@@ -21,6 +21,8 @@ from typing import Literal, NamedTuple, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.curve import arc_length
+from crgame_ros.geometry.reference_point import beside
 from crgame_ros.waypoints.waypoint_projection import ALONE, CurveIndex, CurvePieces
 import numpy as np
 from numpy.typing import NDArray
@@ -107,8 +109,7 @@ class WaypointLane:
         self.points: FloatArray = points[kept]
         if len(self.points) < 2:
             raise InputError('all way-points are the same', _WHERE, 'give two places at least')
-        self.s: FloatArray = np.concatenate(
-            ([0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))))
+        self.s: FloatArray = arc_length(self.points)
         self.kinds: Mapping[str, Interpolation] = MappingProxyType(
             _checked_kinds({**DEFAULT_KINDS, **(kinds or {})}))
         from scipy.interpolate import CubicSpline
@@ -170,9 +171,7 @@ class WaypointLane:
         :param d: (N,) offsets to the left [m]
         :return: (N, 3) x [m], y [m], yaw [rad]
         """
-        here = self.at(s)
-        return np.stack((here.x - d * np.sin(here.yaw), here.y + d * np.cos(here.yaw), here.yaw),
-                        axis=-1)
+        return beside(np.column_stack(self.at(s)[:3]), d)
 
     def project(self, points: FloatArray) -> LanePosition:
         """

@@ -15,6 +15,7 @@
 """The reactive planner on several lanes: it leaves its lane where that is better and free."""
 
 from commonroad_dc import pycrcc
+from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.plan_check import check_plan
@@ -54,6 +55,23 @@ def drive(road: support.Scenario, start: VehicleState, cars: tuple[Car, ...], ti
     planner.setup(support.context(road, support.problem(start.speed), len(cars)))
     return support.drive(planner, start, ticks, lambda k: tuple(
         (x + 0.1 * k * speed * np.cos(yaw), y, yaw, speed) for x, y, yaw, speed in cars))
+
+
+def test_a_frame_of_a_loop_stops_before_a_whole_turn() -> None:
+    """The library refuses headings beyond ±2 pi: roundabouts and closed loops come in pieces."""
+    core = pytest.importorskip('crgame_ros.planner.reactive_core')
+    angle = np.linspace(0.0, 6.0 * np.pi, 240)
+    path = ReferencePath.from_polyline(30.0 * np.column_stack((np.sin(angle), -np.cos(angle))))
+    lap = 2.0 * np.pi * 30.0
+    for s, first in ((0.0, 0.0), (1.5 * lap, 1.5 * lap - core.FRAME_BEHIND)):
+        rows = core.frame_rows(path, s)
+        assert path.s[rows.start] == pytest.approx(first, abs=path.step)
+        turned = path.heading[rows] - 2.0 * np.pi * round(path.heading[rows.start] / 2.0 / np.pi)
+        assert 5.9 < np.abs(turned).max() <= core.HEADING_LIMIT < 2.0 * np.pi
+        x, y = path.points[rows.start + 50]
+        system = core.CoordinateSystem(path.points[rows], preprocess_reference=False,
+                                       clcs_params=core.CLCSParams())
+        assert system.convert_to_curvilinear_coords(x, y)[1] == pytest.approx(0.0, abs=1e-3)
 
 
 def check_free(plans: list[Plan], road: support.Scenario, cars: tuple[Car, ...],

@@ -72,7 +72,7 @@ def test_arc_agrees_with_the_circle() -> None:
     s, offset = road.locate(1, 28.8 * math.sin(phi), 30.0 - 28.8 * math.cos(phi))
     assert (s, offset) == pytest.approx((30.0 * phi, d), abs=2e-3)
     assert road.width_at(1, 10.0) == pytest.approx(4.0, abs=1e-3)
-    points, arc_length = road.center_line(1)
+    points, arc_length = road.line(1).points, road.line(1).s
     assert len(points) == len(arc_length) == 200
     assert arc_length[-1] == pytest.approx(15.0 * math.pi, abs=1e-3)
 
@@ -127,7 +127,7 @@ def test_many_lookups_equal_single_ones() -> None:
     """The vectorised look-up is the scalar one."""
     road = RoadNetwork(shared('USA_Lanker-1_3_T-1.xml').scenario.lanelet_network)
     rng = np.random.default_rng(3)
-    points = np.concatenate([road.center_line(i)[0] for i in road.lanelet_ids])
+    points = np.concatenate([road.line(i).points for i in road.lanelet_ids])
     poses = np.column_stack((points + rng.normal(0.0, 3.0, points.shape),
                              rng.uniform(-3.0, 3.0, len(points))))
     for pose, found in zip(poses, road.lanelets_at(poses), strict=True):
@@ -167,7 +167,7 @@ def test_false_successors_are_not_followed() -> None:
     assert road.straightest_successor(2) is None
     for lanelet_id in road.lanelet_ids:
         steps = np.hypot(*np.diff(road.lane_path(lanelet_id, 300.0), axis=0).T)
-        longest = np.diff(road.center_line(lanelet_id)[1]).max()
+        longest = np.diff(road.line(lanelet_id).s).max()
         assert steps.max() < max(longest, 2.5)
 
 

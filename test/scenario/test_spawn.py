@@ -221,7 +221,7 @@ def test_lanelet_pose_is_the_foot_on_the_centre_line() -> None:
     pose = lanelet_pose(road, av)
     lane = road.lanelet_at(av.x, av.y, av.yaw)
     assert lane is not None
-    line = shapely.LineString(road.center_line(lane)[0])
+    line = shapely.LineString(road.line(lane).points)
     nearest = line.distance(shapely.Point(av.x, av.y))
     assert line.distance(shapely.Point(pose.x, pose.y)) < 1e-6
     assert math.dist((pose.x, pose.y), (av.x, av.y)) == pytest.approx(nearest, abs=1e-3)

@@ -78,5 +78,5 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
         return None
     rear = np.where(ahead, rears, np.inf)
     nearest = int(np.argmin(rear))
-    headings = np.interp([s[0], along[nearest, 0]], path.line.s, path.line.headings)
+    headings = path.line.heading_at(np.array([s[0], along[nearest, 0]]))
     return Ahead(int(candidates[nearest]), float(rear[nearest] - front), *headings.tolist())

@@ -19,8 +19,8 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.curve import Curve, nearest
 from crgame_ros.geometry.polyline import resample
-from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import find_route, in_lane
 import numpy as np
@@ -31,8 +31,8 @@ FloatArray = NDArray[np.float64]
 # How far ahead somebody is looked for [m], and how far samples of the path are apart [m].
 REACH = 300.0
 SPACING = 1.0
-# A position is projected when it is so near to the normal [m], or after so many steps.
-EXACT, ROUNDS = 1e-11, 20
+# A position is projected when it is so near to the normal [m], or after so many rounds.
+EXACT, ROUNDS = 1e-11, 19
 # Who drives at a greater angle to its lane is not on it [rad].
 MAX_ANGLE = math.radians(60.0)
 
@@ -43,27 +43,22 @@ class OwnPath(NamedTuple):
 
     :param line: with arc length and offset.
     :param samples: (S, 2) points of it, `SPACING` apart [m]
-    :param curvatures: (n + 1) of its n segments, with the straight parts before and behind [1/m]
     """
 
-    line: LaneLine
+    line: Curve
     samples: FloatArray
-    curvatures: FloatArray
 
     @classmethod
     def along(cls, points: FloatArray) -> 'OwnPath':
         """Make it of a polyline (n, 2) [m]."""
-        line = LaneLine(points)
-        bends = np.diff(line.headings) / np.diff(line.s)
-        return cls(line, resample(points, SPACING), np.concatenate(([0.0], bends, [0.0])))
+        return cls(Curve.from_polyline(points), resample(points, SPACING))
 
     def near(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Give the distances (N) of positions (N, 2) to the nearest samples, and their s [m]."""
-        x, y = self.samples.T
-        square = (positions[:, :1] - x) ** 2 + (positions[:, 1:] - y) ** 2
-        nearest = np.argmin(square, axis=1)
+        row = nearest(positions, self.samples)
         scale = self.line.length / (len(self.samples) - 1)
-        return np.sqrt(square.min(axis=1)), nearest * scale
+        dx, dy = (positions - self.samples[row]).T
+        return np.asarray(np.sqrt(dx ** 2 + dy ** 2)), scale * row.astype(np.float64)
 
     def project(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
@@ -71,19 +66,7 @@ class OwnPath(NamedTuple):
 
         By Newton's method from the nearest sample: in the same coordinates as those of the line.
         """
-        s = self.near(positions)[1]
-        zero = np.zeros_like(s)
-        for _ in range(ROUNDS):
-            pose = self.line.poses(s, zero)
-            dx, dy = (positions - pose[:, :2]).T
-            cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-            along, aside = dx * cos + dy * sin, dy * cos - dx * sin
-            if np.abs(along).max() < EXACT:
-                break
-            bend = self.curvatures[np.searchsorted(self.line.s, s, side='right')]
-            # Beyond the centre of curvature Newton's step would point the wrong way.
-            s = s + along / np.maximum(1.0 - bend * aside, 0.3)
-        return s, aside
+        return self.line.refine(positions, self.near(positions)[1], ROUNDS, EXACT)
 
 
 class OwnPaths:
@@ -111,7 +94,7 @@ class OwnPaths:
         if lanelet is not None:
             path = self._on_lane(self._goals[vehicle], lanelet)
             s = path.near(np.array([[x, y]]))[1]
-            heading = float(np.interp(s, path.line.s, path.line.headings)[0])
+            heading = float(path.line.heading_at(s)[0])
             if abs(wrap_pi(yaw - heading)) <= MAX_ANGLE:
                 return path
         ahead = (x + REACH * math.cos(yaw), y + REACH * math.sin(yaw))

@@ -22,8 +22,8 @@ from commonroad.geometry.shape import ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.traffic_light import TrafficLight
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.nodes.markers import marker_style as style
-from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
 from crgame_ros.scenario.loading import group_outline, LoadedScenario
@@ -157,7 +157,7 @@ def line_segments(points: FloatArray, aside: float, dashed: bool) -> list[FloatA
     """
     if not np.ptp(points, axis=0).any():
         return []
-    line = LaneLine(points)
+    line = Curve.from_polyline(points)
     if dashed:
         pieces = []
         for start in np.arange(0.0, line.length, DASH + GAP).tolist():

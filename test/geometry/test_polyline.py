@@ -12,12 +12,12 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Paths and curvilinear frames against circles and the library's own conversion."""
+"""Paths against circles and the curvilinear frame of CommonRoad's library."""
 
 import math
 
+from commonroad_clcs.pycrccosy import CurvilinearCoordinateSystem
 from crgame_ros.errors import InputError
-from crgame_ros.geometry.curvilinear import CurvilinearFrame
 from crgame_ros.geometry.polyline import ReferencePath, resample
 import numpy as np
 import pytest
@@ -67,6 +67,29 @@ def test_projection_of_nan_is_nan() -> None:
     assert np.isnan([s[0], d[0]]).all() and np.isfinite([s[1], d[1]]).all()
 
 
+def test_one_pose_is_located_as_many_are() -> None:
+    path = circle()
+    for angle, d in ((0.8, -2.0), (1.5, 0.0), (2.4, 4.0)):
+        x, y = (RADIUS - d) * math.sin(angle), RADIUS - (RADIUS - d) * math.cos(angle)
+        s, aside, heading = path.locate(x, y, RADIUS * angle + 2.0)
+        assert (s, aside) == pytest.approx((RADIUS * angle, d), abs=0.05)
+        assert heading == pytest.approx(angle, abs=0.005)
+        many = path.refine(np.array([[x, y]]), np.array([RADIUS * angle + 2.0]))
+        assert (s, aside) == pytest.approx((many[0][0], many[1][0]), abs=1e-4)
+        assert path.curvature_at(s) == pytest.approx(1.0 / RADIUS, rel=0.02)
+        assert path.curvature_at(s) == pytest.approx(path.pose_at(np.array(s))[3], abs=1e-12)
+
+
+def test_a_path_ends_at_its_ends() -> None:
+    path = ReferencePath.from_polyline(np.array([[0.0, 0.0], [20.0, 0.0]]))
+    assert path.pose_at(np.array([-3.0, 99.0, np.nan]))[:, 0] == pytest.approx(
+        (0.0, path.length, 0.0), abs=1e-4)
+    # Points beyond them have arc lengths all the same.
+    s, d = path.project(np.array([[-4.0, 1.0], [25.0, -2.0]]))
+    assert s == pytest.approx((-4.0, 25.0), abs=1e-4) and d == pytest.approx((1.0, -2.0))
+    assert path.locate(25.0, -2.0, 15.0) == pytest.approx((25.0, -2.0, 0.0), abs=1e-4)
+
+
 def test_window_separates_the_laps_of_a_loop() -> None:
     path = circle(2.0)
     lap = 2.0 * math.pi * RADIUS
@@ -75,44 +98,20 @@ def test_window_separates_the_laps_of_a_loop() -> None:
     assert path.project(point, lap, 1.5 * lap)[0][0] == pytest.approx(1.25 * lap, abs=0.6)
 
 
-def test_frame_agrees_with_the_closed_form_on_a_circle() -> None:
-    """On a circle (CRG 1): s is radius times angle, d is the radius less the distance."""
-    frame = CurvilinearFrame(circle(0.5))
+def test_projection_is_that_of_commonroads_frame() -> None:
+    """As Wuersching and Althoff have it (CRG 1 and its reference 9), and as a circle does."""
+    path = circle(0.5)
+    frame = CurvilinearCoordinateSystem(path.points, 20.0, 0.1)
+    # The library prolongs the path at both ends; its s starts before ours.
+    shift = path.step - frame.convert_to_curvilinear_coords(*path.points[1], False)[0]
     for angle in (0.5, 1.2, 2.0):
         for d in (-2.0, 0.0, 3.0):
-            x = (RADIUS - d) * math.sin(angle)
-            y = RADIUS - (RADIUS - d) * math.cos(angle)
-            mapped = frame.to_curvilinear(x, y)
-            assert mapped is not None
+            place = (RADIUS - d) * math.sin(angle), RADIUS - (RADIUS - d) * math.cos(angle)
+            (s,), (aside,) = path.project(np.array([place]))
             # Resampling a polyline of 80 chords shortens the circle by 0.03 %.
-            assert mapped[0] == pytest.approx(RADIUS * angle, abs=0.08)
-            assert mapped[1] == pytest.approx(d, abs=0.05)
-            assert frame.to_cartesian(*mapped) == pytest.approx((x, y), abs=1e-3)
-
-
-def test_frame_maps_many_points_like_one() -> None:
-    frame = CurvilinearFrame(circle(0.5))
-    points = np.array([[5.0, 1.0], [400.0, 0.0], [12.0, 2.0], [np.nan, 0.0]])
-    many = frame.to_curvilinear_many(points)
-    assert tuple(many[0]) == pytest.approx(frame.to_curvilinear(5.0, 1.0), abs=1e-9)
-    assert tuple(many[2]) == pytest.approx(frame.to_curvilinear(12.0, 2.0), abs=1e-9)
-    assert np.isnan(many[[1, 3]]).all()
-    assert frame.to_curvilinear(400.0, 0.0) is None
-
-
-def test_frame_of_a_loop_stops_before_the_heading_limit() -> None:
-    path = circle(3.0)
-    lap = 2.0 * math.pi * RADIUS
-    first = CurvilinearFrame(path)
-    assert 0.9 * lap < first.last < lap
-    later = CurvilinearFrame(path, 1.5 * lap)
-    x, y = path.pose_at(np.array(1.7 * lap))[:2]
-    assert later.to_curvilinear(float(x), float(y))[0] == pytest.approx(1.7 * lap, abs=0.01)
-
-
-def test_outside_of_the_domain_is_an_input_error() -> None:
-    with pytest.raises(InputError, match='outside the domain'):
-        CurvilinearFrame(circle(0.5)).to_cartesian(30.0, 29.9)
+            assert (s, aside) == pytest.approx((RADIUS * angle, d), abs=0.08)
+            theirs = frame.convert_to_curvilinear_coords(*place)
+            assert (s - shift, aside) == pytest.approx(theirs, abs=0.01)
 
 
 @pytest.mark.parametrize('points', [[[0.0, 0.0]], [[1.0, 1.0], [1.0, 1.0]],

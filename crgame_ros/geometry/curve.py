@@ -1,0 +1,173 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A curve in the plane, and the curvilinear coordinates (s, d) along it (CRG 1)."""
+
+from functools import cached_property
+
+from crgame_ros.geometry.reference_point import beside, seen_from
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Points times segments handled at once, which bounds the memory of a projection.
+_CHUNK = 2_000_000
+
+
+class Curve:
+    """
+    Points by their arc lengths s, and offsets d to the left; straight beyond both ends.
+
+    Positions are linear between the points, and headings too, so that lines of constant d are
+    continuous where the curve bends.
+
+    :param points: (n, 2), n >= 2, no two of them in a row the same [m]
+    :param s: (n) their arc lengths, the first 0 [m]
+    :param heading: (n) the directions there, unwrapped: no jumps of 2 pi [rad]
+    """
+
+    def __init__(self, points: FloatArray, s: FloatArray, heading: FloatArray) -> None:
+        self.points = points
+        self.s = s
+        self.heading = heading
+
+    @classmethod
+    def from_polyline(cls, points: FloatArray) -> 'Curve':
+        """
+        Make a curve of vertices, at which the heading is between those of the segments.
+
+        :param points: (n, 2), n >= 2, not all equal; repeated ones are dropped [m]
+        """
+        points = points[np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > 1e-6))]
+        chord = np.diff(points, axis=0)
+        angle = np.unwrap(np.arctan2(chord[:, 1], chord[:, 0]))
+        middle = 0.5 * (angle[1:] + angle[:-1])
+        return cls(points, arc_length(points), np.concatenate((angle[:1], middle, angle[-1:])))
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return float(self.s[-1])
+
+    @cached_property
+    def steps(self) -> FloatArray:
+        """Lengths of the segments, (n - 1) [m]."""
+        return np.asarray(np.hypot(*np.diff(self.points, axis=0).T))
+
+    @cached_property
+    def directions(self) -> FloatArray:
+        """Unit vectors along the segments, (n - 1, 2)."""
+        return np.asarray(np.diff(self.points, axis=0) / self.steps[:, None])
+
+    @cached_property
+    def _bends(self) -> FloatArray:
+        """Curvature of the segments, and of the straight parts before and behind, (n + 1)."""
+        return np.concatenate(([0.0], np.diff(self.heading) / np.diff(self.s), [0.0]))
+
+    def heading_at(self, s: FloatArray) -> FloatArray:
+        """Give the headings at arc lengths of any shape, not wrapped [rad]."""
+        return np.asarray(np.interp(s, self.s, self.heading), dtype=np.float64)
+
+    def pose_at(self, s: FloatArray) -> FloatArray:
+        """
+        Give x [m], y [m], heading [rad] and curvature [1/m] at arc lengths.
+
+        :param s: (...) [m]
+        :return: (..., 4); the heading is not wrapped.
+        """
+        after = self.s.searchsorted(s, side='right')
+        segment = np.minimum(np.maximum(after - 1, 0), len(self.steps) - 1)
+        result = np.empty((*s.shape, 4))
+        result[..., :2] = (self.points[segment]
+                           + (s - self.s[segment])[..., None] * self.directions[segment])
+        result[..., 2] = self.heading_at(s)
+        result[..., 3] = self._bends[after]
+        return result
+
+    def poses(self, s: FloatArray, d: FloatArray) -> FloatArray:
+        """Give the (..., 3) poses at arc lengths and offsets (...); yaw is not wrapped."""
+        return beside(self.pose_at(s), d)
+
+    def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Find arc lengths and offsets (N), (N) of points (N, 2): the inverse of `poses`."""
+        rows = max(1, _CHUNK // len(self.steps))
+        if len(points) > rows:
+            parts = [self.project(points[i:i + rows]) for i in range(0, len(points), rows)]
+            return (np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts]))
+        offset = points[:, None, :] - self.points[None, :-1, :]
+        along = np.einsum('nij,ij->ni', offset, self.directions)
+        inside = np.clip(along, 0.0, self.steps)
+        across = offset[..., 1] * self.directions[:, 0] - offset[..., 0] * self.directions[:, 1]
+        best = np.argmin((along - inside) ** 2 + across ** 2, axis=1)
+        row = np.arange(len(points))
+        inside[:, 0] = np.minimum(along[:, 0], self.steps[0])
+        inside[:, -1] = np.where(along[:, -1] > 0.0, along[:, -1], inside[:, -1])
+        return self._settle(points, self.s[best] + inside[row, best])
+
+    def _settle(self, points: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Move s until each point lies on the normal of the interpolated heading, or is best."""
+        error = np.full_like(s, np.inf)
+        trial = s
+        d = np.zeros_like(s)
+        for _ in range(20):
+            along, aside = seen_from(self.pose_at(trial), points)
+            better = np.abs(along) < error
+            s = np.where(better, trial, s)
+            d = np.where(better, aside, d)
+            error = np.where(better, np.abs(along), error)
+            trial = np.where(better, trial + along, s)
+            if not np.any(better & (np.abs(along) > 1e-9)):
+                break
+        return s, d
+
+    def refine(self, points: FloatArray, guess: FloatArray, rounds: int = 3,
+               exact: float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """
+        Project points whose arc length is nearly known, by Newton's method.
+
+        :param points: (N, 2); NaN gives NaN [m]
+        :param guess: (N) arc lengths [m]
+        :param rounds: of correction.
+        :param exact: ends them earlier when all points are so near to their normals [m]
+        :return: arc lengths s and offsets d to the left, both (N) [m]
+        """
+        s = np.asarray(guess, dtype=np.float64)
+        aside = np.zeros_like(s)
+        for left in range(rounds, -1, -1):
+            s = self._within(s)
+            pose = self.pose_at(s)
+            along, aside = seen_from(pose, points)
+            if exact and np.abs(along).max() < exact:
+                break
+            # Beyond the centre of curvature Newton's step would point the wrong way.
+            stretch = np.maximum(1.0 - pose[:, 3] * aside, 0.3)
+            s = s + along / (stretch if left or exact else 1.0)
+        return s, aside
+
+    def _within(self, s: FloatArray) -> FloatArray:
+        """Give the arc lengths from which points beyond the ends are seen: their own."""
+        return s
+
+
+def arc_length(points: FloatArray) -> FloatArray:
+    """Sum the lengths of the segments of a polyline (n, 2): (n) from 0 [m]."""
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    return np.concatenate(([0.0], np.cumsum(lengths)))
+
+
+def nearest(points: FloatArray, samples: FloatArray) -> NDArray[np.intp]:
+    """Give the row of the sample (M, 2) that is nearest to each of points (N, 2)."""
+    return np.argmin((points[:, :1] - samples[:, 0]) ** 2
+                     + (points[:, 1:] - samples[:, 1]) ** 2, axis=1)
