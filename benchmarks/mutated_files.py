@@ -105,8 +105,8 @@ class Harness:
         self._folder.mkdir()
         file_trials.prepare(self._folder)
         self._trials = file_trials.trials(self._folder, published)
-        # Everything is imported and compiled before the first case. No case's collection of garbage
-        # goes through it again, and its pages stay shared.
+        # Everything is imported and compiled before the first case. No case's collection of
+        # garbage goes through it again, and its pages stay shared.
         file_trials.warm_up(self._folder)
         gc.collect()
         gc.freeze()
