@@ -27,6 +27,9 @@ from xdist.workermanage import WorkerController
 
 # Of tests that keep to the clock: they speak with running graphs and servers.
 REAL_TIME_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
+# These in there do not: they compute, or start what nobody waits for.
+TIMELESS = {'cockpit/test_replay_backend', 'cockpit/test_scene', 'ros/test_markers',
+            'ros/test_number_parameters', 'ros/test_ros_messages'}
 # The group of those that no graph may run beside: they assert what clocks show.
 ALONE = 'alone'
 GRAPH_WORKERS = 2
@@ -59,7 +62,8 @@ def group_of(item: pytest.Item, folder: Path) -> str:
 
 def keeps_to_the_clock(group: str) -> bool:
     """Tell whether the tests of a group speak with running graphs or servers."""
-    return group == ALONE or group.partition('/')[0] in REAL_TIME_FOLDERS
+    return group == ALONE or (
+        group.partition('/')[0] in REAL_TIME_FOLDERS and group not in TIMELESS)
 
 
 def order_of(group: str) -> int:
