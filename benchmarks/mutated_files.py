@@ -105,8 +105,11 @@ class Harness:
         self._folder.mkdir()
         file_trials.prepare(self._folder)
         self._trials = file_trials.trials(self._folder, published)
-        # Everything is imported and compiled before the first case.
+        # Everything is imported and compiled before the first case. No case's collection of
+        # garbage goes through it again, and its pages stay shared.
         file_trials.warm_up(self._folder)
+        gc.collect()
+        gc.freeze()
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -150,7 +153,6 @@ class Harness:
 def _fork(work: object, broken: Path) -> Outcome:
     """Do something in a process of its own, within bounds."""
     assert callable(work)
-    gc.collect()
     reading, writing = os.pipe()
     dump = broken.parent / 'trace.txt'
     child = os.fork()

@@ -16,7 +16,10 @@
 
 import ast
 from collections.abc import Iterator
+import hashlib
+from importlib.metadata import distributions
 from importlib.util import find_spec
+import os
 from pathlib import Path
 import re
 import subprocess
@@ -93,6 +96,35 @@ def _functions(file: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
             yield node
 
 
+def _linter_versions() -> str:
+    """Name Python and every installed package: plugins are among them, and say things, too."""
+    packages = {f'{item.name} {item.version}' for item in distributions()}
+    return '\n'.join([sys.version, *sorted(packages)])
+
+
+def _lint_each(linter: str) -> None:
+    """
+    Run a linter that looks at each file by itself on those that it has not found clean before.
+
+    What it said of a file holds as long as the file, its place and all installed packages do.
+    """
+    versions = hashlib.sha256(f'{linter}\n{_linter_versions()}'.encode())
+    digests = {}
+    for file in _sources():
+        found = versions.copy()
+        found.update(str(file.relative_to(ROOT)).encode() + b'\0' + file.read_bytes())
+        digests[str(file.relative_to(ROOT))] = found.hexdigest()
+    clean = ROOT / 'build' / f'.{linter}_clean'
+    known = set(clean.read_text().split()) if clean.is_file() else set()
+    unknown = [name for name, digest in digests.items() if digest not in known]
+    if unknown:
+        _run('-m', f'{linter}.main', *unknown)
+        clean.parent.mkdir(exist_ok=True)
+        whole = clean.with_suffix(f'.{os.getpid()}')
+        whole.write_text('\n'.join(sorted(digests.values())))
+        whole.replace(clean)
+
+
 def test_ruff() -> None:
     """Line length, quotes, import order, docstrings, annotations (pyproject.toml)."""
     _run('-m', 'ruff', 'check', '--no-cache', *(str(file) for file in _sources()))
@@ -112,7 +144,22 @@ def test_ament_linter(linter: str) -> None:
     """
     if find_spec(linter) is None:
         pytest.skip(f'{linter} is not installed')
-    _run('-m', f'{linter}.main', *FOLDERS, 'setup.py', '--exclude', str(FOREIGN))
+    _lint_each(linter)
+
+
+def test_a_linter_forgets_no_complaint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file with a fault is looked at, and told, as often as it is asked for; so is a new one."""
+    monkeypatch.setitem(globals(), 'ROOT', tmp_path)
+    module = tmp_path / 'module.py'
+    monkeypatch.setitem(globals(), '_sources', lambda: [module])
+    module.write_text('x = 1\n')
+    _lint_each('ament_flake8')
+    module.write_text('x = "1"\n')
+    for _ in range(2):
+        with pytest.raises(AssertionError, match='Q000'):
+            _lint_each('ament_flake8')
+    module.write_text('x = 1\n')
+    _lint_each('ament_flake8')
 
 
 def test_every_file_starts_with_the_licence_header() -> None:

@@ -16,6 +16,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+import gc
 from pathlib import Path
 import sys
 from typing import Any
@@ -35,6 +36,8 @@ def mutated_files() -> Iterator[Any]:
     sys.path.insert(0, str(BENCHMARKS))
     import mutated_files
     yield mutated_files
+    # What a harness has set aside.
+    gc.unfreeze()
     sys.path.remove(str(BENCHMARKS))
 
 

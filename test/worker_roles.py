@@ -27,12 +27,13 @@ from xdist.workermanage import WorkerController
 
 # Of tests that keep to the clock: they speak with running graphs and servers.
 REAL_TIME_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
-# The group of those that nothing may run beside: they assert what clocks show.
+# These in there do not: they compute, or start what nobody waits for.
+TIMELESS = {'cockpit/test_replay_backend', 'cockpit/test_scene', 'ros/test_markers',
+            'ros/test_number_parameters', 'ros/test_ros_messages'}
+# The group of those that no graph may run beside: they assert what clocks show.
 ALONE = 'alone'
 GRAPH_WORKERS = 2
 MAX_WORKERS = 4
-# Beside a graph that wants the processor a worker that computes gets a tenth of it.
-COMPUTING_NICENESS = 10
 _NAME = os.environ.get('PYTEST_XDIST_WORKER', 'gw0')
 
 
@@ -61,7 +62,8 @@ def group_of(item: pytest.Item, folder: Path) -> str:
 
 def keeps_to_the_clock(group: str) -> bool:
     """Tell whether the tests of a group speak with running graphs or servers."""
-    return group == ALONE or group.partition('/')[0] in REAL_TIME_FOLDERS
+    return group == ALONE or (
+        group.partition('/')[0] in REAL_TIME_FOLDERS and group not in TIMELESS)
 
 
 def order_of(group: str) -> int:
@@ -100,19 +102,23 @@ class RoleScheduling(LoadGroupScheduling):
 
 
 def step_back() -> None:
-    """Lower the priority of a worker that computes beside others, for good."""
+    """
+    Let a worker compute, for good, only in what others leave of the processors.
+
+    Whoever wakes up takes the place of an idle task at once, so that clocks don't show it.
+    """
     if int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1')) > 1:
-        os.nice(max(0, COMPUTING_NICENESS - os.nice(0)))
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
 @contextmanager
-def in_company(file: Path, *, alone: bool = False) -> Iterator[None]:
+def among_graphs(file: Path, *, alone: bool) -> Iterator[None]:
     """
-    Wait until no other worker runs anything, or only until nobody is alone.
+    Wait until no other worker runs a graph, or only until nobody is alone.
 
     Who wants to be alone gets there last: others don't wait for it while some of them work.
 
-    :param file: that all workers lock.
+    :param file: that all workers with graphs lock.
     """
     with file.open('a') as handle:
         fcntl.flock(handle, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)

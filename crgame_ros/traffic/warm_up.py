@@ -14,7 +14,9 @@
 # limitations under the License.
 """Compile everything that traffic runs, before it is needed: `python -m …traffic.warm_up`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import fcntl
 from functools import cache
 import sys
 import time
@@ -43,9 +45,33 @@ LIGHT = 9001
 
 
 def ensure_compiled(say: Callable[[str], None]) -> None:
-    """Compile what is not compiled yet; this takes about a minute, once."""
-    if marker().exists():
+    """Compile what is not compiled yet; this takes about a minute, once, whoever else asks."""
+    with _turn(say):
+        if not marker().exists():
+            _compile(say)
+
+
+@contextmanager
+def _turn(say: Callable[[str], None]) -> Iterator[None]:
+    """Wait until no other process compiles: two would each do all of it."""
+    lock = marker().with_name('compiling.lock')
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        handle = lock.open('a')
+    except OSError:
+        # What cannot be kept is of no use to others.
+        yield
         return
+    with handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            say('another process compiles traffic: waiting for it')
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+
+
+def _compile(say: Callable[[str], None]) -> None:
     say('compiling traffic: this happens once and takes about a minute')
     start = time.monotonic()
     drive_everything()

@@ -16,6 +16,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable
+from functools import lru_cache
 import time
 from types import TracebackType
 from typing import Any, Self
@@ -38,6 +39,8 @@ from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 QUEUE_DEPTH = 5000
+# Whoever waits asks for the games a hundred times a second.
+_parsed = lru_cache(parse_game_document)
 
 
 class Peer:
@@ -115,7 +118,7 @@ class Peer:
     @property
     def games(self) -> list[GameDocument]:
         """Every game document so far."""
-        return [parse_game_document(message.data) for message in self.messages['/scenario/game']]
+        return [_parsed(message.data) for message in self.messages['/scenario/game']]
 
     @property
     def n(self) -> int:

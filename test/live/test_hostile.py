@@ -14,7 +14,7 @@
 # limitations under the License.
 """No message of anybody ends a process, owns a run, or costs its files."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 import json
 import os
@@ -24,6 +24,7 @@ import subprocess
 import sys
 import time
 
+from builtin_interfaces.msg import Time
 from commonroad.common.file_reader import CommonRoadFileReader
 from hostile import code, games, messages
 from live_peer import Peer
@@ -85,12 +86,18 @@ class Sender:
         self._peer = peer
         self._publishers: dict[tuple[str, str], Publisher] = {}
 
-    def send(self, topic: str, vehicle: str, message: object) -> None:
-        """Send a message, or bytes that claim to be one."""
-        if (topic, vehicle) not in self._publishers:
+    def meet(self, topics: Iterable[tuple[str, str]]) -> None:
+        """Wait until whoever reads one of these topics hears this sender."""
+        new = dict.fromkeys(topic for topic in topics if topic not in self._publishers)
+        for topic, vehicle in new:
             self._publishers[topic, vehicle] = self._peer.publisher(topic, vehicle)
+        if new:
             # The first who listens may be the test itself: the others are to hear it, too.
             self._peer.listen_for(0.5)
+
+    def send(self, topic: str, vehicle: str, message: object) -> None:
+        """Send a message, or bytes that claim to be one."""
+        self.meet([(topic, vehicle)])
         # The middleware itself sends no bytes that cannot be a message of a fixed size.
         with suppress(RCLError):
             self._publishers[topic, vehicle].publish(message)
@@ -120,6 +127,7 @@ def test_no_message_ends_a_node_or_the_run(run: Run) -> None:
     pids, sender, sent = dict(launcher.started), Sender(peer), 0
     names = [list(peer.messages[topic][-1].joint_names) for topic in (
         '/vehicles/state', '/traffic/objects', '/traffic/agents')]
+    sender.meet((topic, vehicle) for topic, vehicle, _ in messages(Time(), *names))
     for topic, vehicle, message in messages(peer.messages['/clock'][-1].clock, *names):
         sender.send(topic, vehicle, message)
         sent += 1
@@ -143,6 +151,8 @@ def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path)
     good = peer.messages['/scenario/game'][-1].data
     proof = tmp_path / 'was_run'
     (tmp_path / 'planner.py').write_text(PROOF.format(path=str(proof)))
+    sender.meet((topic, '') for topic in (
+        '/scenario/xml', '/scenario/objects', '/scenario/game'))
     # What the test before has sent of these is forgotten at the next reset; here at once.
     for topic in ('/scenario/xml', '/scenario/objects'):
         sender.send(topic, '', peer.messages[topic][0])

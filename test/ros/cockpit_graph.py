@@ -63,19 +63,25 @@ class Graph:
 
     async def say(self, name: str, message: Any, vehicle: str = '') -> None:
         """Publish a message of the simulation or a planner, once the cockpit hears it."""
-        publisher = self._publishers.get((name, vehicle))
-        if publisher is None:
-            publisher = self._publishers[name, vehicle] = \
-                self.peer._endpoints.publisher(name, vehicle)
+        await self.meet((name, vehicle))
+        self._publishers[name, vehicle].publish(message)
+
+    async def meet(self, *topics: tuple[str, str]) -> None:
+        """Wait until the cockpit hears what is published on these topics."""
+        new = {topic: self.peer._endpoints.publisher(*topic)
+               for topic in topics if topic not in self._publishers}
+        for (name, _), publisher in new.items():
             await self.until(publisher.get_subscription_count, f'a listener of {name}')
+        if new:
             await asyncio.sleep(0.2)
-        publisher.publish(message)
+        self._publishers |= new
 
     async def begin(self, setup: Setup, epoch: int = 0) -> None:
         """Publish the documents of a game, and wait for its scene."""
         texts = {'xml': setup.loaded.xml_text, 'objects': objects_document(setup.descriptions),
                  'game': game_document(setup, epoch=epoch, clock_offset_ns=OFFSET_NS,
                                        real_time_factor=1.0)}
+        await self.meet(*((f'/scenario/{name}', '') for name in texts), ('/seats', ''))
         for name, text in texts.items():
             await self.say(f'/scenario/{name}', String(data=text))
         await self.until(lambda: self.scene.get('time', {}).get('epoch') == epoch, 'the scene')

@@ -14,7 +14,9 @@
 # limitations under the License.
 """Everything that traffic runs is compiled, and loaded, before it is needed."""
 
+import fcntl
 import json
+import os
 from pathlib import Path
 import shutil
 import subprocess
@@ -74,3 +76,18 @@ def test_what_is_compiled_in_names_the_cache(file: str, tmp_path: Path,
         changed.write('# Changed.\n')
     assert cache.digest.__wrapped__('waiting') != before
     assert cache.digest.__wrapped__('driving_side') == cache.digest('driving_side')
+
+
+def test_who_comes_while_another_compiles_waits_for_it(tmp_path: Path) -> None:
+    """It says so, and then compiles nothing itself."""
+    with (tmp_path / 'compiling.lock').open('a') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with subprocess.Popen([sys.executable, '-m', 'crgame_ros.traffic.warm_up'],
+                              env=os.environ | {'NUMBA_CACHE_DIR': str(tmp_path)},
+                              stderr=subprocess.PIPE, text=True) as process:
+            assert process.stderr is not None
+            assert 'waiting for it' in process.stderr.readline()
+            (tmp_path / cache.marker().name).touch()
+            fcntl.flock(lock, fcntl.LOCK_UN)
+            assert process.stderr.read() == ''
+    assert process.returncode == 0
