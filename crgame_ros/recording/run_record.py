@@ -74,8 +74,6 @@ def read_run_record(path: Path, epoch: int | None = None,
 
 def run_record_of(result: OfflineResult) -> RunRecord:
     """Give the record of an offline run."""
-    commands = np.full((len(result.commands) - 1, len(result.setup.vehicle_ids),
-                        len(COMMAND_COLUMNS)), np.nan)
-    commands[:, :result.commands.shape[1]] = result.commands[1:]
+    commands = np.concatenate((result.commands, result.av_commands), axis=1)[1:]
     return RunRecord(run_log_of(result), np.arange(1, len(result.commands)), commands,
                      result.fired)

@@ -134,6 +134,7 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
         tuple(EventReaction(event.name, event.n * dt_s,
                             reaction_to(event.n * dt_s, controls, limits))
               for event in record.fired if len(controls.times_s)),
+        limits,
         tuple(_gap(everybody, number, keeping, change) for change in keeping.changes),
         () if human else find_take_overs(
             controls, _calm(everybody, states, keeping, controls),

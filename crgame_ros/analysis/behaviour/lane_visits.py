@@ -103,7 +103,8 @@ class LaneVisits:
         """Give how a vehicle goes on from a lanelet that it has left, until when and in which."""
         along = self._along(last.lanelet)
         beside = [each for lanelet in (last.lanelet, *along) for each in self._beside(lanelet)]
-        beside += [each for one in self._beside(last.lanelet) for each in self._along(one)]
+        # Maps tell of neighbours for a part of the way only.
+        beside += [each for one in dict.fromkeys(beside) for each in self._along(one)]
         for entry, candidates in (
                 (Entry.ALONG, along), (Entry.CHANGE, [x for x in beside if x not in along])):
             # Ids break ties, so that the order in the map does not.

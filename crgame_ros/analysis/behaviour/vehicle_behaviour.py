@@ -20,7 +20,7 @@ from typing import Any
 
 from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
 from crgame_ros.analysis.behaviour.gaps_accepted import AcceptedGap, Neighbour
-from crgame_ros.analysis.behaviour.reactions import Reaction
+from crgame_ros.analysis.behaviour.reactions import Reaction, ResponseLimits
 from crgame_ros.analysis.behaviour.take_overs import TakeOver
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,7 @@ class DriverBehaviour:
     :param driven_s: for how long commands drove it [s]
     :param values: by name, those measures of `MEASURES` of which there is one value.
     :param reactions: to each event.
+    :param limits: what counted as a response.
     :param lane_changes: with the gaps that were accepted.
     :param take_overs: of an AV.
     :param times_s: (K) of the steps, since the run's start [s]
@@ -78,6 +79,7 @@ class DriverBehaviour:
     driven_s: float
     values: dict[str, float]
     reactions: tuple[EventReaction, ...]
+    limits: ResponseLimits
     lane_changes: tuple[LaneChangeGap, ...]
     take_overs: tuple[TakeOver, ...]
     times_s: FloatArray
@@ -100,6 +102,7 @@ class DriverBehaviour:
                 'reaction_brake': _finite(each.reaction.brake_s),
                 'reaction_steering': _finite(each.reaction.steering_s)}
                 for each in self.reactions],
+            'response_limits': self.limits._asdict(),
             'lane_changes': [_lane_change(each) for each in self.lane_changes],
             'take_overs': [_take_over(each) for each in self.take_overs]}
         if series:

@@ -86,7 +86,7 @@ def test_a_curve_driven_as_it_bends_is_never_left(vehicle: VehicleParameters) ->
 
 
 def test_where_there_is_no_crossing(vehicle: VehicleParameters) -> None:
-    """Standing, parallel, beyond the horizon: inf. A wheel beyond a boundary: 0. Backwards: yes."""
+    """Standing, parallel, beyond the horizon: inf. A wheel across: 0. Backwards: yes."""
     lane = _straight_lane()
     assert math.isinf(_crossing(lane, vehicle, (0.0, 0.0, 0.1), 0.0, 0.0).tlc_s[0])
     assert math.isinf(_crossing(lane, vehicle, (0.0, 0.0, 0.0), 30.0, 0.0).tlc_s[0])

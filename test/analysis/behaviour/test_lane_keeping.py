@@ -16,12 +16,18 @@
 
 from collections.abc import Callable
 import math
+from pathlib import Path
 from typing import Any
 
+from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.analysis.behaviour.lane_keeping import keep_lane, sdlp, SIDEWAYS
 from crgame_ros.analysis.behaviour.lane_visits import Entry, LaneVisits
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import StateColumn
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -106,8 +112,25 @@ def test_off_the_lanes_nothing_is_known(road: Any, along: Callable[..., Array],
     assert np.isfinite(keeping.offset[~off]).all()
 
 
+def test_a_published_map_that_tells_of_neighbours_for_a_part_only(
+        shared_scenarios: Path, vehicle: VehicleParameters) -> None:
+    """On US 101 two cars turn off, one to a ramp that is no neighbour yet; all others keep on."""
+    loaded = load_scenario(shared_scenarios / 'USA_US101-4_1_T-1.xml')
+    roads, obstacles = RoadNetwork(loaded.scenario.lanelet_network), ScenarioObstacles(loaded)
+    changed = {}
+    for column, description in enumerate(obstacles.descriptions):
+        known = np.isfinite(obstacles.poses[:, column, 0])
+        poses, moves = obstacles.poses[known, column], obstacles.velocities[known, column]
+        states = np.zeros((len(poses), STATE_WIDTH))
+        states[:, :3] = shifted(poses, -vehicle.rear_to_center)
+        states[:, StateColumn.SPEED] = np.hypot(moves[:, 0], moves[:, 1])
+        keeping = keep_lane(roads, states, vehicle, loaded.time_step_s)
+        if keeping.changes:
+            changed[description.id] = [(keeping.visits[change.visit].lanelet, change.side)
+                                       for change in keeping.changes]
+    assert changed == {'o373': [(16, -1)], 'o389': [(15, -1)]}
+
+
 def test_a_street_without_lanes_is_no_error() -> None:
     """Nobody is in a lane of an empty map."""
-    from commonroad.scenario.lanelet import LaneletNetwork
-    from crgame_ros.roads.road_network import RoadNetwork
     assert LaneVisits(RoadNetwork(LaneletNetwork())).follow(np.zeros((5, 3))) == ()
