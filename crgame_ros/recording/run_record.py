@@ -50,7 +50,7 @@ class RunRecord:
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """Simulated time of the commands since the run's start (R) [s]."""
+        """Give the simulated time of the commands since the run's start (R) [s]."""
         return np.asarray(self.ns * self.log.game.scheduler.dt_s)
 
 

@@ -20,7 +20,7 @@ import math
 
 from crgame_ros.analysis.behaviour.lane_crossing import lane_crossing
 from crgame_ros.analysis.behaviour.lane_strip import heading_at, LaneStrip, strip_of, wheels_of
-from crgame_ros.analysis.behaviour.lane_visits import Entry, LaneVisit, LaneVisits
+from crgame_ros.analysis.behaviour.lane_visits import LaneEntry, LaneVisit, LaneVisits
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.vehicle.parameters import VehicleParameters
@@ -139,7 +139,7 @@ def _changes(visits: Sequence[LaneVisit], strips: Sequence[LaneStrip], centers: 
              wheels: FloatArray, sideways: FloatArray, most: int) -> tuple[ChangeOfLane, ...]:
     found = []
     for number, visit in enumerate(visits):
-        if visit.entry is not Entry.CHANGE:
+        if visit.entry is not LaneEntry.CHANGE:
             continue
         row, left = visit.first, strips[number - 1]
         side = 1 if left.center.project(centers[row:row + 1, :2])[1][0] > 0.0 else -1
@@ -158,14 +158,14 @@ def _changes(visits: Sequence[LaneVisit], strips: Sequence[LaneStrip], centers: 
 
 def _begun(visits: Sequence[LaneVisit], number: int) -> int:
     """Give the step at which a vehicle came to the lane of a stay."""
-    while visits[number].entry is Entry.ALONG:
+    while visits[number].entry is LaneEntry.ALONG:
         number -= 1
     return visits[number].first
 
 
 def _done(visits: Sequence[LaneVisit], number: int) -> int:
     """Give the step at which a vehicle has left the lane of a stay."""
-    while number + 1 < len(visits) and visits[number + 1].entry is Entry.ALONG:
+    while number + 1 < len(visits) and visits[number + 1].entry is LaneEntry.ALONG:
         number += 1
     return visits[number].end
 

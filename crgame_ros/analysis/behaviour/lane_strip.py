@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple, Self
 
-from crgame_ros.analysis.behaviour.lane_visits import Entry, LaneVisit
+from crgame_ros.analysis.behaviour.lane_visits import LaneEntry, LaneVisit
 from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 import numpy as np
@@ -84,7 +84,7 @@ def strip_of(roads: RoadNetwork, visits: Sequence[LaneVisit], number: int) -> La
             roads, _prolonged(roads, _prolonged(roads, taken, AHEAD, True), BEHIND, False), True)
     length = 0.0
     for follower in visits[number + 1:]:
-        if follower.entry is not Entry.ALONG or follower.against or length > AHEAD \
+        if follower.entry is not LaneEntry.ALONG or follower.against or length > AHEAD \
                 or follower.lanelet not in roads.lanelet_network.find_lanelet_by_id(
                     taken[-1]).successor:
             break

@@ -33,7 +33,7 @@ _CHUNK, _BETWEEN = 64, 5
 _ALONG = math.radians(60.0)
 
 
-class Entry(Enum):
+class LaneEntry(Enum):
     """How a vehicle came into a lanelet."""
 
     ALONG = 'along'
@@ -56,7 +56,7 @@ class LaneVisit(NamedTuple):
     lanelet: int
     first: int
     end: int
-    entry: Entry
+    entry: LaneEntry
     against: bool
 
 
@@ -85,11 +85,11 @@ class LaneVisits:
     def _visits(self, poses: FloatArray) -> Iterator[LaneVisit]:
         row, last = 0, None
         while row < len(poses):
-            entry, end, chosen = Entry.ANEW, row, None
+            entry, end, chosen = LaneEntry.ANEW, row, None
             if last is not None:
                 entry, end, chosen = self._next(last, row, poses)
             if chosen is None:
-                entry, chosen = Entry.ANEW, self._anew(poses[row])
+                entry, chosen = LaneEntry.ANEW, self._anew(poses[row])
                 end = row if chosen is None else self._end(chosen, row, poses)
             if chosen is None or end == row:
                 row, last = row + 1, None
@@ -99,21 +99,21 @@ class LaneVisits:
             row = end
 
     def _next(self, last: LaneVisit, row: int,
-              poses: FloatArray) -> tuple[Entry, int, int | None]:
+              poses: FloatArray) -> tuple[LaneEntry, int, int | None]:
         """Give how a vehicle goes on from a lanelet that it has left, until when and in which."""
         along = self._along(last.lanelet)
         beside = [each for lanelet in (last.lanelet, *along) for each in self._beside(lanelet)]
         # Maps tell of neighbours for a part of the way only.
         beside += [each for one in dict.fromkeys(beside) for each in self._along(one)]
-        for entry, candidates in (
-                (Entry.ALONG, along), (Entry.CHANGE, [x for x in beside if x not in along])):
+        beside = [each for each in beside if each not in along]
+        for entry, candidates in ((LaneEntry.ALONG, along), (LaneEntry.CHANGE, beside)):
             # Ids break ties, so that the order in the map does not.
             ends = [(end, -each) for each in dict.fromkeys(candidates)
                     if (end := self._end(each, row, poses)) > row
                     and self._fits(each, poses[row])]
             if ends:
                 return entry, max(ends)[0], -max(ends)[1]
-        return Entry.ANEW, row, None
+        return LaneEntry.ANEW, row, None
 
     def _anew(self, pose: FloatArray) -> int | None:
         found = self._roads.lanelet_at(*pose.tolist())

@@ -21,7 +21,7 @@ from typing import Any
 
 from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.analysis.behaviour.lane_keeping import keep_lane, sdlp, SIDEWAYS
-from crgame_ros.analysis.behaviour.lane_visits import Entry, LaneVisits
+from crgame_ros.analysis.behaviour.lane_visits import LaneEntry, LaneVisits
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
@@ -79,7 +79,7 @@ def test_a_lane_change_is_cut_out(side: int, road: Any, along: Callable[..., Arr
     # The first wheel is half a width ahead of the centre, sideways, but for the car's yaw.
     assert change.wheel == pytest.approx(np.flatnonzero(
         side * (y - 1.75) > -0.5 * vehicle.width)[0], abs=1)
-    assert [visit.entry for visit in keeping.visits] == [Entry.ANEW, Entry.CHANGE]
+    assert [visit.entry for visit in keeping.visits] == [LaneEntry.ANEW, LaneEntry.CHANGE]
     kept = sdlp(keeping.offset, keeping.kept, states[:, StateColumn.SPEED])
     before, after = side * (base - (0.0 if side > 0 else 3.5)), 0.1 + way - 3.5
     levels = np.where(TIMES_S < 12.5, before, after)
