@@ -107,12 +107,14 @@ class LaneVisits:
         beside += [each for one in dict.fromkeys(beside) for each in self._along(one)]
         beside = [each for each in beside if each not in along]
         for entry, candidates in ((LaneEntry.ALONG, along), (LaneEntry.CHANGE, beside)):
-            # Ids break ties, so that the order in the map does not.
-            ends = [(end, -each) for each in dict.fromkeys(candidates)
+            # Of those it stays in as long it is the one that fits its heading.
+            ends = [(end, -self._turn(each, poses[row]), -each)
+                    for each in dict.fromkeys(candidates)
                     if (end := self._end(each, row, poses)) > row
                     and self._fits(each, poses[row])]
             if ends:
-                return entry, max(ends)[0], -max(ends)[1]
+                end, _, negative = max(ends)
+                return entry, end, -negative
         return LaneEntry.ANEW, row, None
 
     def _anew(self, pose: FloatArray) -> int | None:

@@ -27,6 +27,7 @@ from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.game.game_file import load_game
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.recorded_seats import SeatOrder
@@ -209,6 +210,21 @@ def test_nothing_depends_on_the_maps_axes(
     assert finite.sum() > 200 and np.array_equal(expected[~finite], found[~finite],
                                                  equal_nan=True)
     np.testing.assert_allclose(found[finite], expected[finite], rtol=1e-9, atol=1e-9)
+
+
+def test_an_av_is_measured_where_its_road_is(changed: tuple[DriverBehaviour, ...]) -> None:
+    """Driven elsewhere than it plans (CRG 9): the same values as where the road is."""
+    record = _play('lane_change', 12.0)
+    transform = RigidTransform(0.7, 120.0, -40.0)
+    states = record.log.vehicle_states.copy()
+    states[..., :3] = transform.to_simulation(states[..., :3])
+    game = replace(record.log.game, avs=(
+        replace(record.log.game.avs[0], transform=transform),))
+    moved = measure_behaviour(replace(record, log=replace(
+        record.log, game=game, vehicle_states=states)))[1]
+    assert moved.values == pytest.approx(changed[1].values, rel=1e-8, abs=1e-9, nan_ok=True)
+    assert np.isfinite(changed[1].tlc_s).any()
+    assert moved.tlc_s == pytest.approx(changed[1].tlc_s, rel=1e-6)
 
 
 def test_json_holds_no_number_that_is_none(changed: tuple[DriverBehaviour, ...]) -> None:
