@@ -35,7 +35,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame run       run a game live, as ./run.sh does
   crgame offline   run a game as fast as it can, without ROS
   crgame convert   turn a recording into a CommonRoad scenario
-  crgame measure   how critical a recorded run was
+  crgame measure   how critical a recorded run was, and how it was driven
   crgame replay    the recorded human against other planners
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
@@ -91,7 +91,8 @@ def _build_parser() -> argparse.ArgumentParser:
     convert.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
-    _add_measure(commands.add_parser('measure', help='how critical a recorded run was'))
+    _add_measure(commands.add_parser('measure',
+                                     help='how critical a run was, and how it was driven'))
     _add_replay(commands.add_parser('replay',
                                     help='the recorded human against other planners'))
     recover = commands.add_parser('recover', help='finish a killed recording')

@@ -12,10 +12,10 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""`crgame measure`: how critical a recorded run was, for people and as JSON."""
+"""`crgame measure`: how critical a recorded run was and how it was driven, also as JSON."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 import json
 import math
@@ -24,7 +24,8 @@ import sys
 from typing import Any
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, short
+from crgame_ros.game.documents import GameDocument
 
 # Behind what is beyond its threshold.
 CRITICAL = '   <- critical'
@@ -33,9 +34,14 @@ TOLD_S = 100.0
 
 DESCRIPTION = """\
 Measure how critical a recorded run was: for each driven vehicle the worst moment of each measure,
-the time it spent below a threshold, and whose way it crossed.
+the time it spent below a threshold, and whose way it crossed. Then how people drove: lane keeping,
+steering reversals, pedals, reactions to events, gaps accepted, take-overs.
 
-Distances are bumper to bumper along the vehicle's own lane. docs/criticality.md defines each."""
+Distances are bumper to bumper along the vehicle's own lane. docs/criticality.md and
+docs/behaviour.md define each.
+
+  crgame measure runs/NAME
+  crgame measure runs/NAME --request take-over --json"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,29 +56,48 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             ('pet', 'S', USUAL.pet_s, 'smaller')):
         parser.add_argument(f'--{name}', type=float, default=value, metavar=unit,
                             help=f'{which} ones are critical (default: {value:g})')
+    parser.add_argument('--request', action='append', default=[], metavar='EVENT',
+                        help='an event that asks to take over an AV, as orders of its seat do; '
+                        'may be given several times')
     parser.add_argument('--json', action='store_true', help='print it as JSON')
     parser.set_defaults(command=measure)
 
 
 def measure(values: argparse.Namespace) -> int:
     """Measure a run, and print what was found."""
+    from crgame_ros.analysis.behaviour.behaviour_text import behaviour_lines
+    from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
     from crgame_ros.analysis.criticality.recorded_criticality import measure_log
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in
-    from crgame_ros.recording.run_log import read_run_log
+    from crgame_ros.recording.run_record import read_run_record
     for name in ('ttc', 'drac', 'pet'):
         if not 0.0 < getattr(values, name) < math.inf:
             raise InputError(f'is {getattr(values, name)}', f'--{name}', 'give a positive number')
     path = values.run
     say = partial(print, file=sys.stderr, flush=True)
-    log = read_run_log(recording_in(path), values.epoch, Progress(say, f'reading {path}'))
-    found = measure_log(log, Thresholds(values.ttc, values.drac, values.pet),
+    record = read_run_record(recording_in(path), values.epoch, Progress(say, f'reading {path}'))
+    _check_requests(values.request, record.log.game)
+    found = measure_log(record.log, Thresholds(values.ttc, values.drac, values.pet),
                         Progress(say, f'measuring {path}')).as_dict()
+    behaviour = measure_behaviour(record, requests=values.request,
+                                  progress=Progress(say, f'measuring the drivers of {path}'))
     if values.json:
+        found['behaviour'] = {each.vehicle_id: each.as_dict() for each in behaviour}
         print(json.dumps(found, indent=2))
     else:
-        print('\n'.join(_lines(found)))
+        lines = [*_lines(found), *(line for each in behaviour if each.human or each.take_overs
+                                   for line in behaviour_lines(each))]
+        print('\n'.join(lines))
     return 0
+
+
+def _check_requests(names: Sequence[str], game: GameDocument) -> None:
+    known = [event.name for event in game.events]
+    for name in names:
+        if name not in known:
+            raise InputError(f'the run has no event {short(name)}', '--request',
+                             'it has ' + (', '.join(known) or 'none'))
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
 from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
@@ -38,16 +39,18 @@ class RunRecord:
     :param commands: (R, V, 4) throttle, brake, steering and reverse that the step from n - 1 to n
         consumed, of the driven vehicles in the log's order; NaN of an AV that follows its plan.
     :param fired: events that took effect, in order.
+    :param orders: of the seats, in order; an offline run has none.
     """
 
     log: RunLog
     ns: NDArray[np.int64]
     commands: NDArray[np.float64]
     fired: tuple[FiredEvent, ...]
+    orders: tuple[SeatOrder, ...] = ()
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """Simulated time of the commands since the run's start (R) [s]."""
+        """Give the simulated time of the commands since the run's start (R) [s]."""
         return np.asarray(self.ns * self.log.game.scheduler.dt_s)
 
 
@@ -61,17 +64,16 @@ def read_run_record(path: Path, epoch: int | None = None,
     log = read_run_log(path, epoch, progress)
     vehicles = [item.id for item in log.vehicles]
     fired = read_run_events(path, log.game.epoch).fired
+    orders = read_seat_orders(path, log.game.epoch)
     if log.cycles is None:
         return RunRecord(log, np.empty(0, dtype=np.int64),
-                         np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired)
+                         np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired, orders)
     ns = log.cycles.column('n').astype(np.int64)
-    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired)
+    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders)
 
 
 def run_record_of(result: OfflineResult) -> RunRecord:
     """Give the record of an offline run."""
-    commands = np.full((len(result.commands) - 1, len(result.setup.vehicle_ids),
-                        len(COMMAND_COLUMNS)), np.nan)
-    commands[:, :result.commands.shape[1]] = result.commands[1:]
+    commands = np.concatenate((result.commands, result.av_commands), axis=1)[1:]
     return RunRecord(run_log_of(result), np.arange(1, len(result.commands)), commands,
                      result.fired)

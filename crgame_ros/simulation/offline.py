@@ -86,6 +86,8 @@ class OfflineResult:
     :param fired: events that took effect, in order.
     :param stop: the human's violation that ended the run, where the game has it so; its n is that
         of the last state.
+    :param av_commands: (n + 1, A, 4) the same commands of those who took over an AV; NaN while it
+        followed its plan.
     """
 
     setup: Setup
@@ -99,6 +101,7 @@ class OfflineResult:
     violations: tuple[VehicleDrivability, ...] = field(default=())
     fired: tuple[FiredEvent, ...] = ()
     stop: VehicleDrivability | None = None
+    av_commands: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0, 4)))
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """Give the states (n + 1, 8) of one driven vehicle."""
@@ -257,6 +260,7 @@ class _Trace:
                  observers: Sequence[RunObserver]) -> None:
         self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), STATE_WIDTH))
         self.commands = np.zeros((steps + 1, len(setup.humans), 4))
+        self.av_commands = np.full((steps + 1, len(setup.avs), 4), np.nan)
         self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
         self.object_velocities: list[NDArray[np.float64]] = []
@@ -279,7 +283,7 @@ class _Trace:
             np.array(self.objects), np.array(self.object_velocities), self.commands[:count],
             self.intervals_s[:count], planners,
             () if self._drivability is None else self._drivability.report(), simulation.fired,
-            self.stop)
+            self.stop, self.av_commands[:count])
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
         """Take a state and the interval of the step that led to it [s]."""
@@ -290,6 +294,9 @@ class _Trace:
         self.vehicles[n] = np.reshape(simulation.states, (-1, STATE_WIDTH))
         for index in range(self.commands.shape[1]):
             self.commands[n, index] = simulation.commands[index] or RELEASED
+        for index, command in enumerate(simulation.commands[self.commands.shape[1]:]):
+            if command is not None:
+                self.av_commands[n, index] = command
         if result.objects is not None:
             self.objects.append(result.objects.poses)
             self.object_velocities.append(result.objects.velocities)

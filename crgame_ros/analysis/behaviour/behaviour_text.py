@@ -1,0 +1,86 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How a vehicle was driven, in lines for people."""
+
+from collections.abc import Iterator
+import math
+
+from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
+from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
+from crgame_ros.analysis.behaviour.steering_reversals import COGNITIVE, ReversalSetting, VISUAL
+from crgame_ros.analysis.behaviour.take_overs import TakeOver
+from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour, LaneChangeGap
+
+
+def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
+    """Tell how a vehicle was driven; what is not defined is left out."""
+    values = found.values
+    yield f'{found.vehicle_id} as it was driven'
+    for name in ('speed', 'acceleration', 'jerk'):
+        yield _line(f'{name}_mean', values[f'{name}_mean'],
+                    f'{name}, sd {values[f"{name}_sd"]:.2f}, '
+                    f'{values[f"{name}_min"]:.2f} to {values[f"{name}_max"]:.2f}')
+    lines = [
+        ('time_above_limit', f'of {values["time_with_limit"]:.1f} s with a speed limit'),
+        ('sdlp', f'of the centre, N - 1; lane changes cut out: {values["lane_changes"]:.0f}'),
+        ('tlc_min', 'smallest time to lane crossing, speed and yaw rate held'),
+        ('tlc_linear_min', 'the same by distance and speed towards the boundary'),
+        ('srr_visual', _setting(VISUAL)), ('srr_cognitive', _setting(COGNITIVE)),
+        *((f'{pedal}_applications', f'applied {100.0 * values[f"{pedal}_share"]:.0f} % of the '
+           'time') for pedal in ('throttle', 'brake'))]
+    for name, text in lines:
+        if math.isfinite(values[name]):
+            yield _line(name, values[name], text)
+    for each in found.reactions:
+        for name, value in zip(('throttle', 'brake', 'steering'), each.reaction, strict=True):
+            if math.isfinite(value):
+                yield _line(f'reaction_{name}', value, f'after {each.event} at '
+                            f'{each.event_s:.1f} s')
+    for change in found.lane_changes:
+        yield from _lane_change(change)
+    for take_over in found.take_overs:
+        yield from _take_over(take_over)
+
+
+def _line(name: str, value: float, text: str) -> str:
+    return f'  {name:<21}{value:9.2f} {MEASURES[name].unit:<6} {text}'.rstrip()
+
+
+def _setting(setting: ReversalSetting) -> str:
+    return f'steering reversals of {setting.gap_deg:g} degrees, {setting.cutoff_hz:g} Hz'
+
+
+def _lane_change(change: LaneChangeGap) -> Iterator[str]:
+    if math.isnan(change.time_s):
+        return
+    where = f'to the {change.side} at {change.time_s:.1f} s'
+    told = False
+    for role in ('leader', 'follower'):
+        neighbour: Neighbour | None = getattr(change.gap, role)
+        if neighbour is not None and math.isfinite(neighbour.time_gap_s):
+            told = True
+            yield _line(f'gap_accepted_{role}', neighbour.time_gap_s,
+                        f'{getattr(change, role)} in {neighbour.gap:.1f} m, {where}')
+    if not told:
+        yield f'  lane change {where}: nobody near'
+
+
+def _take_over(take_over: TakeOver) -> Iterator[str]:
+    by = '' if take_over.request is None else f', asked for by {take_over.request.by}'
+    yield f'  taken over from {take_over.seat_s:.1f} to {take_over.end_s:.1f} s{by}'
+    for name, value in (('take_over_hands_on', take_over.to_hands_on_s),
+                        ('take_over_stable', take_over.to_stable_s)):
+        if math.isfinite(value):
+            yield _line(name, value, 'after the request')

@@ -1,0 +1,98 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Gaps that a driver accepted: to the leader and the follower in the lane that it enters."""
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+from crgame_ros.analysis.behaviour.lane_strip import LaneStrip
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Who is in a lane with less of its width than this is not in the way [m].
+IN_LANE = 0.25
+# Who is farther away is not near [m].
+NEAR = 150.0
+
+
+class Neighbour(NamedTuple):
+    """
+    Who is ahead, or behind, in the lane entered.
+
+    :param number: its number among the others.
+    :param gap: bumper to bumper along the lane, below 0 beside each other [m]
+    :param time_gap_s: gap divided by the speed of whoever is behind; inf where that one does not
+        move forwards [s]
+    """
+
+    number: int
+    gap: float
+    time_gap_s: float
+
+
+class AcceptedGap(NamedTuple):
+    """Leader and follower in a lane; None where nobody is near."""
+
+    leader: Neighbour | None
+    follower: Neighbour | None
+
+
+def gap_in_lane(strip: LaneStrip, own: FloatArray, own_velocity: FloatArray,
+                others: Sequence[FloatArray], velocities: FloatArray) -> AcceptedGap:
+    """
+    Find the gap in a lane that a vehicle enters.
+
+    :param strip: the lane that it enters.
+    :param own: (C + 1, 2) its centre, then its corners [m]
+    :param own_velocity: (2) [m/s]
+    :param others: of each other (D + 1, 2) centre and corners; NaN where absent [m]
+    :param velocities: (N, 2) of the others [m/s]
+    """
+    own_s = strip.center.project(own)[0]
+    leader: Neighbour | None = None
+    follower: Neighbour | None = None
+    own_speed = _along(strip, own_s[0], own_velocity)
+    for number, points in enumerate(others):
+        if not math.hypot(*(points[0] - own[0])) < NEAR or not _is_in(strip, points[1:]):
+            continue
+        s = strip.center.project(points)[0]
+        if s[0] > own_s[0]:
+            gap = float(s[1:].min() - own_s[1:].max())
+            if leader is None or gap < leader.gap:
+                leader = Neighbour(number, gap, _time(gap, own_speed))
+        else:
+            gap = float(own_s[1:].min() - s[1:].max())
+            if follower is None or gap < follower.gap:
+                follower = Neighbour(
+                    number, gap, _time(gap, _along(strip, s[0], velocities[number])))
+    return AcceptedGap(leader, follower)
+
+
+def _is_in(strip: LaneStrip, corners: FloatArray) -> bool:
+    """Tell whether a footprint is in a lane with more than a margin."""
+    beyond = strip.beyond(corners)
+    return bool((beyond.min(axis=0) < -IN_LANE).all())
+
+
+def _along(strip: LaneStrip, s: float, velocity: FloatArray) -> float:
+    heading = float(strip.center.heading_at(np.array([s]))[0])
+    return float(velocity[0]) * math.cos(heading) + float(velocity[1]) * math.sin(heading)
+
+
+def _time(gap: float, speed: float) -> float:
+    return gap / speed if speed > 0.0 else math.inf

@@ -1,0 +1,171 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Which lanelets a driven vehicle was in, one after the other, and where it changed lanes."""
+
+from collections.abc import Iterable, Iterator
+from enum import Enum
+import math
+from typing import NamedTuple
+
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.roads.road_network import RoadNetwork
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+FloatArray = NDArray[np.float64]
+
+# Positions looked at together, and lanelets that may lie between two steps.
+_CHUNK, _BETWEEN = 64, 5
+# Who drives at a greater angle to a lane is not on it [rad].
+_ALONG = math.radians(60.0)
+
+
+class LaneEntry(Enum):
+    """How a vehicle came into a lanelet."""
+
+    ALONG = 'along'
+    CHANGE = 'change'
+    ANEW = 'anew'
+
+
+class LaneVisit(NamedTuple):
+    """
+    A stay of a vehicle's reference point in a lanelet.
+
+    :param lanelet: id.
+    :param first: scenario step, counted from that of the first pose.
+    :param end: the step after the last.
+    :param entry: along the lane, by a change from a neighbour, or anew: at the start, from beside
+        the road, or where the map says nothing of how the lanes belong together.
+    :param against: whether it drove against the lanelet's direction.
+    """
+
+    lanelet: int
+    first: int
+    end: int
+    entry: LaneEntry
+    against: bool
+
+
+class LaneVisits:
+    """
+    Follows reference points over a road network.
+
+    A vehicle is in a lanelet until it leaves its area. Then it is in one that follows, or in a
+    neighbour's: a lane change; of several that overlap it is the one in which it stays longest.
+
+    :param roads: the road network.
+    """
+
+    def __init__(self, roads: RoadNetwork) -> None:
+        self._roads = roads
+        self._areas: dict[int, shapely.Geometry] = {}
+
+    def follow(self, poses: FloatArray) -> tuple[LaneVisit, ...]:
+        """
+        Give the stays in lanes for cars, in order.
+
+        :param poses: (K, 3) of the reference point, at the scenario's steps; finite.
+        """
+        return tuple(self._visits(poses)) if self._roads.lanelet_ids else ()
+
+    def _visits(self, poses: FloatArray) -> Iterator[LaneVisit]:
+        row, last = 0, None
+        while row < len(poses):
+            entry, end, chosen = LaneEntry.ANEW, row, None
+            if last is not None:
+                entry, end, chosen = self._next(last, row, poses)
+            if chosen is None:
+                entry, chosen = LaneEntry.ANEW, self._anew(poses[row])
+                end = row if chosen is None else self._end(chosen, row, poses)
+            if chosen is None or end == row:
+                row, last = row + 1, None
+                continue
+            last = LaneVisit(chosen, row, end, entry, self._turn(chosen, poses[row]) > math.pi / 2)
+            yield last
+            row = end
+
+    def _next(self, last: LaneVisit, row: int,
+              poses: FloatArray) -> tuple[LaneEntry, int, int | None]:
+        """Give how a vehicle goes on from a lanelet that it has left, until when and in which."""
+        along = self._along(last.lanelet)
+        beside = [each for lanelet in (last.lanelet, *along) for each in self._beside(lanelet)]
+        # Maps tell of neighbours for a part of the way only.
+        beside += [each for one in dict.fromkeys(beside) for each in self._along(one)]
+        beside = [each for each in beside if each not in along]
+        for entry, candidates in ((LaneEntry.ALONG, along), (LaneEntry.CHANGE, beside)):
+            # Of those it stays in as long it is the one that fits its heading.
+            ends = [(end, -self._turn(each, poses[row]), -each)
+                    for each in dict.fromkeys(candidates)
+                    if (end := self._end(each, row, poses)) > row
+                    and self._fits(each, poses[row])]
+            if ends:
+                end, _, negative = max(ends)
+                return entry, end, -negative
+        return LaneEntry.ANEW, row, None
+
+    def _anew(self, pose: FloatArray) -> int | None:
+        found = self._roads.lanelet_at(*pose.tolist())
+        return found if found is not None and self._fits(found, pose) else None
+
+    def _fits(self, lanelet: int, pose: FloatArray) -> bool:
+        """Tell whether a lanelet is for cars, and a heading along it or against it."""
+        turn = self._turn(lanelet, pose)
+        found = self._roads.lanelet_network.find_lanelet_by_id(lanelet)
+        # A boundary that is a point bounds nothing.
+        return (self._roads.is_for_cars(lanelet) and min(turn, math.pi - turn) <= _ALONG
+                and all(np.ptp(side, axis=0).max() > 1e-3
+                        for side in (found.left_vertices, found.right_vertices)))
+
+    def _turn(self, lanelet: int, pose: FloatArray) -> float:
+        """Give the angle between a heading and a lanelet's direction, 0 to pi [rad]."""
+        s, _ = self._roads.locate(lanelet, float(pose[0]), float(pose[1]))
+        line = self._roads.line(lanelet)
+        return abs(wrap_pi(float(pose[2]) - float(line.heading_at(np.array(s)))))
+
+    def _end(self, lanelet: int, row: int, poses: FloatArray) -> int:
+        """Give the first step from one on at which a lanelet no longer holds the vehicle."""
+        area = self._areas.get(lanelet)
+        if area is None:
+            area = self._areas[lanelet] = self._roads.area_of([lanelet])
+            shapely.prepare(area)
+        while row < len(poses):
+            x, y = poses[row:row + _CHUNK, :2].T
+            outside = np.flatnonzero(~shapely.intersects_xy(area, x, y))
+            if len(outside):
+                return row + int(outside[0])
+            row += _CHUNK
+        return len(poses)
+
+    def _along(self, lanelet: int) -> list[int]:
+        """List the lanelets before and behind one, nearest first."""
+        found: list[int] = []
+        network = self._roads.lanelet_network
+        for kind in ('successor', 'predecessor'):
+            border = [lanelet]
+            for _ in range(_BETWEEN):
+                border = self._known(each for one in border for each in getattr(
+                    network.find_lanelet_by_id(one), kind) if each not in found)
+                found += border
+        return list(dict.fromkeys(each for each in found if each != lanelet))
+
+    def _beside(self, lanelet: int) -> list[int]:
+        found = self._roads.lanelet_network.find_lanelet_by_id(lanelet)
+        return self._known((found.adj_left, found.adj_right))
+
+    def _known(self, lanelets: Iterable[int | None]) -> list[int]:
+        known = set(self._roads.lanelet_ids)
+        return [each for each in dict.fromkeys(lanelets) if each in known]

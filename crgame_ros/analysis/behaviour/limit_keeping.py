@@ -1,0 +1,70 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The speed limits that a vehicle drove under: of the signs, and of what events set."""
+
+from collections.abc import Mapping, Sequence
+import math
+
+from crgame_ros.analysis.behaviour.lane_visits import LaneVisit
+from crgame_ros.game.documents import GameDocument
+from crgame_ros.game.events import FiredEvent, SpeedLimit
+from crgame_ros.roads.road_network import RoadNetwork
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,
+              events: Sequence[tuple[int, SpeedLimit]]) -> FloatArray:
+    """
+    Give the speed limit at each step: NaN off the lanes and where there is none [m/s].
+
+    :param visits: stays in lanelets.
+    :param count: number of steps K.
+    :param events: step from which on a limit is set, in order.
+    """
+    limits = np.full(count, np.nan)
+    for visit in visits:
+        signed = roads.speed_limit(visit.lanelet)
+        limits[visit.first:visit.end] = math.nan if signed is None else signed
+        for step, event in events:
+            if not event.lanelets or visit.lanelet in event.lanelets:
+                limits[max(visit.first, step):visit.end] = event.speed
+    return limits
+
+
+def limit_events(game: GameDocument, fired: Sequence[FiredEvent],
+                 first_k: int) -> list[tuple[int, SpeedLimit]]:
+    """Give the limits that events set, with the step since `first_k` at which they took effect."""
+    actions: Mapping[str, object] = {event.name: event.action for event in game.events}
+    found = []
+    for event in fired:
+        action = actions.get(event.name)
+        if isinstance(action, SpeedLimit):
+            found.append((event.k - first_k, action))
+    return found
+
+
+def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
+    """
+    Give the time above the limit [s]; each step stands for its time.
+
+    :return: NaN where there was no limit at all
+    """
+    limited = np.isfinite(limits)
+    if not limited.any():
+        return math.nan
+    return step_s * int(np.count_nonzero(np.abs(speed[limited]) > limits[limited]))

@@ -1,0 +1,71 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How a pedal was used: how far it was pressed, for how long, and how often."""
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+from crgame_ros.analysis.behaviour.spread import Spread, spread_of
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# A pedal is applied from this travel on, until it is back at the other: hysteresis [share].
+PRESSED, RELEASED_AGAIN = 0.05, 0.02
+
+
+class PedalUse(NamedTuple):
+    """
+    How a pedal was used.
+
+    :param travel: of the pedal, 0 to 1.
+    :param share: of the time in which it was applied.
+    :param per_minute: applications [1/min]
+    """
+
+    travel: Spread
+    share: float
+    per_minute: float
+
+
+def applied(travel: FloatArray, pressed: float = PRESSED,
+            released: float = RELEASED_AGAIN) -> NDArray[np.bool_]:
+    """
+    Tell when a pedal is applied, with hysteresis; at first it is not.
+
+    :param travel: (N) 0 to 1, without a gap.
+    :param pressed: from which on it is applied; `released`: down to which it stays so.
+    """
+    tells = (travel >= pressed) | (travel <= released)
+    latest = np.maximum.accumulate(np.where(tells, np.arange(len(travel)), -1))
+    return (latest >= 0) & (travel[latest] >= pressed)
+
+
+def use_of_pedal(pieces: Sequence[FloatArray], dt_s: float) -> PedalUse:
+    """
+    Say how a pedal was used.
+
+    :param pieces: its travel, each dt apart and without a gap; one that begins with the pedal
+        pressed has an application there.
+    """
+    if not pieces:
+        return PedalUse(spread_of(np.empty(0)), math.nan, math.nan)
+    states = [applied(piece) for piece in pieces]
+    count = sum(int(np.count_nonzero(np.diff(state, prepend=False) & state)) for state in states)
+    lapse_s = dt_s * sum(map(len, pieces))
+    return PedalUse(spread_of(np.concatenate(pieces)), float(np.concatenate(states).mean()),
+                    60.0 * count / lapse_s)

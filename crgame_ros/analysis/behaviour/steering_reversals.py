@@ -1,0 +1,99 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Steering reversals (Markkula and Engstroem 2006): how often the steering wheel is turned back.
+
+G. Markkula, J. Engstroem: A steering wheel reversal rate metric for assessing effects of visual
+and cognitive secondary task load. ITS World Congress, London, 2006.
+"""
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, filtfilt
+
+FloatArray = NDArray[np.float64]
+
+ORDER = 2
+# A shorter piece says nothing about reversals of 0.6 Hz [s].
+SHORTEST_S = 2.0
+
+
+class ReversalSetting(NamedTuple):
+    """
+    Which reversals count.
+
+    :param cutoff_hz: of the low pass [Hz]
+    :param gap_deg: by more than which the wheel has to be turned [degrees]
+    """
+
+    cutoff_hz: float
+    gap_deg: float
+
+
+VISUAL = ReversalSetting(0.6, 3.0)
+COGNITIVE = ReversalSetting(2.0, 0.1)
+
+
+def smoothed(angles_deg: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArray:
+    """
+    Filter angles forth and back by a Butterworth low pass of order 2.
+
+    :param angles_deg: (N) dt apart, N > 9 [degrees]
+    """
+    numerator, denominator = butter(ORDER, cutoff_hz, fs=1.0 / dt_s)
+    return np.asarray(filtfilt(numerator, denominator, angles_deg))
+
+
+def stationary_points(angles_deg: FloatArray) -> FloatArray:
+    """Give the angles at which the difference changes sign, or the one before is zero."""
+    steps = np.diff(angles_deg)
+    before, after = steps[:-1], steps[1:]
+    return angles_deg[1:-1][(np.sign(before) * np.sign(after) < 0.0) | (before == 0.0)]
+
+
+def count_reversals(points_deg: FloatArray, gap_deg: float) -> int:
+    """Count the reversals among stationary points, upwards and downwards."""
+    return _upwards(points_deg, gap_deg) + _upwards(-points_deg, gap_deg)
+
+
+def _upwards(points_deg: FloatArray, gap_deg: float) -> int:
+    count, kept = 0, math.inf
+    for point in points_deg.tolist():
+        if point - kept > gap_deg:
+            count, kept = count + 1, point
+        elif point <= kept:
+            kept = point
+    return count
+
+
+def reversal_rate(pieces: Sequence[FloatArray], dt_s: float, setting: ReversalSetting) -> float:
+    """
+    Give the reversals of a steering wheel per minute.
+
+    :param pieces: angles of the steering wheel, each dt apart and without a gap; those shorter
+        than `SHORTEST_S` are left out [degrees]
+    :return: NaN if nothing is left, or the low pass is beyond half the sampling rate [1/min]
+    """
+    # A filter of order 2 is padded by 9 samples at either end.
+    long = [piece for piece in pieces if len(piece) * dt_s >= SHORTEST_S and len(piece) > 9]
+    if not long or setting.cutoff_hz >= 0.5 / dt_s:
+        return math.nan
+    count = sum(count_reversals(stationary_points(smoothed(piece, dt_s, setting.cutoff_hz)),
+                                setting.gap_deg) for piece in long)
+    return 60.0 * count / (dt_s * sum(map(len, long)))

@@ -1,0 +1,122 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Take-overs of an AV: from the request to hands on, and to the first stable second."""
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+from crgame_ros.analysis.behaviour.driver_controls import DriverControls
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Hands are on with the first such input (Gold et al. 2013): travel of a pedal [share], and
+# steering wheel away from where it was when the seat was taken [degrees].
+PEDAL_INPUT, WHEEL_INPUT_DEG = 0.1, 2.0
+# A request that was made earlier is of something else [s].
+LONGEST_WAIT_S = 60.0
+# A second is stable in which the steering wheel stays within so much [degrees].
+STABLE_S, STABLE_WHEEL_DEG = 1.0, 10.0
+
+
+class TakeOverRequest(NamedTuple):
+    """
+    That somebody shall drive an AV.
+
+    :param time_s: since the run's start [s]
+    :param by: `order` of the seat, or the name of an event.
+    """
+
+    time_s: float
+    by: str
+
+
+class TakeOver(NamedTuple):
+    """
+    How somebody took over an AV; times since the run's start, NaN where it did not happen [s].
+
+    :param request: that led to it; None where none is known.
+    :param seat_s: first command that the vehicle obeyed.
+    :param end_s: last such command.
+    :param hands_on_s: first input.
+    :param stable_s: beginning of the first stable second from then on.
+    """
+
+    request: TakeOverRequest | None
+    seat_s: float
+    end_s: float
+    hands_on_s: float
+    stable_s: float
+
+    @property
+    def to_hands_on_s(self) -> float:
+        """Time from the request to hands on; NaN where one is missing [s]."""
+        return math.nan if self.request is None else self.hands_on_s - self.request.time_s
+
+    @property
+    def to_stable_s(self) -> float:
+        """Time from the request to the first stable second; NaN where one is missing [s]."""
+        return math.nan if self.request is None else self.stable_s - self.request.time_s
+
+
+def find_take_overs(controls: DriverControls, calm: NDArray[np.bool_],
+                    requests: Sequence[TakeOverRequest]) -> tuple[TakeOver, ...]:
+    """
+    Find the take-overs of an AV.
+
+    A request belongs to the first take-over after it; of several the first counts.
+
+    :param controls: of the AV; whoever drove it for a piece had taken it over.
+    :param calm: (R) whether vehicle and lane allow a stable second at each command: no wheel
+        beyond a boundary of its lane, and no hard acceleration.
+    :param requests: in order of time.
+    """
+    found: list[TakeOver] = []
+    for piece in controls.pieces():
+        times_s = controls.times_s[piece]
+        since_s = max(found[-1].end_s if found else -math.inf, times_s[0] - LONGEST_WAIT_S)
+        request = next((each for each in requests
+                        if since_s < each.time_s <= times_s[0] + 1e-9), None)
+        hands_on = _hands_on(controls, piece)
+        stable = math.nan if hands_on is None else _stable(
+            times_s[hands_on:], controls.wheel_deg[piece][hands_on:], calm[piece][hands_on:],
+            controls.dt_s)
+        found.append(TakeOver(request, float(times_s[0]), float(times_s[-1]),
+                              math.nan if hands_on is None else float(times_s[hands_on]), stable))
+    return tuple(found)
+
+
+def _hands_on(controls: DriverControls, piece: slice) -> int | None:
+    """Give the row of the first input in a piece."""
+    turned = np.abs(controls.wheel_deg[piece] - controls.wheel_deg[piece][0])
+    inputs = np.flatnonzero((controls.throttle[piece] >= PEDAL_INPUT)
+                            | (controls.brake[piece] >= PEDAL_INPUT)
+                            | (turned >= WHEEL_INPUT_DEG))
+    return int(inputs[0]) if len(inputs) else None
+
+
+def _stable(times_s: FloatArray, wheel_deg: FloatArray, calm: NDArray[np.bool_],
+            dt_s: float) -> float:
+    """Give the beginning of the first stable second, NaN without one."""
+    ends = np.searchsorted(times_s, times_s + STABLE_S - 0.5 * dt_s)
+    for row, end in enumerate(ends.tolist()):
+        if end == len(times_s):
+            break
+        within = wheel_deg[row:end + 1]
+        if calm[row:end + 1].all() and np.ptp(within) <= STABLE_WHEEL_DEG:
+            return float(times_s[row])
+    return math.nan

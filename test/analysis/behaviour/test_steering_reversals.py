@@ -1,0 +1,127 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Steering reversals: of sines by hand, and of random signals by another reading of the text."""
+
+import math
+
+from crgame_ros.analysis.behaviour.driver_controls import DriverControls
+from crgame_ros.analysis.behaviour.steering_reversals import (
+    COGNITIVE,
+    count_reversals,
+    reversal_rate,
+    ReversalSetting,
+    stationary_points,
+    VISUAL,
+)
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+DT_S, MINUTE = 0.01, 6000
+
+
+def _sine(amplitude_deg: float, frequency_hz: float) -> NDArray[np.float64]:
+    return amplitude_deg * np.sin(2.0 * math.pi * frequency_hz * DT_S * np.arange(MINUTE))
+
+
+def test_the_settings_are_those_of_the_paper() -> None:
+    """Visual load 0.6 Hz and 3 degrees, cognitive load 2 Hz and 0.1 degrees."""
+    assert VISUAL == (0.6, 3.0) and COGNITIVE == (2.0, 0.1)
+
+
+@pytest.mark.parametrize(('amplitude_deg', 'frequency_hz', 'setting', 'count'), [
+    (5.0, 0.2, VISUAL, 2 * 12 - 1), (5.0, 0.2, COGNITIVE, 2 * 12 - 1),
+    # 2.8 degrees from end to end are below a gap of 3, but above one of 0.1.
+    (1.4, 0.2, VISUAL, 0), (1.4, 0.2, COGNITIVE, 2 * 12 - 1),
+    # At f the low pass leaves 1 / (1 + (f / f_c)^4), forth and back: 0.8 % of 2 Hz, and half.
+    (5.0, 2.0, VISUAL, 0), (5.0, 2.0, COGNITIVE, 2 * 120 - 1),
+    # At the cut-off half is left: 3.02 degrees are a reversal, 2.8 are none.
+    (3.02, 0.6, VISUAL, 2 * 36 - 1), (2.8, 0.6, VISUAL, 0),
+    (0.04, 0.2, COGNITIVE, 0)])
+def test_sines_have_known_counts(amplitude_deg: float, frequency_hz: float,
+                                 setting: ReversalSetting, count: int) -> None:
+    """In each period one reversal at the top and one at the bottom; none at the very first top."""
+    found = reversal_rate([_sine(amplitude_deg, frequency_hz)], DT_S, setting)
+    # Of what barely counts, or does not, the signal's ends may hold one more or less.
+    assert found == pytest.approx(count, abs=1.0 if frequency_hz == 0.6 else 0.0)
+
+
+def test_nothing_below_the_gap_counts() -> None:
+    """A wheel that stands, and noise of half the gap."""
+    noise = np.random.default_rng(1).uniform(-0.02, 0.02, MINUTE)
+    for angles in (np.zeros(MINUTE), np.full(MINUTE, 7.0), noise):
+        assert reversal_rate([angles], DT_S, COGNITIVE) == 0.0
+
+
+def _another_reading(angles_deg: NDArray[np.float64], cutoff_hz: float, gap_deg: float) -> int:
+    """Follow the definition's text word by word."""
+    sections = butter(2, cutoff_hz / (0.5 / DT_S), output='sos')
+    theta = sosfiltfilt(sections, angles_deg, padlen=9).tolist()
+    points = [theta[i] for i in range(1, len(theta) - 1)
+              if (theta[i] - theta[i - 1]) * (theta[i + 1] - theta[i]) < 0.0
+              or theta[i] - theta[i - 1] == 0.0]
+    total = 0
+    for sign in (1.0, -1.0):
+        kept = None
+        for point in points:
+            value = sign * point
+            if kept is None or value <= kept:
+                kept = value
+            elif value > kept + gap_deg:
+                total, kept = total + 1, value
+    return total
+
+
+@pytest.mark.parametrize('seed', range(5))
+@pytest.mark.parametrize('setting', [VISUAL, COGNITIVE])
+def test_random_signals_as_the_text_says(seed: int, setting: ReversalSetting) -> None:
+    """Walks of the wheel over a minute, also such that stand for a while."""
+    rng = np.random.default_rng(seed)
+    angles = np.cumsum(rng.normal(0.0, 0.8, MINUTE)) * (0.5 + 0.5 * (seed % 2))
+    angles[2000:2500] = angles[2000]
+    expected = _another_reading(angles, *setting)
+    assert expected > 5
+    assert reversal_rate([angles], DT_S, setting) == pytest.approx(expected)
+
+
+def test_points_are_compared_with_the_last_kept_one() -> None:
+    """By hand: with a gap of 3 up at 4, then 2 is kept, 5 is too near, 1 is kept, up at 9."""
+    points = np.array([0.0, 4.0, 2.0, 5.0, 1.0, 9.0])
+    # Downwards from 5 to 1 alone, which is exactly 4 and so not more than a gap of 4.
+    assert count_reversals(points, 3.0) == 2 + 1
+    assert count_reversals(points, 4.0) == 2
+    assert stationary_points(np.array([0.0, 1.0, 0.0, 0.0, 1.0])).tolist() == [1.0, 0.0]
+
+
+def test_uneven_times_are_made_even_and_gaps_cut() -> None:
+    """Every third command lost changes no count; what lies behind a gap is another piece."""
+    times_s = DT_S * np.arange(1, MINUTE + 1)
+    kept = np.arange(MINUTE) % 3 != 0
+    commands = np.zeros((MINUTE, 4))
+    commands[:, 2] = _sine(5.0, 0.2) / 450.0
+    for rows, count in ((kept, 23), (kept & (np.abs(times_s - 30.0) > 0.5), 22)):
+        controls = DriverControls.of(times_s[rows], commands[rows], math.radians(450.0), DT_S)
+        pieces = controls.even_pieces(controls.wheel_deg)
+        assert len(pieces) == 24 - count
+        minutes = DT_S * sum(map(len, pieces)) / 60.0
+        assert reversal_rate(pieces, DT_S, VISUAL) * minutes == pytest.approx(count, abs=0.1)
+
+
+def test_nothing_is_said_of_nothing() -> None:
+    """No piece, one of a second, and a low pass beyond half the sampling rate."""
+    assert math.isnan(reversal_rate([], DT_S, VISUAL))
+    assert math.isnan(reversal_rate([np.zeros(100)], DT_S, VISUAL))
+    assert math.isnan(reversal_rate([np.zeros(100)], 0.25, COGNITIVE))

@@ -1,0 +1,134 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How people drove, from a recording: the same as from the run; take-overs; the command."""
+
+from dataclasses import replace
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+from crgame_ros.cli import main
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
+from crgame_ros.recording.run_record import read_run_record, run_record_of
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.timing.cycle_rows import CycleRows, NO_COMMAND
+import numpy as np
+import pytest
+
+DURATION_S, LOG_NS = 8.0, 1_700_000_000_000_000_000
+FROM, TO, HANDS_ON = 300, 700, 350
+
+
+@pytest.fixture(scope='module')
+def taken_over() -> OfflineResult:
+    """Run the crossing with two events; somebody drives the AV from n = 300 to 700."""
+    setup = build_setup(load_game(scenarios_directory() / 'crossing.yaml'))
+    hands = np.full((800, 4), np.nan)
+    hands[FROM:TO] = 0.0
+    hands[HANDS_ON:TO, 0] = 0.2
+    human = np.zeros((800, 4))
+    human[:500, 0] = 0.3
+    human[530:, 1] = 0.4
+    return run_offline(
+        setup, duration_s=DURATION_S, check_drivability=False,
+        drivers={'hv0': ReplayDriver(human), 'av0': ReplayDriver(hands)},
+        triggers=((200, 'slow-zone'), (450, 'pedestrian')))
+
+
+@pytest.fixture(scope='module')
+def bag(taken_over: OfflineResult, recorder: Any, samples: Any,
+        tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Record it, with the commands of the AV and the orders of the seats."""
+    messages = [each for each in recorder.messages(taken_over) if each[0] != '/timing/cycle']
+    columns = CycleRows(['hv0', 'av0'], 1).columns
+    for row, command in zip(recorder.rows, taken_over.av_commands[1:, 0], strict=True):
+        rows = np.array([[*row, *(NO_COMMAND if np.isnan(command[0]) else command)]])
+        n = int(row[1])
+        messages.append(('/timing/cycle', 'std_msgs/msg/Float64MultiArray',
+                         LOG_NS + 10_000_000 * n + 1_500_000, recorder.cycle_rows(columns, rows)))
+    for n, text in ((180, '{"seat": "av0", "source": "game"}'), (230, 'no order'),
+                    (240, '{"seat": 7, "source": "cockpit"}'),
+                    (250, '{"seat": "av0", "source": "cockpit"}'),
+                    (700, '{"seat": "av0", "source": "game"}')):
+        messages.append(('/seats/order', 'std_msgs/msg/String', LOG_NS + 10_000_000 * n
+                         + 2_000_000, samples.string(text)))
+    return Path(recorder.ours(tmp_path_factory.mktemp('run') / 'bag',
+                              sorted(messages, key=lambda each: each[2])))
+
+
+def test_orders_of_seats_are_read(bag: Path, recorder: Any, tmp_path: Path,
+                                  taken_over: OfflineResult) -> None:
+    """At the step of the newest state; nothing that is no order; none of a run without orders."""
+    assert read_seat_orders(bag) == (
+        SeatOrder(180, 'av0', 'game'), SeatOrder(250, 'av0', 'cockpit'),
+        SeatOrder(700, 'av0', 'game'))
+    plain = recorder.ours(tmp_path / 'bag', recorder.messages(taken_over))
+    assert read_seat_orders(plain) == ()
+
+
+def test_a_recording_says_the_same_as_the_run(bag: Path,
+                                              taken_over: OfflineResult) -> None:
+    """Every number, to the last bit; only a recording holds who asked for a seat."""
+    here = measure_behaviour(run_record_of(taken_over))
+    record = read_run_record(bag)
+    there = measure_behaviour(record)
+    unasked = measure_behaviour(replace(record, orders=()))
+    assert [json.dumps(each.as_dict(series=True)) for each in here] == [
+        json.dumps(each.as_dict(series=True)) for each in unasked]
+    assert there[0].reactions[1].reaction.brake_s == pytest.approx(0.81)
+    assert there[0].reactions[1].reaction.throttle_s == pytest.approx(0.51)
+    take_over, = there[1].take_overs
+    assert take_over.request == (2.5, 'order')
+    # The row n holds what the step to n consumed.
+    assert take_over.seat_s == pytest.approx(0.01 * (FROM + 1))
+    assert take_over.to_hands_on_s == pytest.approx(0.01 * (HANDS_ON + 1) - 2.5)
+    assert there[1].values['throttle_share'] == pytest.approx((TO - HANDS_ON) / (TO - FROM))
+
+
+def test_the_command_tells_it(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """For people, as JSON beside the keys that were there, and with an event that asks."""
+    assert main(['measure', str(bag), '--json']) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found) == {'thresholds', 'vehicles', 'behaviour'}
+    assert set(found['behaviour']) == {'hv0', 'av0'}
+    assert found['behaviour']['av0']['take_overs'][0]['take_over_hands_on'] == pytest.approx(1.01)
+    assert main(['measure', str(bag), '--request', 'slow-zone']) == 0
+    text = capsys.readouterr().out
+    assert 'hv0 as it was driven' in text and '  sdlp ' in text
+    assert '  reaction_brake            0.81 s      after pedestrian at 4.5 s' in text
+    assert 'asked for by slow-zone' in text
+    assert '  take_over_hands_on        1.51 s      after the request' in text
+
+
+def test_an_event_that_there_is_not_is_refused(bag: Path,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    """In a line that names those that there are."""
+    assert main(['measure', str(bag), '--request', 'nothing']) == 2
+    error = capsys.readouterr().err
+    assert "--request: the run has no event 'nothing'" in error and 'slow-zone' in error
+
+
+def test_without_commands_motion_is_left(bag: Path) -> None:
+    """A recording that lacks its cycles: no pedals and no wheel, the rest as it is."""
+    record = read_run_record(bag)
+    bare = replace(record, ns=record.ns[:0], commands=record.commands[:0])
+    human = measure_behaviour(bare)[0]
+    assert human.driven_s == 0.0 and not human.reactions
+    assert np.isnan(human.values['srr_visual']) and np.isfinite(human.values['sdlp'])
