@@ -36,6 +36,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame offline   run a game as fast as it can, without ROS
   crgame convert   turn a recording into a CommonRoad scenario
   crgame measure   how critical a recorded run was
+  crgame score     how well planners drove, by CommonRoad's and nuPlan's scores
   crgame replay    the recorded human against other planners
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
@@ -92,6 +93,7 @@ def _build_parser() -> argparse.ArgumentParser:
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
     _add_measure(commands.add_parser('measure', help='how critical a recorded run was'))
+    _add_score(commands.add_parser('score', help='how well planners drove'))
     _add_replay(commands.add_parser('replay',
                                     help='the recorded human against other planners'))
     recover = commands.add_parser('recover', help='finish a killed recording')
@@ -113,6 +115,11 @@ def _build_parser() -> argparse.ArgumentParser:
 
 def _add_measure(parser: argparse.ArgumentParser) -> None:
     from crgame_ros.analysis.measure_command import add_arguments
+    add_arguments(parser)
+
+
+def _add_score(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.analysis.score_command import add_arguments
     add_arguments(parser)
 
 
