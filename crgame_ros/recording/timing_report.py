@@ -211,7 +211,7 @@ class _Collector:
         report['last_refusal'] = engine.get('last_refusal') or None
         report['plans'] = max(self._answers[av], _count(node, 'plans') or 0)
         report['fallback'] = _count(node, 'fallbacks')
-        report['fallback_reasons'] = dict(self._reasons[name])
+        report['fallback_reasons'] = dict(self._reasons[name]) or None
         report['plan_time_ms'] = spread_of(self._plan_times_ms[name])
         report['latency_ms'] = spread_of(self._latencies_ms[av])
         report['first_latency_ms'] = self._first_latency_ms.get(av)

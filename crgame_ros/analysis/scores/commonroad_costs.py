@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 import math
+import re
 from typing import Any, NamedTuple
 
 from commonroad.common.solution import CostFunction, VehicleType
@@ -41,7 +42,8 @@ class CostDefinition(NamedTuple):
 _PATH_LENGTH = 'the code takes the path length L where the site has the offset from the lane'
 COSTS = {
     'JB1': CostDefinition('T', 'the same on the site'),
-    'SA1': CostDefinition('0.1 SA + 0.1 SR + 1e5 D', 'weights differ from the site'),
+    'SA1': CostDefinition('0.1 SA + 0.1 SR + 1e5 D', 'weights differ from the site; the code '
+                          'does not see obstacles turned by exactly 0 rad in D'),
     'WX1': CostDefinition('10 T + V + 0.1 A + 0.1 J + 0.1 D + 10 L', _PATH_LENGTH),
     'SM1': CostDefinition('50 A + 50 SA + 50 SR + L + 20 V + 50 O', _PATH_LENGTH),
     'SM2': CostDefinition('50 A + 50 SA + 50 SR + L + 50 O', _PATH_LENGTH),
@@ -114,4 +116,10 @@ def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajecto
 def _reason(error: BaseException) -> str:
     """Say in a line what the checker stumbled over: the cause, where it names one."""
     cause = error.__cause__ or error
-    return one_line(f'{type(cause).__name__}: {cause}' if str(cause) else type(cause).__name__)
+    lacking = re.search(r"has no attribute '(\w+)'", str(cause))
+    if isinstance(cause, AttributeError) and lacking:
+        return f'its states have no {lacking[1]}'
+    if cause is error:
+        # Before any cost there is the way along the lanes, which the checker looks for.
+        return one_line(f'the checker finds no lanes for it ({type(cause).__name__}: {cause})')
+    return one_line(f'{type(cause).__name__}: {cause}')

@@ -45,6 +45,8 @@ WEIGHTS = {'progress': 5.0, 'time_to_collision': 5.0, 'speed_limit': 4.0, 'comfo
 OVERHANG, LEAST_PROGRESS, LEAST_TTC_S = 0.3, 0.2, 0.95
 # So many collisions at fault with each kind give nothing.
 FATAL: dict[TrackKind, int] = {'vulnerable': 1, 'vehicle': 1, 'object': 2}
+# No free drive comes farther than with this speed [m/s].
+FASTEST = 100.0
 # An expert who starts farther away drove another scenario, perhaps [m].
 ELSEWHERE = 5.0
 
@@ -192,12 +194,17 @@ class NuplanScorer:
             return 0.0, None
         start, start_s = start_lanelet(self._roads, *drive.poses[0].tolist())
         goals = frozenset[int]() if problem is None else goal_lanelets(self._roads, problem)
-        found = find_route(self._roads, start, start_s, goals, 200.0 * drive.duration_s)
-        route = ComparedRoute(self._roads, [lanelet for leg in found.legs for lanelet in leg])
+        # Who has no goal goes on from where it came to.
+        driven = [] if goals else route_of(self._roads, drive.poses).lanelets
+        start = driven[-1] if driven else start
+        found = find_route(self._roads, start, start_s, goals, FASTEST * drive.duration_s)
+        route = ComparedRoute(self._roads, [
+            *driven, *(lanelet for leg in found.legs for lanelet in leg)])
         ends = [] if problem is None or found.goal is None else [
             way for point in _goal_points(problem) if (way := route.way_to(point)) is not None]
+        begin = route.way_to(drive.poses[0, :2]) or 0.0
         return route.progress(drive.poses[:, :2]), route.free_way(
-            start_s, max(float(drive.speeds[0]), 0.0), drive.duration_s, max(ends, default=1e9))
+            begin, max(float(drive.speeds[0]), 0.0), drive.duration_s, max(ends, default=1e9))
 
 
 def collision_score(collisions: Sequence[JudgedCollision]) -> float:

@@ -98,7 +98,7 @@ def plans_of_report(report: Mapping[str, Any]) -> dict[str, PlanRecord]:
     """
     return {
         av: PlanRecord({name: entry[name] for name in _COUNTS}, entry['fallback'],
-                       entry['fallback_reasons'], entry['last_refusal'],
+                       entry['fallback_reasons'] or {}, entry['last_refusal'],
                        {name: entry[name] for name in ('latency_ms', 'plan_time_ms', 'age_ms')},
                        entry['worst_tracking_errors'])
         for av, entry in report['planners'].items()}

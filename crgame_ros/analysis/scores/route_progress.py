@@ -68,6 +68,11 @@ class ComparedRoute:
         """Give the number of its parts."""
         return len(self._blocks)
 
+    @property
+    def lanelets(self) -> list[int]:
+        """Give its lanelets in driving order, one for each part."""
+        return [block.lanelet for block in self._blocks]
+
     def progress(self, points: FloatArray) -> float:
         """
         Give how far points (K, 2) in turn come along the route [m].

@@ -15,14 +15,16 @@
 """Scores solutions, whoever made them, against their scenario."""
 
 from collections.abc import Callable, Mapping
+import copy
 from dataclasses import dataclass, replace
 
 from commonroad.common.solution import (
     PlanningProblemSolution,
     Solution,
+    TrajectoryType,
     vehicle_parameters,
 )
-from commonroad.planning.planning_problem import PlanningProblemSet
+from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.trajectory import Trajectory
 from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.nuplan_score import NuplanScore, NuplanScorer
@@ -32,8 +34,9 @@ from crgame_ros.analysis.scores.run_expert import recorded_expert
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import poses_of, SolutionJudge, speeds_of
-from crgame_ros.analysis.scores.trajectory_feasibility import simulated
+from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility, simulated
 from crgame_ros.errors import InputError, one_line
+from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.geometry.shape import Shape
 import numpy as np
 
@@ -81,9 +84,12 @@ def _score(scored: ScoredScenario, judge: SolutionJudge, nuplan: NuplanScorer, n
                   in zip(parts, drives, strict=True) if mate is not part]
         drive = replace(drives[number], tracks=(*drives[number].tracks, *others))
         who = name if len(parts) == 1 else f'{name}, problem {problem.planning_problem_id}'
+        judged = judge.judge(part.found, part.driven, failed=failed, others=solved)
+        if judged.feasibility.feasible is False and _has_rear_axles(part.found, problem, drive):
+            told.append('its positions are those of the rear axle, as files of 2021 have them: '
+                        'as such they would be feasible')
         result.append(VehicleScores(
-            who, 'solution', '',
-            judge.judge(part.found, part.driven, failed=failed, others=solved),
+            who, 'solution', '', judged,
             _score_drive(scored, nuplan, drive, part, told),
             find_goal(problem, part.driven.state_list, drive.dt_s), None, tuple(told)))
     return result
@@ -112,6 +118,20 @@ def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
         except Exception as error:  # the checker raises whatever its code stumbles over
             failed[name] = one_line(str(error) or type(error).__name__)
     return failed
+
+
+def _has_rear_axles(found: PlanningProblemSolution, problem: PlanningProblem,
+                    drive: ScoredDrive) -> bool:
+    """Tell whether a trajectory is feasible if its positions are of the rear axle."""
+    if found.trajectory_type is not TrajectoryType.KS:
+        return False
+    moved = copy.deepcopy(found.trajectory.state_list)
+    for state, pose in zip(moved, shifted(drive.poses, drive.rear_to_center), strict=True):
+        state.position = pose[:2]
+    return check_feasibility(
+        PlanningProblemSolution(found.planning_problem_id, found.vehicle_model, found.vehicle_type,
+                                found.cost_function, Trajectory(moved[0].time_step, moved)),
+        problem, drive.dt_s).feasible is True
 
 
 def _drive(scored: ScoredScenario, part: _Part, solved: frozenset[int]) -> ScoredDrive:

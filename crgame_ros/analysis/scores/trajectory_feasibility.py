@@ -71,7 +71,9 @@ class TrajectoryFeasibility:
         return {
             'feasible': self.feasible, 'first_step': self.first_step, 'reason': self.reason,
             'transitions': self.transitions, 'infeasible': self.infeasible,
-            'position_error_m': self.position_error, 'heading_error_rad': self.heading_error,
+            # Beyond all numbers where no inputs were found.
+            'position_error_m': _finite(self.position_error),
+            'heading_error_rad': _finite(self.heading_error),
             'excess_acceleration_m_s2': self.excess_acceleration,
             'excess_steering_rate_rad_s': self.excess_steering_rate,
             'excess_friction_m_s2': self.excess_friction, 'step_s': self.step_s}
@@ -111,6 +113,10 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
         not len(bad), None if first is None else int(states[first].time_step),
         '' if first is None else _why(*measured[first][1]), len(feasible), len(bad), worst[0],
         worst[1], worst[2], worst[3], worst[4], stride * dt_s)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _transition(now: TraceState, then: TraceState, dynamics: VehicleDynamics, step_s: float
@@ -172,7 +178,7 @@ def _of_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
 def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
               dt_s: float) -> Trajectory:
     """
-    Give a solution's states: of inputs what the model makes of them, beyond bounds as well.
+    Give a solution's states: of inputs what the model makes of them, until one is beyond bounds.
 
     :raises ValueError: if the model cannot be driven with them.
     """
@@ -180,10 +186,7 @@ def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
         return found.trajectory
     dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
     try:
-        made = dynamics.simulate_trajectory(problem.initial_state, found.trajectory, dt_s,
-                                            throw=False)
+        return feasibility_checker.input_vector_feasibility(
+            problem.initial_state, found.trajectory, dynamics, dt_s)[1]
     except Exception as error:  # the checker raises whatever its code stumbles over
         raise ValueError(one_line(f'{type(error).__name__}: {error}')) from error
-    if made is None:
-        raise ValueError('its inputs are beyond the bounds of the model')
-    return made
