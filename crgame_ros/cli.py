@@ -17,11 +17,12 @@
 import argparse
 from collections.abc import Callable, Sequence
 from functools import partial
+import importlib
 import json
 from pathlib import Path
 import sys
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from crgame_ros import __version__
 from crgame_ros.errors import CrgameError, InputError
@@ -29,22 +30,41 @@ from crgame_ros.errors import CrgameError, InputError
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
     from crgame_ros.simulation.offline import OfflineResult
 
+
+class _Tool(NamedTuple):
+    """
+    A command whose module declares its options (`add_arguments`) and what it does.
+
+    :param name: of the command.
+    :param does: for people, in a few words.
+    :param module: that is loaded when the command line is read; it loads all else when it runs.
+    """
+
+    name: str
+    does: str
+    module: str
+
+
+RUN, OFFLINE = 'run a game live, as ./run.sh does', 'run a game as fast as it can, without ROS'
+CONVERT = 'turn a recording into a CommonRoad scenario'
+RECOVER, INFO = 'finish a recording whose recorder was killed', 'what is in a recording'
+DOCTOR = 'what is missing on this machine, and the remedy'
+TOOLS = (
+    _Tool('measure', 'how critical a recorded run was, and how people drove',
+          'crgame_ros.analysis.measure_command'),
+    _Tool('score', "how well planners drove, by CommonRoad's and nuPlan's scores",
+          'crgame_ros.analysis.score_command'),
+    _Tool('replay', 'the recorded human against other planners', 'crgame_ros.replay_command'),
+    _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',
+          'crgame_ros.analysis.validate_command'),
+    _Tool('rasterize', 'draw curbs and obstacles of a scenario as an occupancy map',
+          'crgame_ros.occupancy.occupancy_command'),
+    _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',
+          'crgame_ros.waypoints.waypoint_command'),
+    _Tool('schema', 'what a game file and other files may say, for editors',
+          'crgame_ros.schema_command'))
 DESCRIPTION = """\
 Tools around crgame_ros, the driving simulator for motion planning.
-
-  crgame run       run a game live, as ./run.sh does
-  crgame offline   run a game as fast as it can, without ROS
-  crgame convert   turn a recording into a CommonRoad scenario
-  crgame measure   how critical a recorded run was, and how it was driven
-  crgame replay    the recorded human against other planners
-  crgame recover   finish a recording whose recorder was killed
-  crgame info      what is in a recording
-  crgame validate  whether files are valid: scenarios, games, recordings, tables
-  crgame rasterize draw curbs and obstacles of a scenario as an occupancy map
-  crgame roads     turn way-points (CSV) into a scenario to drive on, or back
-  crgame schema    what a game file and other files may say, for editors
-  crgame doctor    what is missing on this machine, and the remedy
-
 `crgame COMMAND --help` tells more."""
 
 
@@ -76,14 +96,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _build_parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog='crgame', description=DESCRIPTION,
-                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = _Parser(prog='crgame', description=DESCRIPTION, formatter_class=partial(
+        argparse.RawDescriptionHelpFormatter, max_help_position=18))
     parser.add_argument('--version', action='version', version=f'crgame_ros {__version__}')
     commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
                                      parser_class=_Parser)
-    commands.add_parser('run', help='run a game live (options: crgame run --help)')
-    _add_offline(commands.add_parser('offline', help='run a game as fast as it can'))
-    convert = commands.add_parser('convert', help='recording to CommonRoad scenario')
+    commands.add_parser('run', help=RUN)
+    _add_offline(commands.add_parser('offline', help=OFFLINE))
+    convert = commands.add_parser('convert', help=CONVERT)
     convert.add_argument('bag', type=Path, help='folder or file of the recording')
     convert.add_argument('--out', type=Path, metavar='PATH',
                          help='file to write (*.xml), or folder for <benchmark id>.xml (default: '
@@ -91,55 +111,20 @@ def _build_parser() -> argparse.ArgumentParser:
     convert.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
-    _add_measure(commands.add_parser('measure',
-                                     help='how critical a run was, and how it was driven'))
-    _add_replay(commands.add_parser('replay',
-                                    help='the recorded human against other planners'))
-    recover = commands.add_parser('recover', help='finish a killed recording')
+    recover = commands.add_parser('recover', help=RECOVER)
     recover.add_argument('bag', type=Path, help='folder or .mcap file')
     recover.set_defaults(command=_recover)
-    info = commands.add_parser('info', help='what is in a recording')
+    info = commands.add_parser('info', help=INFO)
     info.add_argument('bag', type=Path, help='folder or file of the recording')
     info.set_defaults(command=_info)
-    _add_validate(commands.add_parser('validate', help='whether files are what they should be'))
-    _add_rasterize(commands.add_parser('rasterize', help='scenario to occupancy map'))
-    _add_roads(commands.add_parser('roads', help='way-points to scenario, or back'))
-    _add_schema(commands.add_parser('schema', help='JSON Schema of games and other files'))
-    doctor = commands.add_parser('doctor', help='what is missing on this machine')
+    for tool in TOOLS:
+        importlib.import_module(tool.module).add_arguments(
+            commands.add_parser(tool.name, help=tool.does))
+    doctor = commands.add_parser('doctor', help=DOCTOR)
     doctor.add_argument('--clean', action='store_true',
                         help='remove the shared memory that killed ROS processes have left')
     doctor.set_defaults(command=_doctor)
     return parser
-
-
-def _add_measure(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.analysis.measure_command import add_arguments
-    add_arguments(parser)
-
-
-def _add_replay(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.replay_command import add_arguments
-    add_arguments(parser)
-
-
-def _add_validate(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.analysis.validate_command import add_arguments
-    add_arguments(parser)
-
-
-def _add_rasterize(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.occupancy.occupancy_command import add_arguments
-    add_arguments(parser)
-
-
-def _add_roads(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.waypoints.waypoint_command import add_arguments
-    add_arguments(parser)
-
-
-def _add_schema(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.schema_command import add_arguments
-    add_arguments(parser)
 
 
 def _add_offline(parser: argparse.ArgumentParser) -> None:

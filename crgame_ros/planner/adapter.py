@@ -111,7 +111,7 @@ class PlannerAdapter:
         self.statistics.plans += 1
         if reason is not None:
             self.statistics.fallbacks += 1
-            self.statistics.reasons[re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', reason)] += 1
+            self.statistics.reasons[reason_kind(reason)] += 1
         self._last_plan = plan
         return plan
 
@@ -136,3 +136,8 @@ def describe(error: Exception) -> str:
     if isinstance(error, PlanningError):
         return text
     return f'{type(error).__name__}: {text}' if text else type(error).__name__
+
+
+def reason_kind(reason: str) -> str:
+    """Give a reason for braking with `#` for its numbers, so that like ones are counted."""
+    return re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', reason)

@@ -14,7 +14,7 @@
 # limitations under the License.
 """`timing.json`: what a recorded run says of its timing, planners, violations and contacts."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 import json
 from pathlib import Path
@@ -24,6 +24,7 @@ from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.status_values import read_status
+from crgame_ros.planner.adapter import reason_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.export import write_text
 from crgame_ros.recording.reader import BagReader
@@ -33,6 +34,7 @@ from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.timing.timing_metrics import TimingMetrics
 import numpy as np
+from numpy.typing import NDArray
 from shapely.errors import GEOSException
 
 _DIAGNOSTICS = '/diagnostics'
@@ -44,6 +46,8 @@ REPORT_KEYS = frozenset((
 # Counts of a status `sim_node: <av> plans`, as the engine keeps them.
 _PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
                 'steps_without_plan')
+# Of a status of a planner that braked, and of a tracked AV.
+_BRAKING, _WORST = 'braking: ', 'worst_'
 
 
 def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None,
@@ -133,6 +137,8 @@ class _Collector:
         self._first_latency_ms: dict[str, float] = {}
         self._answers: dict[str, int] = defaultdict(int)
         self._plan_times_ms: dict[str, list[float]] = defaultdict(list)
+        self._ages_ms: dict[str, list[float]] = defaultdict(list)
+        self._reasons: dict[str, Counter[str]] = defaultdict(Counter)
         self._statuses: dict[str, dict[str, str]] = {}
 
     def take(self, recorded: BagMessage, reader: BagReader) -> None:
@@ -176,6 +182,11 @@ class _Collector:
         self._statuses[status.name] = values
         if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
             self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
+            if status.message.startswith(_BRAKING):
+                reason = reason_kind(status.message.removeprefix(_BRAKING))
+                self._reasons[status.name][reason] += 1
+        elif status.name.startswith('sim_node: ') and values.get('age_ms'):
+            self._ages_ms[status.name].append(float(values['age_ms']))
 
     def _take_verdict(self, vehicle: str, status: Any) -> None:
         """Note what has begun to be violated; heartbeats repeat what lasts."""
@@ -200,9 +211,14 @@ class _Collector:
         report['last_refusal'] = engine.get('last_refusal') or None
         report['plans'] = max(self._answers[av], _count(node, 'plans') or 0)
         report['fallback'] = _count(node, 'fallbacks')
-        report['plan_time_ms'] = _spread(self._plan_times_ms[name])
-        report['latency_ms'] = _spread(self._latencies_ms[av])
+        report['fallback_reasons'] = dict(self._reasons[name]) or None
+        report['plan_time_ms'] = spread_of(self._plan_times_ms[name])
+        report['latency_ms'] = spread_of(self._latencies_ms[av])
         report['first_latency_ms'] = self._first_latency_ms.get(av)
+        report['age_ms'] = spread_of(self._ages_ms[f'sim_node: {av} plans'])
+        report['worst_tracking_errors'] = {
+            key.removeprefix(_WORST).removesuffix('_error'): float(value)
+            for key, value in engine.items() if key.startswith(_WORST) and value} or None
         return report
 
 
@@ -211,7 +227,7 @@ def _count(values: dict[str, str], key: str) -> int | None:
     return int(text) if text.isdecimal() else None
 
 
-def _spread(samples: Sequence[float]) -> dict[str, float] | None:
+def spread_of(samples: Sequence[float] | NDArray[np.float64]) -> dict[str, float] | None:
     """Give median, 99th percentile and maximum; None of nothing."""
     values = np.array(samples)
     if not len(values):

@@ -70,13 +70,14 @@ def read_text(path: Path) -> str:
     return _decode(data, name)
 
 
-def parse_hardened(text: str, source: str) -> etree._Element:
+def parse_hardened(text: str, source: str, root_tag: str = 'commonRoad') -> etree._Element:
     """
     Parse XML without entities, document types, network access or oversized nodes.
 
     :param text: the file's content, of any declared encoding
     :param source: file name for messages
-    :return: the root element `commonRoad`
+    :param root_tag: name of the root element: of a scenario, unless it is a solution
+    :return: the root element
     :raises InputError: if it is no XML, has another root, or declares a document type.
     """
     if len(text) > MAX_BYTES:
@@ -95,9 +96,10 @@ def parse_hardened(text: str, source: str) -> etree._Element:
         raise InputError(f'is no well-formed XML ({error})', source, _DOWNLOAD) from error
     if root.getroottree().docinfo.doctype:
         raise _has_doctype(source)
-    if root.tag != 'commonRoad':
+    if root.tag != root_tag:
+        kind = 'scenario' if root_tag == 'commonRoad' else 'solution'
         raise InputError(f'the root element is <{root.tag}>', source,
-                         'give a CommonRoad scenario, whose root is <commonRoad>')
+                         f'give a CommonRoad {kind}, whose root is <{root_tag}>')
     return root
 
 

@@ -136,13 +136,15 @@ def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     for second, factor in ((1, 1), (2, 2)):
         stamp_ns = second * 1_000_000_000
         messages.append(('/diagnostics', DIAGNOSTICS, START + stamp_ns, recorder.status(
-            stamp_ns, 'sim_node: av0 plans', 'following its plan',
+            stamp_ns, 'sim_node: av0 plans', 'following its plan', age_ms=20.0 * factor,
+            worst_lane_error=0.1 * factor, lane_error=7.0,
             **{key: factor * value for key, value in counts.items()})))
     for plans, fallbacks, time_ms in ((1, 1, 8.0), (10, 1, 2.0), (17, 2, 3.0)):
         stamp_ns = plans * 100_000_000
         messages.append(('/diagnostics', DIAGNOSTICS, START + stamp_ns, recorder.status(
-            stamp_ns, 'planner_node: av0', 'planning', k=plans, plans=plans, fallbacks=fallbacks,
-            plan_time_ms=f'{time_ms:.3f}')))
+            stamp_ns, 'planner_node: av0',
+            'planning' if plans == 10 else f'braking: {plans} m short', k=plans, plans=plans,
+            fallbacks=fallbacks, plan_time_ms=f'{time_ms:.3f}')))
     report = timing_report(recorder.ours(
         tmp_path / 'bag', sorted(messages, key=lambda message: message[2])))
     av0 = report['planners']['av0']
@@ -153,6 +155,10 @@ def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     assert av0['plan_time_ms'] == pytest.approx({'p50': 3.0, 'p99': 7.9, 'max': 8.0})
     # The run waits for the first plan: what the planner took to start is told apart.
     assert av0['first_latency_ms'] == pytest.approx(300.0)
+    # Numbers differ from fallback to fallback, reasons do not.
+    assert av0['fallback_reasons'] == {'# m short': 2}
+    assert av0['age_ms'] == pytest.approx({'p50': 30.0, 'p99': 39.8, 'max': 40.0})
+    assert av0['worst_tracking_errors'] == {'lane': 0.2}
     silent = report['planners']['av1']
     assert silent == dict.fromkeys(av0) | {'plans': 0}
 

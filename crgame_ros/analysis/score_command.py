@@ -1,0 +1,259 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""`crgame score`: how well planners and people drove, for people and as JSON."""
+
+import argparse
+from collections.abc import Iterator
+from datetime import datetime
+from functools import partial
+import json
+from pathlib import Path
+import sys
+from typing import Any, TYPE_CHECKING
+
+from crgame_ros.errors import CrgameError, InputError
+
+if TYPE_CHECKING:  # A command that needs no engine starts without it.
+    from crgame_ros.analysis.scores.planner_scores import PlannerScores
+    from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+
+DESCRIPTION = """\
+Score who drove: CommonRoad's costs and checks, feasibility, nuPlan's closed-loop score, and what
+planners answered.
+
+  crgame score runs/NAME                                     each vehicle of a run
+  crgame score runs/NAME --expert runs/HUMAN                 progress compared with a human's run
+  crgame score --scenario FILE.xml --solution SOLUTION.xml   published solutions of a scenario
+
+docs/scores.md defines each score. With --out the scenario, a solution file for each vehicle and
+cost function, and all numbers (scores.json) are written."""
+NONE = '-'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument('run', nargs='?', type=Path, help='folder of a run, or its recording')
+    parser.add_argument('--epoch', type=int, help='which run of a recording that holds several '
+                        '(resets count them from 0; default: the last)')
+    parser.add_argument('--scenario', type=Path, metavar='FILE',
+                        help='CommonRoad file instead of a run, for --solution')
+    parser.add_argument('--solution', type=Path, action='append', default=[], metavar='FILE',
+                        help='solution file to score against the run as exported, or against '
+                        '--scenario; may be repeated')
+    parser.add_argument('--expert', type=Path, metavar='RUN',
+                        help="run whose first human's progress is the measure (default: the "
+                        'recorded obstacle that a planning problem replaced, else a free drive at '
+                        'the speed limit)')
+    parser.add_argument('--json', action='store_true', help='print it as JSON')
+    parser.add_argument('--out', type=Path, metavar='DIR', help='folder to write files to')
+    parser.set_defaults(command=score)
+
+
+def score(values: argparse.Namespace) -> int:
+    """Score a run or solutions, and print what was found."""
+    import gc
+    if (values.run is None) == (values.scenario is None):
+        raise InputError('give a run, or --scenario with --solution', 'crgame score',
+                         'see --help')
+    if values.scenario is not None and not values.solution:
+        raise InputError('there is nothing to score', '--scenario', 'give --solution FILE')
+    if values.scenario is not None and values.expert is not None:
+        raise InputError('is for runs', '--expert', 'leave it out')
+    found = _score_run(values) if values.run is not None else _score_file(values)
+    # What the checker holds in circles its package would complain of at the end.
+    gc.collect()
+    if values.out is not None:
+        _write(found, values.out)
+    told = [each.as_dict() for each in found]
+    if values.json:
+        print(json.dumps(told[0] if len(told) == 1 else told, indent=2, allow_nan=False))
+    else:
+        print('\n'.join(line for each in told for line in _lines(each)))
+        if values.out is not None:
+            print(f'files are in {values.out}')
+    return 0
+
+
+def _say(what: str) -> Any:
+    from crgame_ros.recording.progress import Progress
+    return Progress(partial(print, file=sys.stderr, flush=True), what)
+
+
+def _score_run(values: argparse.Namespace) -> 'list[PlannerScores]':
+    from crgame_ros.analysis.scores.plan_record import plans_of_report
+    from crgame_ros.analysis.scores.run_expert import expert_of_run
+    from crgame_ros.analysis.scores.scored_run import score_run
+    from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+    from crgame_ros.recording.run_folder import recording_in
+    from crgame_ros.recording.run_log import read_run_log
+    from crgame_ros.recording.run_record import read_run_record
+    from crgame_ros.recording.timing_report import timing_report
+    bag = recording_in(values.run)
+    record = read_run_record(bag, values.epoch, _say(f'reading {values.run}'))
+    expert = None if values.expert is None else expert_of_run(
+        read_run_log(recording_in(values.expert), None, _say(f'reading {values.expert}')),
+        record.log, str(values.expert))
+    plans = {}
+    if record.log.game.avs:
+        try:
+            plans = plans_of_report(timing_report(bag, values.epoch, record.log,
+                                                  _say(f'reading plans of {values.run}')))
+        except CrgameError as error:
+            print(f'note: no plans: {error}', file=sys.stderr)
+    found = [score_run(record, expert=expert, plans=plans,
+                       progress=_say(f'scoring {values.run}'))]
+    if values.solution:
+        found.append(_score_solutions(values, ScoredScenario.of_run(record.log)[0]))
+    return found
+
+
+def _score_file(values: argparse.Namespace) -> 'list[PlannerScores]':
+    from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+    from crgame_ros.scenario.loading import load_scenario
+    return [_score_solutions(values, ScoredScenario.of_file(load_scenario(values.scenario)))]
+
+
+def _score_solutions(values: argparse.Namespace, scored: 'ScoredScenario') -> 'PlannerScores':
+    from crgame_ros.analysis.scores.scored_solution import score_solutions
+    from crgame_ros.analysis.scores.solution_file import read_solution
+    return score_solutions(scored, {str(path): read_solution(path) for path in values.solution},
+                           _say('scoring solutions'))
+
+
+def _write(found: 'list[PlannerScores]', out: Path) -> None:
+    """Write the scenario, the solutions of the vehicles of a run, and all numbers."""
+    from crgame_ros.analysis.scores.solution_file import dated, solution_name, solution_text
+    from crgame_ros.recording.export import prepare_folder, write_text
+    prepare_folder(out)
+    when = datetime.now()
+    scores = found[0]
+    write_text(scores.xml_text, out / f'{scores.scenario_id}.xml')
+    for vehicle in scores.vehicles:
+        if vehicle.role == 'solution':
+            continue
+        for solution in vehicle.commonroad.solutions(scores.scenario_id).values():
+            write_text(solution_text(dated(solution, when)),
+                       out / solution_name(solution, vehicle.vehicle_id))
+    told = [each.as_dict() for each in found]
+    write_text(json.dumps(told[0] if len(told) == 1 else told, indent=2, allow_nan=False) + '\n',
+               out / 'scores.json')
+
+
+def _lines(found: dict[str, Any]) -> Iterator[str]:
+    yield f'{found["scenario"]}, {found["checker"]}'
+    for vehicle in found['vehicles']:
+        planner = f', {vehicle["planner"]}' if vehicle['planner'] else ''
+        yield ''
+        yield f'{vehicle["vehicle"]} ({vehicle["role"]}{planner})'
+        yield from (f'  {name:<12} {text}' for name, text in (
+            *_nuplan(vehicle['nuplan']), *_commonroad(vehicle['commonroad']),
+            *_goal(vehicle['goal']), *_plans(vehicle['plans'])))
+        for remark in vehicle['remarks']:
+            yield f'  note: {remark}'
+    yield ''
+    for remark in found['remarks']:
+        yield f'note: {remark}'
+
+
+def _nuplan(found: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
+    if found is None:
+        return
+    factors = ' x '.join(f'{name.replace("_", " ")} {_number(value)}'
+                         for name, value in found['multipliers'].items())
+    mean = ', '.join(f'{name.replace("_", " ")} {_number(entry["value"])} (x{entry["weight"]:g})'
+                     for name, entry in found['weighted'].items())
+    yield 'nuPlan', f'{found["score"]:.3f} of 1'
+    yield '', f'= {factors}'
+    yield '', f'x mean of {mean}'
+    yield '', (f'progress {found["progress_m"]:.0f} m, {found["expert"]}: '
+               f'{found["expert_progress_m"]:.0f} m')
+    for each in found['collisions']:
+        fault = 'at fault' if each['at_fault'] else 'not at fault'
+        yield '', (f'collision with {each["with"]} at {each["time_s"]:.1f} s: {each["kind"]}, '
+                   f'{fault}')
+    beyond = [f'{name.replace("_", " ")} {entry["lowest"]:.2f} to {entry["highest"]:.2f} '
+              f'{entry["unit"]}' for name, entry in found['comfort'].items()
+              if not entry['comfortable']]
+    if beyond:
+        yield '', f'not comfortable: {"; ".join(beyond)}'
+    for remark in found['remarks']:
+        yield '', f'note: {remark}'
+
+
+def _commonroad(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    yield 'CommonRoad', (f'{"valid" if found["valid"] else "not valid"} as {found["vehicle"]}, '
+                         f'problem {found["planning_problem"]}, {found["states"]} states')
+    for name, reason in found['failed'].items():
+        yield '', f'{name}: {reason}'
+    costs = {name: entry for name, entry in found['costs'].items() if entry['total'] is not None}
+    if costs:
+        yield '', '  '.join(f'{name} {entry["total"]:.4g}' for name, entry in costs.items())
+    reasons: dict[str, list[str]] = {}
+    for name, entry in found['costs'].items():
+        if entry['total'] is None:
+            reasons.setdefault(entry['reason'], []).append(name)
+    for reason, names in reasons.items():
+        yield '', f'no {", ".join(names)}: {reason}'
+    yield 'feasibility', _feasibility(found['feasibility'])
+
+
+def _feasibility(found: dict[str, Any]) -> str:
+    if found['feasible'] is None:
+        return f'unknown: {found["reason"]}'
+    if found['feasible']:
+        return f'feasible, {found["transitions"]} transitions'
+    return (f'not from time step {found["first_step"]} on, {found["infeasible"]} of '
+            f'{found["transitions"]} transitions: {found["reason"]}')
+
+
+def _goal(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    if found['reached_s'] is not None:
+        yield 'goal', f'reached after {found["reached_s"]:.1f} s'
+    elif found['last_distance_m'] is not None:
+        yield 'goal', (f'not reached, {found["last_distance_m"]:.1f} m away at the end '
+                       f'({found["least_distance_m"]:.1f} m at best)')
+    else:
+        yield 'goal', 'not reached'
+
+
+def _plans(found: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
+    if found is None:
+        return
+    if found['accepted_share'] is None:
+        yield 'plans', 'not recorded'
+        return
+    yield 'plans', (f'{100.0 * found["accepted_share"]:.1f} % accepted and no fallback, of '
+                    f'{_number(found["plans"])}; '
+                    f'{_number(found["fallbacks"])} fallbacks, {_number(found["refused"])} '
+                    f'refused, {_number(found["steps_without_plan"])} steps without a plan')
+    for reason, count in found['fallback_reasons'].items():
+        yield '', f'{count} x {reason}'
+    for name in ('latency_ms', 'age_ms', 'plan_time_ms'):
+        if found[name] is not None:
+            yield '', (f'{name.removesuffix("_ms").replace("_", " ")} '
+                       f'{found[name]["p50"]:.0f} ms, at worst {found[name]["max"]:.0f} ms')
+    if found['worst_tracking_errors']:
+        yield 'tracking', 'at worst ' + ', '.join(
+            f'{name} {value:.2f} {_TRACKING_UNITS.get(name, "")}'
+            for name, value in found['worst_tracking_errors'].items())
+
+
+_TRACKING_UNITS = {'lateral': 'm', 'along': 'm', 'heading': 'rad', 'speed': 'm/s', 'lane': 'm'}
+
+
+def _number(value: float | None) -> str:
+    return NONE if value is None else f'{value:.3g}'

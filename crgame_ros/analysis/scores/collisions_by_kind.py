@@ -1,0 +1,119 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Collisions as nuPlan's closed-loop score sees them: which kind, and at whose fault."""
+
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from crgame_ros.analysis.scores.lanes_driven import LanesDriven
+from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
+from crgame_ros.drivability.contact import Kind
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.vehicle.standstill import REST
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+FloatArray = NDArray[np.float64]
+# Whose centre is at a smaller angle to the heading is ahead of the rear axle, at a greater one
+# behind it (nuplan-devkit, observation/idm/utils.py) [rad].
+AHEAD, BEHIND = math.radians(30.0), math.radians(150.0)
+
+
+@dataclass(frozen=True)
+class JudgedCollision:
+    """
+    The first touch of the vehicle and one other.
+
+    :param other_id: whom it touched.
+    :param other_kind: what that is.
+    :param step: time step, from the drive's first.
+    :param time_s: the same [s]
+    :param kind: of the collision.
+    :param at_fault: whether it counts as the vehicle's fault.
+    """
+
+    other_id: str
+    other_kind: TrackKind
+    step: int
+    time_s: float
+    kind: Kind
+    at_fault: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give it as JSON has it."""
+        return {'with': self.other_id, 'group': self.other_kind, 'time_s': self.time_s,
+                'kind': self.kind, 'at_fault': self.at_fault}
+
+
+def find_collisions(drive: ScoredDrive, lanes: LanesDriven) -> tuple[JudgedCollision, ...]:
+    """
+    Find the first touch with each other, in order of time.
+
+    A vehicle that stands, one that is hit from behind, and one that is hit at the side within its
+    lane are not at fault; one that hits what stands, or hits with its front, is.
+    """
+    found = []
+    for track in drive.tracks:
+        step = _first_touch(drive, track)
+        if step is None:
+            continue
+        kind = _kind(drive, track, step)
+        at_fault = kind in ('stopped track', 'active front') \
+            or kind == 'lateral' and not lanes.in_one_lane[step]
+        found.append(JudgedCollision(track.id, track.kind, step, step * drive.dt_s, kind,
+                                     bool(at_fault)))
+    return tuple(sorted(found, key=lambda each: (each.step, each.other_id)))
+
+
+def angle_to(rear_axles: FloatArray, points: FloatArray) -> FloatArray:
+    """
+    Give the angles (...) between headings and the directions to points, 0 straight ahead [rad].
+
+    :param rear_axles: (..., 3)
+    :param points: (..., 2)
+    """
+    offset = points - rear_axles[..., :2]
+    along = offset[..., 0] * np.cos(rear_axles[..., 2]) + offset[..., 1] * np.sin(
+        rear_axles[..., 2])
+    across = offset[..., 1] * np.cos(rear_axles[..., 2]) - offset[..., 0] * np.sin(
+        rear_axles[..., 2])
+    return np.abs(np.arctan2(across, along))
+
+
+def _first_touch(drive: ScoredDrive, track: Track) -> int | None:
+    reach = drive.shape.radius + track.shape.radius
+    apart = np.hypot(*(track.poses[:, :2] - drive.poses[:, :2]).T)
+    near = np.flatnonzero(apart <= reach)
+    if not len(near):
+        return None
+    own = shapely.polygons(drive.outlines[near])
+    theirs = shapely.polygons(placed(outline(track.shape), track.poses[near]))
+    touching = near[shapely.intersects(own, theirs)]
+    return int(touching[0]) if len(touching) else None
+
+
+def _kind(drive: ScoredDrive, track: Track, step: int) -> Kind:
+    if abs(drive.speeds[step]) <= REST:
+        return 'stopped ego'
+    if track.speeds[step] <= REST:
+        return 'stopped track'
+    if float(angle_to(drive.rear_axles[step], track.poses[step, :2])) > BEHIND:
+        return 'rear'
+    # Of a rectangle the first and the last corner are those of the front.
+    front = shapely.linestrings(drive.outlines[step][[0, -1]])
+    body = shapely.polygons(placed(outline(track.shape), track.poses[step]))
+    return 'active front' if shapely.intersects(front, body) else 'lateral'

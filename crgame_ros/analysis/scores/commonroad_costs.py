@@ -1,0 +1,125 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""CommonRoad's cost functions of a trajectory, by the drivability checker's own evaluator."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+import math
+import re
+from typing import Any, NamedTuple
+
+from commonroad.common.solution import CostFunction, VehicleType
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.trajectory import Trajectory
+from commonroad_dc.costs.evaluation import CostFunctionEvaluator
+from commonroad_dc.costs.route_matcher import LaneletRouteMatcher
+from crgame_ros.errors import one_line
+
+CHECKER = 'commonroad-drivability-checker'
+
+
+class CostDefinition(NamedTuple):
+    """A cost function as the checker's code has it: a sentence, and where the site differs."""
+
+    definition: str
+    variant: str
+
+
+_PATH_LENGTH = 'the code takes the path length L where the site has the offset from the lane'
+COSTS = {
+    'JB1': CostDefinition('T', 'the same on the site'),
+    'SA1': CostDefinition('0.1 SA + 0.1 SR + 1e5 D', 'weights differ from the site; the code '
+                          'does not see obstacles turned by exactly 0 rad in D'),
+    'WX1': CostDefinition('10 T + V + 0.1 A + 0.1 J + 0.1 D + 10 L', _PATH_LENGTH),
+    'SM1': CostDefinition('50 A + 50 SA + 50 SR + L + 20 V + 50 O', _PATH_LENGTH),
+    'SM2': CostDefinition('50 A + 50 SA + 50 SR + L + 50 O', _PATH_LENGTH),
+    'SM3': CostDefinition('50 A + 50 SA + 50 SR + 20 V + 50 O', 'weights differ from the site'),
+    'MW1': CostDefinition('5 Jlat + 0.5 Jlon + 0.2 Vlon + ID',
+                          'in the code Jlat is of the lateral speed, Vlon is 0, and ID is 10'),
+    'TR1': CostDefinition('0.01 Jlon + 22 SR + 8 D + 0.5 LC', 'not on the site'),
+}
+
+
+@dataclass(frozen=True)
+class TrajectoryCost:
+    """
+    The cost of a trajectory by one function.
+
+    :param name: of the function.
+    :param total: its value; None where it cannot be computed.
+    :param parts: its parts without their weights, by name.
+    :param reason: why there is none; empty otherwise.
+    """
+
+    name: str
+    total: float | None
+    parts: dict[str, float]
+    reason: str = ''
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give it as JSON has it."""
+        if self.total is None:
+            return {'total': None, 'reason': self.reason}
+        return {'total': self.total, 'parts': self.parts}
+
+
+def checker_version() -> str:
+    """Name the checker and its version."""
+    return f'{CHECKER} {version(CHECKER)}'
+
+
+def evaluate_costs(scenario: Scenario, problem: PlanningProblem, trajectory: Trajectory,
+                   kind: VehicleType, names: Sequence[str] = tuple(COSTS)
+                   ) -> tuple[TrajectoryCost, ...]:
+    """
+    Evaluate cost functions.
+
+    :param scenario: without the vehicle itself.
+    :param problem: that the trajectory solves.
+    :param trajectory: states of the centre, as CommonRoad's vehicle models have them.
+    :param kind: vehicle type: how wide the vehicle is.
+    """
+    found = tuple(_evaluate(scenario, problem, trajectory, kind, name) for name in names)
+    # The checker keeps its last scenario for ever, whose package complains of it at the end.
+    LaneletRouteMatcher.scenario_cc.cache_clear()
+    return found
+
+
+def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajectory,
+              kind: VehicleType, name: str) -> TrajectoryCost:
+    evaluator = CostFunctionEvaluator(CostFunction[name], kind)
+    try:
+        found = evaluator.evaluate_pp_solution(scenario, problem, trajectory)
+        parts = {part.name: float(value) for part, value in found.partial_costs.items()}
+        total = float(found.total_costs)
+    except Exception as error:  # the checker raises whatever its code stumbles over
+        return TrajectoryCost(name, None, {}, _reason(error))
+    if not math.isfinite(total):
+        return TrajectoryCost(name, None, {}, 'a part of it is not finite')
+    return TrajectoryCost(name, total, parts)
+
+
+def _reason(error: BaseException) -> str:
+    """Say in a line what the checker stumbled over: the cause, where it names one."""
+    cause = error.__cause__ or error
+    lacking = re.search(r"has no attribute '(\w+)'", str(cause))
+    if isinstance(cause, AttributeError) and lacking:
+        return f'its states have no {lacking[1]}'
+    if cause is error:
+        # Before any cost there is the way along the lanes, which the checker looks for.
+        return one_line(f'the checker finds no lanes for it ({type(cause).__name__}: {cause})')
+    return one_line(f'{type(cause).__name__}: {cause}')

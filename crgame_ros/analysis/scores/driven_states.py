@@ -1,0 +1,101 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A vehicle's drive as states of CommonRoad's kinematic single-track model."""
+
+from typing import NamedTuple
+
+from commonroad.common.solution import vehicle_parameters, VehicleType
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.state import KSState
+from commonroad.scenario.trajectory import Trajectory
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import StateColumn
+
+# Vehicles that differ by no more are the same [m].
+_SAME = 1e-6
+
+
+class ChosenType(NamedTuple):
+    """
+    The vehicle type of CommonRoad that stands for a vehicle.
+
+    :param type: number 1 to 4 in benchmark ids.
+    :param difference: sum of what length, width, wheelbase and the place of the centre differ by
+        [m]
+    """
+
+    type: VehicleType
+    difference: float
+
+    @property
+    def is_exact(self) -> bool:
+        """Tell whether the type has the vehicle's dimensions."""
+        return self.difference < _SAME
+
+
+def choose_type(vehicle: VehicleParameters) -> ChosenType:
+    """Choose the vehicle type whose dimensions are nearest: CommonRoad knows four."""
+    found = []
+    for kind, known in vehicle_parameters.items():
+        differences = (known.l - vehicle.length, known.w - vehicle.width,
+                       known.a + known.b - vehicle.wheelbase, known.b - vehicle.rear_to_center)
+        found.append((sum(map(abs, differences)), kind.value))
+    least, number = min(found)
+    return ChosenType(VehicleType(number), least)
+
+
+def driven_states(log: RunLog, vehicle: int, kind: VehicleType) -> list[KSState]:
+    """
+    Give a vehicle's states from time step 0 on, as the model KS has them.
+
+    The rear axle is where it was; the model's centre lies the type's own distance ahead.
+
+    :param vehicle: its number among the driven ones.
+    """
+    states = log.vehicle_states[:, vehicle]
+    centers = shifted(states[:, :3], vehicle_parameters[kind].b)
+    yaws = wrap_pi_array(states[:, StateColumn.YAW])
+    return [
+        KSState(time_step=row, position=centers[row, :2].copy(),
+                steering_angle=float(states[row, StateColumn.STEERING_ANGLE]),
+                velocity=float(states[row, StateColumn.SPEED]), orientation=float(yaws[row]))
+        for row in range(len(states))]
+
+
+def goal_step(problem: PlanningProblem, states: list[KSState]) -> int | None:
+    """Find the first state that meets the goal; None without one."""
+    if not problem.goal.state_list:
+        return None
+    for number, state in enumerate(states):
+        if is_reached(problem, state):
+            return number
+    return None
+
+
+def is_reached(problem: PlanningProblem, state: KSState) -> bool:
+    """Tell whether a state meets the goal; one that asks for what the state lacks is not met."""
+    try:
+        return bool(problem.goal.is_reached(state))
+    except (AttributeError, ValueError):
+        return False
+
+
+def until_goal(states: list[KSState], step: int | None) -> Trajectory:
+    """Give the trajectory that ends where the goal is reached, as a solution does."""
+    kept = states if step is None else states[:max(step, 1) + 1]
+    return Trajectory(kept[0].time_step, kept)

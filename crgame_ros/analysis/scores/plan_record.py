@@ -1,0 +1,149 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What an AV's planner answered in a run, and how an AV came to its goal."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from commonroad.geometry.shape import ShapeGroup
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.state import KSState
+from crgame_ros.analysis.scores.driven_states import goal_step
+from crgame_ros.recording.timing_report import spread_of
+from crgame_ros.scenario.loading import group_outline
+from crgame_ros.simulation.offline import OfflineResult, PlannerRecord
+import numpy as np
+import shapely
+
+_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
+           'steps_without_plan', 'plans')
+
+
+@dataclass(frozen=True)
+class PlanRecord:
+    """
+    The plans of one AV.
+
+    :param counts: by name; None where it was not recorded.
+    :param fallbacks: braking plans given, because the planner failed.
+    :param reasons: how often each reason for one came, as far as it was told.
+    :param last_refusal: why a plan was refused last.
+    :param spreads: p50, p99 and max by name: latency_ms from request to plan, plan_time_ms of the
+        planner itself, age_ms of the plan in use; None where nobody measured it.
+    :param tracking: worst errors of a tracked AV by name [m], [rad], [m/s]; None of one that
+        follows its plans exactly.
+    """
+
+    counts: dict[str, int | None]
+    fallbacks: int | None
+    reasons: dict[str, int]
+    last_refusal: str | None
+    spreads: dict[str, dict[str, float] | None]
+    tracking: dict[str, float] | None
+
+    @property
+    def accepted_share(self) -> float | None:
+        """Share of the planner's answers that were accepted and no fallback; None: none."""
+        accepted, plans = self.counts['accepted'], self.counts['plans']
+        if accepted is None or not plans:
+            return None
+        return max(0, accepted - (self.fallbacks or 0)) / plans
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give it as JSON has it."""
+        return {'accepted_share': self.accepted_share, **self.counts,
+                'fallbacks': self.fallbacks, 'fallback_reasons': self.reasons,
+                'last_refusal': self.last_refusal, **self.spreads,
+                'worst_tracking_errors': self.tracking}
+
+
+@dataclass(frozen=True)
+class GoalRecord:
+    """
+    How a vehicle came to its goal.
+
+    :param reached_s: when a state first met the goal, since the run's start; None: never [s]
+    :param last_distance: from the centre to the goal's area at the end; None: it has none [m]
+    :param least_distance: smallest of the run [m]
+    """
+
+    reached_s: float | None
+    last_distance: float | None
+    least_distance: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give it as JSON has it."""
+        return {'reached_s': self.reached_s, 'last_distance_m': self.last_distance,
+                'least_distance_m': self.least_distance}
+
+
+def plans_of_report(report: Mapping[str, Any]) -> dict[str, PlanRecord]:
+    """
+    Take the plans of each AV out of a timing report.
+
+    :param report: of `recording.timing_report`.
+    """
+    return {
+        av: PlanRecord({name: entry[name] for name in _COUNTS}, entry['fallback'],
+                       entry['fallback_reasons'] or {}, entry['last_refusal'],
+                       {name: entry[name] for name in ('latency_ms', 'plan_time_ms', 'age_ms')},
+                       entry['worst_tracking_errors'])
+        for av, entry in report['planners'].items()}
+
+
+def plans_of_result(result: OfflineResult) -> dict[str, PlanRecord]:
+    """
+    Take the plans of each AV out of an offline run.
+
+    Its planners answer after a stated number of steps: there is no latency to measure.
+    """
+    return {av: _of_record(record) for av, record in result.planners.items()}
+
+
+def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) -> GoalRecord:
+    """
+    Find when and how near a drive came to its goal.
+
+    :param states: from time step 0 on.
+    """
+    step = goal_step(problem, list(states))
+    points = shapely.points([state.position for state in states])
+    areas = [_area(state.position) for state in problem.goal.state_list
+             if getattr(state, 'position', None) is not None]
+    away = np.min([shapely.distance(points, area) for area in areas], axis=0) if areas else None
+    return GoalRecord(None if step is None else step * dt_s,
+                      None if away is None else float(away[-1]),
+                      None if away is None else float(away.min()))
+
+
+def _area(position: Any) -> shapely.Geometry:
+    return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))
+
+
+def _of_record(record: PlannerRecord) -> PlanRecord:
+    counters, statistics = record.counters, record.statistics
+    counts: dict[str, int | None] = {name: getattr(counters, name) for name in _COUNTS[:-1]}
+    counts['plans'] = statistics.plans
+    tracking = None
+    if record.tracking is not None:
+        tracking = dict(record.tracking._asdict())
+        if record.lane_error is not None:
+            tracking['lane'] = record.lane_error
+    durations = np.array(statistics.durations_s) * 1e3
+    return PlanRecord(counts, statistics.fallbacks, dict(statistics.reasons),
+                      counters.last_refusal or None,
+                      {'latency_ms': None, 'plan_time_ms': spread_of(durations), 'age_ms': None},
+                      tracking)

@@ -1,0 +1,152 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How far a vehicle came along a route, compared with somebody else's drive over it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from crgame_ros.roads.road_network import RoadNetwork
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+FloatArray = NDArray[np.float64]
+
+# Shorter ways are noise, and one that is as long backwards is none (nuplan-devkit,
+# docs/metrics_description.md) [m].
+NOISE = 0.1
+# In the free drive a vehicle gains speed by what nuPlan still calls comfortable [m/s^2], and where
+# no limit is known drives as fast as this [m/s], 50 km/h.
+FREE_ACCELERATION, UNLIMITED = 2.40, 50.0 / 3.6
+_FREE_STEP_S = 0.01
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A lanelet of the route and the lanes beside it: where it is, and from which way on."""
+
+    lanelet: int
+    area: shapely.Geometry
+    start: float
+
+
+class ComparedRoute:
+    """
+    Lanelets one after the other; those of the same direction beside one count as that one.
+
+    :param roads: the road network.
+    :param lanelets: in driving order; neighbours and repetitions are taken together.
+    """
+
+    def __init__(self, roads: RoadNetwork, lanelets: Sequence[int]) -> None:
+        self._roads = roads
+        self._blocks: list[_Block] = []
+        start, beside = 0.0, frozenset[int]()
+        for lanelet in lanelets:
+            if lanelet in beside:
+                continue
+            if self._blocks:
+                start += roads.line(self._blocks[-1].lanelet).length
+            beside = _road(roads, lanelet)
+            area = shapely.buffer(roads.area_of(beside), 0.01)
+            shapely.prepare(area)
+            self._blocks.append(_Block(lanelet, area, start))
+
+    def __len__(self) -> int:
+        """Give the number of its parts."""
+        return len(self._blocks)
+
+    @property
+    def lanelets(self) -> list[int]:
+        """Give its lanelets in driving order, one for each part."""
+        return [block.lanelet for block in self._blocks]
+
+    def progress(self, points: FloatArray) -> float:
+        """
+        Give how far points (K, 2) in turn come along the route [m].
+
+        A point counts where it is in the part of the one before, or in a later one; off the route
+        nothing is gained.
+        """
+        index = 0
+        first: float | None = None
+        last: float | None = None
+        inside = np.array([shapely.intersects_xy(block.area, points[:, 0], points[:, 1])
+                           for block in self._blocks])
+        for row in range(len(points)):
+            found = np.flatnonzero(inside[index:, row])
+            if not len(found):
+                continue
+            index += int(found[0])
+            block = self._blocks[index]
+            last = block.start + self._roads.locate(block.lanelet, *points[row].tolist())[0]
+            first = last if first is None else first
+        return 0.0 if last is None or first is None else last - first
+
+    def way_to(self, point: FloatArray) -> float | None:
+        """Give where a point (2) is along the route; None beside it [m]."""
+        for block in self._blocks:
+            if shapely.intersects_xy(block.area, *point.tolist()):
+                return block.start + self._roads.locate(block.lanelet, *point.tolist())[0]
+        return None
+
+    def free_way(self, start: float, speed: float, duration_s: float, end: float) -> float:
+        """
+        Give how far an unhindered vehicle comes at the speed limit [m].
+
+        It gains speed with `FREE_ACCELERATION` and loses it at once where a lower limit begins.
+
+        :param start: where on the route it starts [m]
+        :param speed: at which it starts [m/s]
+        :param end: where its way ends; the route does at the latest [m]
+        """
+        if not self._blocks:
+            return 0.0
+        starts = np.array([block.start for block in self._blocks])
+        limits = [self._roads.speed_limit(block.lanelet) or UNLIMITED for block in self._blocks]
+        end = min(end, self._blocks[-1].start
+                  + self._roads.line(self._blocks[-1].lanelet).length)
+        place, now_s = start, 0.0
+        while now_s < duration_s - 1e-9 and place < end:
+            step_s = min(_FREE_STEP_S, duration_s - now_s)
+            part = max(int(np.searchsorted(starts, place, side='right')) - 1, 0)
+            speed = min(speed, limits[part])
+            then = min(speed + FREE_ACCELERATION * step_s, limits[part])
+            place += 0.5 * (speed + then) * step_s
+            speed, now_s = then, now_s + step_s
+        return max(0.0, min(place, end) - start)
+
+
+def route_of(roads: RoadNetwork, poses: FloatArray) -> ComparedRoute:
+    """Give the route that somebody took, by the poses (K, 3) of the centre."""
+    if not roads.lanelet_ids:
+        return ComparedRoute(roads, ())
+    numbers = roads.lanelets_at(poses[np.isfinite(poses).all(axis=1)])
+    return ComparedRoute(roads, [roads.lanelet_ids[number]
+                                 for number in numbers[numbers >= 0].tolist()])
+
+
+def progress_ratio(own: float, expert: float) -> float:
+    """Give the share of the expert's way that was driven, 0 to 1 (nuplan-devkit)."""
+    return 0.0 if own < -NOISE else min(1.0, max(own, NOISE) / max(expert, NOISE))
+
+
+def _road(roads: RoadNetwork, lanelet: int) -> frozenset[int]:
+    """List a lanelet and all lanes of its direction beside it."""
+    found = [lanelet]
+    for each in found:
+        found += [other for other in (roads.left_of(each), roads.right_of(each))
+                  if other in roads.lanelet_ids and other not in found]
+    return frozenset(found)

@@ -1,0 +1,65 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Who shows how far a vehicle might have come: a recorded human, or whose drive it repeats."""
+
+from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.analysis.scores.nuplan_score import Expert
+from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.recording.run_log import RunLog
+import numpy as np
+
+
+def expert_of_run(expert: RunLog, log: RunLog, name: str) -> Expert:
+    """
+    Take the expert out of a run: its first human, or else its first vehicle.
+
+    :param expert: the run.
+    :param log: the run that is scored: whose steps the expert's are cut and filled to.
+    :param name: of the run, for people.
+    :raises InputError: if nobody drives in it, or in another scenario or at other times.
+    """
+    if not expert.vehicles:
+        raise InputError('nobody drives in it', name, 'give a run with a human')
+    if expert.game.scheduler.time_step_s != log.game.scheduler.time_step_s:
+        raise InputError('its time steps are not as long as those of the run', name,
+                         'give a run of the same scenario')
+    item = expert.vehicles[0]
+    centers = shifted(expert.vehicle_states[:, 0, :3], item.rear_to_center)
+    rows = np.arange(len(log.ks)) + int(log.ks[0] - expert.ks[0])
+    poses = np.full((max(0, min(len(rows), len(expert.ks) - int(rows[0]))), 3), np.nan)
+    known = rows[:len(poses)] >= 0
+    poses[known] = centers[rows[:len(poses)][known]]
+    if not np.isfinite(poses).any():
+        raise InputError('it drove at other times', name, 'give a run of the same scenario')
+    return Expert(f'{item.id} of {name}', poses)
+
+
+def recorded_expert(scored: ScoredScenario, problem: PlanningProblem | None,
+                    first_k: int, steps: int) -> Expert | None:
+    """
+    Take the recorded obstacle that a planning problem replaced; None where there is none.
+
+    :param first_k: time step at which the drive begins.
+    :param steps: how many it has.
+    """
+    obstacle = None if problem is None else scored.own.get(problem.planning_problem_id)
+    if obstacle is None:
+        return None
+    course = scored.course(obstacle)[first_k:first_k + steps]
+    if not np.isfinite(course).any():
+        return None
+    return Expert(f'recorded obstacle {obstacle}', course)

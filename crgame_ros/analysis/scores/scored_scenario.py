@@ -1,0 +1,168 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The scenario that solutions are checked against: without the vehicle that is judged itself."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+import functools
+import math
+
+from commonroad.geometry.shape import Circle, Polygon, Rectangle
+from commonroad.geometry.shape import Shape as CommonRoadShape
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.prediction.prediction import TrajectoryPrediction
+from commonroad.scenario.obstacle import DynamicObstacle, ObstacleType
+from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.state import CustomState, InitialState
+from commonroad.scenario.trajectory import Trajectory
+from crgame_ros.errors import InputError
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.recording.export import export_scenario, ExportedScenario
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.scenario.loading import (
+    exact_position,
+    exact_value,
+    LoadedScenario,
+    parse_scenario,
+)
+from crgame_ros.scenario.obstacles import ScenarioObstacles
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# An obstacle that begins so near to a planning problem and in its direction is the vehicle from
+# whose drive the problem was made [m], [rad]: two cars cannot be there.
+_SAME_PLACE, _SAME_HEADING = 0.5, 0.1
+
+
+@dataclass(frozen=True)
+class ScoredScenario:
+    """
+    A scenario, and which of its obstacles are the vehicles that solve its problems.
+
+    :param loaded: the scenario.
+    :param own: those obstacles' ids, by planning problem.
+    """
+
+    loaded: LoadedScenario
+    own: dict[int, int] = field(default_factory=dict)
+
+    @classmethod
+    def of_file(cls, loaded: LoadedScenario) -> 'ScoredScenario':
+        """
+        Take a scenario as it is published.
+
+        The obstacle that a planning problem replaced is the recorded human of a run, or begins
+        where the problem does.
+        """
+        obstacles = loaded.scenario.dynamic_obstacles
+        own = {}
+        for problem in loaded.planning_problems:
+            start = problem.initial_state
+            for obstacle in obstacles:
+                other = obstacle.initial_state
+                if exact_value(other.time_step) == exact_value(start.time_step) \
+                        and math.dist(exact_position(other.position),
+                                      exact_position(start.position)) < _SAME_PLACE \
+                        and abs(wrap_pi(exact_value(other.orientation)
+                                        - exact_value(start.orientation))) < _SAME_HEADING:
+                    own[problem.planning_problem_id] = int(obstacle.obstacle_id)
+        return cls(loaded, own | loaded.human_problems)
+
+    @classmethod
+    def of_run(cls, log: RunLog) -> tuple['ScoredScenario', ExportedScenario]:
+        """
+        Export a run and take its scenario.
+
+        :raises InputError: if it cannot be exported.
+        """
+        exported = export_scenario(log)
+        loaded = parse_scenario(exported.xml_text, exported.benchmark_id)
+        own = {number: exported.obstacle_ids[name]
+               for name, number in exported.problem_ids.items()
+               if name in exported.obstacle_ids}
+        return cls(loaded, own), exported
+
+    def problem(self, number: int) -> PlanningProblem:
+        """
+        Give a planning problem.
+
+        :raises InputError: if there is none of this number.
+        """
+        for problem in self.loaded.planning_problems:
+            if problem.planning_problem_id == number:
+                return problem
+        known = ', '.join(str(each.planning_problem_id) for each in self.loaded.planning_problems)
+        raise InputError(f'it has no planning problem {number}', self.loaded.source,
+                         f'it has {known or "none"}: give the scenario that was solved')
+
+    @functools.cached_property
+    def obstacles(self) -> ScenarioObstacles:
+        """Everything in it, over time."""
+        return ScenarioObstacles(self.loaded)
+
+    def course(self, obstacle_id: int) -> FloatArray:
+        """Give the poses (n, 3) of an obstacle's centre from time step 0 on; NaN where absent."""
+        column = self.obstacles.ids.index(f'o{obstacle_id}')
+        poses = self.obstacles.poses[:, column]
+        before = np.full((max(self.obstacles.first_k, 0), 3), np.nan)
+        return np.concatenate((before, poses[max(-self.obstacles.first_k, 0):]))
+
+    def without_own(self, numbers: Collection[int]) -> Scenario:
+        """
+        Give the scenario without the vehicles that solve some problems.
+
+        What comes later than time step 0 is a phantom obstacle in files, which the checker passes
+        over; here it is an obstacle that begins later.
+        """
+        original = self.loaded.scenario
+        scenario = Scenario(original.dt, original.scenario_id)
+        scenario.replace_lanelet_network(original.lanelet_network)
+        own = self.own_obstacles(numbers)
+        scenario.add_objects([
+            *original.static_obstacles,
+            *(each for each in original.dynamic_obstacles if each.obstacle_id not in own),
+            *(self._later(int(each.obstacle_id)) for each in original.phantom_obstacle)])
+        return scenario
+
+    def own_obstacles(self, numbers: Collection[int]) -> frozenset[int]:
+        """List the obstacles that are the vehicles which solve some problems."""
+        return frozenset(self.own[number] for number in numbers if number in self.own)
+
+    def _later(self, obstacle_id: int) -> DynamicObstacle:
+        column = self.obstacles.ids.index(f'o{obstacle_id}')
+        first = self.obstacles.first_step(column)
+        poses, velocities = self.obstacles.track(column)
+        speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        states = [CustomState(time_step=first + row, position=pose[:2], orientation=float(pose[2]),
+                              velocity=float(speed))
+                  for row, (pose, speed) in enumerate(zip(poses, speeds, strict=True))]
+        shape = _shape_of(self.obstacles.descriptions[column].shape)
+        initial = InitialState(time_step=first, position=poses[0, :2],
+                               orientation=float(poses[0, 2]), velocity=float(speeds[0]),
+                               acceleration=0.0, yaw_rate=0.0, slip_angle=0.0)
+        prediction = TrajectoryPrediction(Trajectory(first + 1, states[1:]), shape) \
+            if len(states) > 1 else None
+        return DynamicObstacle(obstacle_id, ObstacleType.UNKNOWN, shape, initial, prediction)
+
+
+def _shape_of(shape: Shape) -> CommonRoadShape:
+    if shape.kind == 'rectangle':
+        return Rectangle(shape.length, shape.width)
+    if shape.kind == 'circle':
+        return Circle(0.5 * shape.length)
+    return Polygon(np.array((*shape.vertices, shape.vertices[0])))

@@ -1,0 +1,165 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Scores solutions, whoever made them, against their scenario."""
+
+from collections.abc import Callable, Mapping
+import copy
+from dataclasses import dataclass, replace
+
+from commonroad.common.solution import (
+    PlanningProblemSolution,
+    Solution,
+    TrajectoryType,
+    vehicle_parameters,
+)
+from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
+from commonroad.scenario.trajectory import Trajectory
+from commonroad_dc.feasibility import solution_checker
+from crgame_ros.analysis.scores.nuplan_score import NuplanScore, NuplanScorer
+from crgame_ros.analysis.scores.plan_record import find_goal
+from crgame_ros.analysis.scores.planner_scores import PlannerScores, REMARKS, VehicleScores
+from crgame_ros.analysis.scores.run_expert import recorded_expert
+from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
+from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+from crgame_ros.analysis.scores.solution_judge import poses_of, SolutionJudge, speeds_of
+from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility, simulated
+from crgame_ros.errors import InputError, one_line
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.geometry.shape import Shape
+import numpy as np
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One planning problem's solution: the states it holds, or that its inputs lead to."""
+
+    found: PlanningProblemSolution
+    driven: Trajectory
+
+
+def score_solutions(scored: ScoredScenario, solutions: Mapping[str, Solution],
+                    progress: Callable[[float], object] = lambda _: None) -> PlannerScores:
+    """
+    Score solutions of a scenario.
+
+    :param scored: the scenario.
+    :param solutions: by the name under which each is reported.
+    :param progress: is told how much has been done, 0 to 1.
+    :raises InputError: if one solves another scenario, or cannot be driven at all.
+    """
+    judge, nuplan = SolutionJudge(scored), NuplanScorer(scored.loaded)
+    vehicles: list[VehicleScores] = []
+    for number, (name, solution) in enumerate(solutions.items()):
+        vehicles += _score(scored, judge, nuplan, name, solution)
+        progress((number + 1) / len(solutions))
+    return PlannerScores(scored.loaded.scenario.scenario_id, scored.loaded.xml_text,
+                         tuple(vehicles), (*REMARKS, *scored.loaded.notices))
+
+
+def _score(scored: ScoredScenario, judge: SolutionJudge, nuplan: NuplanScorer, name: str,
+           solution: Solution) -> list[VehicleScores]:
+    parts = [_part(scored, found, name) for found in solution.planning_problem_solutions]
+    remarks = [] if str(solution.scenario_id) == str(scored.loaded.scenario.scenario_id) else [
+        one_line(f'it was made for the scenario {solution.scenario_id}')]
+    failed = _failures(scored, solution)
+    solved = frozenset(part.found.planning_problem_id for part in parts)
+    drives = [_drive(scored, part, solved) for part in parts]
+    result = []
+    for number, part in enumerate(parts):
+        problem = scored.problem(part.found.planning_problem_id)
+        told = list(remarks)
+        others = [_track(other, mate, drives[number], part) for mate, other
+                  in zip(parts, drives, strict=True) if mate is not part]
+        drive = replace(drives[number], tracks=(*drives[number].tracks, *others))
+        who = name if len(parts) == 1 else f'{name}, problem {problem.planning_problem_id}'
+        judged = judge.judge(part.found, part.driven, failed=failed, others=solved)
+        if judged.feasibility.feasible is False and _has_rear_axles(part.found, problem, drive):
+            told.append('its positions are those of the rear axle, as files of 2021 have them: '
+                        'as such they would be feasible')
+        result.append(VehicleScores(
+            who, 'solution', '', judged,
+            _score_drive(scored, nuplan, drive, part, told),
+            find_goal(problem, part.driven.state_list, drive.dt_s), None, tuple(told)))
+    return result
+
+
+def _part(scored: ScoredScenario, found: PlanningProblemSolution, name: str) -> _Part:
+    problem = scored.problem(found.planning_problem_id)
+    try:
+        return _Part(found, simulated(found, problem, scored.loaded.time_step_s))
+    except ValueError as error:
+        raise InputError(f'planning problem {found.planning_problem_id}: {error}', name,
+                         'give a solution that can be driven') from error
+
+
+def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
+    """Ask the checks of the checker that are about a solution as a whole."""
+    problems = PlanningProblemSet(list(scored.loaded.planning_problems))
+    failed = {}
+    for name, check in (
+            ('solved_all_problems',
+             lambda: solution_checker.solved_all_problems(problems, solution)),
+            ('ego_collision', lambda: solution_checker.ego_collision(
+                scored.loaded.scenario, problems, solution))):
+        try:
+            check()
+        except Exception as error:  # the checker raises whatever its code stumbles over
+            failed[name] = one_line(str(error) or type(error).__name__)
+    return failed
+
+
+def _has_rear_axles(found: PlanningProblemSolution, problem: PlanningProblem,
+                    drive: ScoredDrive) -> bool:
+    """Tell whether a trajectory is feasible if its positions are of the rear axle."""
+    if found.trajectory_type is not TrajectoryType.KS:
+        return False
+    moved = copy.deepcopy(found.trajectory.state_list)
+    for state, pose in zip(moved, shifted(drive.poses, drive.rear_to_center), strict=True):
+        state.position = pose[:2]
+    return check_feasibility(
+        PlanningProblemSolution(found.planning_problem_id, found.vehicle_model, found.vehicle_type,
+                                found.cost_function, Trajectory(moved[0].time_step, moved)),
+        problem, drive.dt_s).feasible is True
+
+
+def _drive(scored: ScoredScenario, part: _Part, solved: frozenset[int]) -> ScoredDrive:
+    kind = vehicle_parameters[part.found.vehicle_type]
+    states = part.driven.state_list
+    return drive_among(
+        f'problem {part.found.planning_problem_id}', Shape.rectangle(kind.l, kind.w),
+        float(kind.b), poses_of(states), speeds_of(states), int(states[0].time_step),
+        scored.loaded, sorted(scored.own_obstacles(solved)))
+
+
+def _track(other: ScoredDrive, mate: _Part, mine: ScoredDrive, part: _Part) -> Track:
+    """Make a track of who is solved together with one, at the steps of this."""
+    rows = np.arange(len(mine.poses)) + int(
+        part.driven.state_list[0].time_step - mate.driven.state_list[0].time_step)
+    known = (rows >= 0) & (rows < len(other.poses))
+    poses, speeds = np.full((len(rows), 3), np.nan), np.full(len(rows), np.nan)
+    poses[known], speeds[known] = other.poses[rows[known]], np.abs(other.speeds[rows[known]])
+    return Track(other.vehicle_id, 'vehicle', other.shape, poses, speeds)
+
+
+def _score_drive(scored: ScoredScenario, nuplan: NuplanScorer, drive: ScoredDrive, part: _Part,
+                 remarks: list[str]) -> NuplanScore | None:
+    problem = scored.problem(part.found.planning_problem_id)
+    expert = recorded_expert(scored, problem, int(part.driven.state_list[0].time_step),
+                             len(drive.poses))
+    try:
+        return nuplan.score(drive, expert, problem)
+    except InputError as error:
+        remarks.append(f'no nuPlan score: {error}')
+        return None

@@ -1,0 +1,98 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Whether a solution is valid: the checks of the drivability checker, each with what it found."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from commonroad.common.solution import PlanningProblemSolution, Solution
+from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
+from commonroad.scenario.scenario import Scenario
+from commonroad_dc.feasibility import solution_checker
+from crgame_ros.analysis.scores.trajectory_feasibility import TrajectoryFeasibility
+from crgame_ros.errors import one_line
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_boundary import RoadBoundary
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class SolutionChecks:
+    """
+    What the checks say.
+
+    :param failed: what each failed check found, by its name in the checker.
+    :param passed: names of the others.
+    """
+
+    failed: dict[str, str]
+    passed: tuple[str, ...]
+
+    @property
+    def is_valid(self) -> bool:
+        """Tell whether all were passed."""
+        return not self.failed
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give it as JSON has it."""
+        return {'valid': self.is_valid, 'failed': self.failed, 'passed': list(self.passed)}
+
+
+def check_solution(scenario: Scenario, problem: PlanningProblem,
+                   found: PlanningProblemSolution, poses: NDArray[np.float64],
+                   feasibility: TrajectoryFeasibility, boundary: RoadBoundary,
+                   earlier: Mapping[str, str]) -> SolutionChecks:
+    """
+    Check the solution of one problem, as `valid_solution` does.
+
+    That function stops at the first failure, and its road boundary needs the package triangle,
+    which is not free, and has crashed on a roundabout. So its checks are asked one by one, and
+    the road is ours: no part of the footprint may be off the union of the lanelets.
+
+    :param scenario: without the vehicle itself.
+    :param poses: (K, 3) of the centre.
+    :param feasibility: what the feasibility check said.
+    :param boundary: of the road.
+    :param earlier: what checks of the whole solution have found, by name.
+    """
+    problems = PlanningProblemSet([problem])
+    solution = Solution(scenario.scenario_id, [found])
+    checks: dict[str, Callable[[], object]] = {
+        'goal_reached': lambda: solution_checker.goal_reached(scenario, problems, solution),
+        'starts_at_correct_state': lambda: solution_checker.starts_at_correct_state(
+            solution, problems),
+        'obstacle_collision': lambda: solution_checker.obstacle_collision(
+            scenario, problems, solution)}
+    failed = dict(earlier)
+    for name, check in checks.items():
+        try:
+            check()
+        except Exception as error:  # the checker raises whatever its code stumbles over
+            failed[name] = one_line(str(error) or type(error).__name__)
+    shape = _shape(found)
+    off = np.flatnonzero(boundary.are_off_road(poses, shape))
+    if len(off):
+        failed['boundary_collision'] = f'off the road from time step {off[0]} of the trajectory on'
+    if not feasibility.feasible:
+        failed['solution_feasible'] = feasibility.reason
+    names = (*checks, 'boundary_collision', 'solution_feasible')
+    return SolutionChecks(failed, tuple(name for name in names if name not in failed))
+
+
+def _shape(found: PlanningProblemSolution) -> Shape:
+    known = solution_checker.VehicleParameterMapping.from_vehicle_type(found.vehicle_type)
+    return Shape.rectangle(float(known.l), float(known.w))

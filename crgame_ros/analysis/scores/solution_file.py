@@ -1,0 +1,97 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Solution files of CommonRoad: read with care, and written."""
+
+from datetime import datetime
+import math
+from pathlib import Path
+
+from commonroad.common.solution import (
+    CommonRoadSolutionReader,
+    CommonRoadSolutionWriter,
+    PlanningProblemSolution,
+    Solution,
+)
+from crgame_ros.errors import InputError
+from crgame_ros.scenario import guard
+from lxml import etree
+
+ROOT = 'CommonRoadSolution'
+_REMEDY = 'compare it with what CommonRoadSolutionWriter writes'
+
+
+def read_solution(path: Path) -> Solution:
+    """
+    Read a solution file; nothing in it is trusted.
+
+    :raises InputError: if it is none, or holds what no vehicle drives: numbers that are not
+        finite, time steps that are not consecutive, no state.
+    """
+    source = str(path)
+    root = guard.parse_hardened(guard.read_text(path), source, ROOT)
+    states = sum(len(trajectory) for trajectory in root)
+    if not 0 < states <= guard.MAX_TIME_STEP:
+        raise InputError(f'has {states} states', source, 'give a file with trajectories')
+    _check_numbers(root, source)
+    try:
+        solution = CommonRoadSolutionReader.fromstring(etree.tostring(root).decode())
+    except Exception as error:  # commonroad-io raises whatever its code stumbles over
+        text = str(error) or 'no further explanation'
+        raise InputError(f'commonroad-io cannot read it ({type(error).__name__}: {text[:200]})',
+                         source, _REMEDY) from error
+    if len(solution.planning_problem_solutions) < len(root):
+        raise InputError('a planning problem is solved twice in it', source, 'remove one of them')
+    for found in solution.planning_problem_solutions:
+        _check_steps(found, source)
+    return solution
+
+
+def solution_text(solution: Solution) -> str:
+    """Write a solution as commonroad-io does."""
+    return str(CommonRoadSolutionWriter(solution).dump())
+
+
+def solution_name(solution: Solution, vehicle_id: str = '') -> str:
+    """Name a solution's file, without the colons that some file systems don't take."""
+    name = solution.benchmark_id.replace(':', '_')
+    return f'solution_{name}{f".{vehicle_id}" if vehicle_id else ""}.xml'
+
+
+def dated(solution: Solution, when: datetime | None) -> Solution:
+    """Give a solution the day and time at which it was made; None: without."""
+    solution.date = None if when is None else when.replace(tzinfo=None, microsecond=0)
+    return solution
+
+
+def _check_numbers(root: etree._Element, source: str) -> None:
+    for leaf in root.iter('*'):
+        if len(leaf):
+            continue
+        try:
+            value = float(leaf.text or '')
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= guard.MAX_MAGNITUDE:
+            raise InputError(f'<{leaf.tag}> is "{(leaf.text or "")[:40]}"',
+                             guard.where(leaf, source), 'give a finite number')
+
+
+def _check_steps(found: PlanningProblemSolution, source: str) -> None:
+    states = found.trajectory.state_list
+    steps = [state.time_step for state in states]
+    where = f'{source}, planning problem {found.planning_problem_id}'
+    if steps != list(range(steps[0], steps[0] + len(steps))) or steps[0] < 0:
+        raise InputError('its time steps are not consecutive', where,
+                         'give a state for every time step')

@@ -1,0 +1,85 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Judges solutions of planning problems with CommonRoad's tools."""
+
+from collections.abc import Callable, Mapping
+
+from commonroad.common.solution import PlanningProblemSolution
+from commonroad.scenario.state import TraceState
+from commonroad.scenario.trajectory import Trajectory
+from crgame_ros.analysis.scores.commonroad_costs import evaluate_costs
+from crgame_ros.analysis.scores.planner_scores import SolutionScores
+from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+from crgame_ros.analysis.scores.solution_checks import check_solution
+from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility
+from crgame_ros.roads.road_boundary import RoadBoundary
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class SolutionJudge:
+    """
+    Judges solutions of one scenario.
+
+    :param scored: the scenario.
+    """
+
+    def __init__(self, scored: ScoredScenario) -> None:
+        self._scored = scored
+        self._boundary = RoadBoundary(scored.loaded.scenario.lanelet_network)
+
+    def judge(self, found: PlanningProblemSolution, driven: Trajectory, *,
+              exact_type: bool = True, failed: Mapping[str, str] | None = None,
+              others: frozenset[int] = frozenset(),
+              progress: Callable[[float], object] = lambda _: None) -> SolutionScores:
+        """
+        Judge one solution.
+
+        :param found: the solution.
+        :param driven: its states: those of its inputs, where it holds inputs.
+        :param exact_type: whether its vehicle type has the vehicle's dimensions.
+        :param failed: what other checks of the solution have found, by name.
+        :param others: planning problems that are solved together with it.
+        :param progress: is told how much has been done, 0 to 1.
+        """
+        problem = self._scored.problem(found.planning_problem_id)
+        scenario = self._scored.without_own({found.planning_problem_id, *others})
+        feasibility = check_feasibility(found, problem, float(scenario.dt), progress)
+        checks = check_solution(scenario, problem, found, poses_of(driven.state_list),
+                                feasibility, self._boundary, failed or {})
+        return SolutionScores(
+            found, exact_type,
+            evaluate_costs(scenario, problem, driven, found.vehicle_type), checks, feasibility)
+
+
+def poses_of(states: list[TraceState]) -> FloatArray:
+    """Give the poses (K, 3) of the centre; a point mass is turned to where it moves."""
+    return np.array([(*state.position, heading_of(state)) for state in states])
+
+
+def speeds_of(states: list[TraceState]) -> FloatArray:
+    """Give the speeds (K) of states; a point mass moves where it is turned to [m/s]."""
+    return np.array([np.hypot(state.velocity, state.velocity_y)
+                     if getattr(state, 'orientation', None) is None else state.velocity
+                     for state in states])
+
+
+def heading_of(state: TraceState) -> float:
+    """Give the direction of a state [rad]."""
+    if getattr(state, 'orientation', None) is None:
+        return float(np.arctan2(state.velocity_y, state.velocity))
+    return float(state.orientation)

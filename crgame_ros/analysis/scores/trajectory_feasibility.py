@@ -1,0 +1,192 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Whether a vehicle model could have driven a trajectory, and by how much it could not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from commonroad.common.solution import PlanningProblemSolution, TrajectoryType, VehicleModel
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.state import TraceState
+from commonroad.scenario.trajectory import Trajectory
+from commonroad_dc.feasibility import feasibility_checker
+from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+from crgame_ros.errors import one_line
+import numpy as np
+
+# The checker's tolerance is a distance, whatever the time: over shorter steps nearly anything
+# passes [s].
+LEAST_STEP_S = 0.1
+# Inputs beyond the limits by less are rounding [share].
+_ROUNDING = 1e-3
+
+
+@dataclass(frozen=True)
+class TrajectoryFeasibility:
+    """
+    What the drivability checker says of a trajectory.
+
+    :param feasible: whether every transition is; None where it could not be asked.
+    :param first_step: time step at which the first infeasible transition begins; None: none.
+    :param reason: why that one is not, or why it could not be asked; empty otherwise.
+    :param transitions: how many were asked.
+    :param infeasible: how many of them are not feasible.
+    :param position_error: largest distance between a state and what the model makes of the one
+        before with the inputs that fit best [m]
+    :param heading_error: likewise [rad]
+    :param excess_acceleration: by which the needed acceleration exceeds the model's limit [m/s^2]
+    :param excess_steering_rate: likewise [rad/s]
+    :param excess_friction: likewise of the acceleration's length, along and across [m/s^2]
+    :param step_s: time of a transition [s]
+    """
+
+    feasible: bool | None
+    first_step: int | None
+    reason: str
+    transitions: int = 0
+    infeasible: int = 0
+    position_error: float = 0.0
+    heading_error: float = 0.0
+    excess_acceleration: float = 0.0
+    excess_steering_rate: float = 0.0
+    excess_friction: float = 0.0
+    step_s: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give it as JSON has it."""
+        return {
+            'feasible': self.feasible, 'first_step': self.first_step, 'reason': self.reason,
+            'transitions': self.transitions, 'infeasible': self.infeasible,
+            # Beyond all numbers where no inputs were found.
+            'position_error_m': _finite(self.position_error),
+            'heading_error_rad': _finite(self.heading_error),
+            'excess_acceleration_m_s2': self.excess_acceleration,
+            'excess_steering_rate_rad_s': self.excess_steering_rate,
+            'excess_friction_m_s2': self.excess_friction, 'step_s': self.step_s}
+
+
+def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, dt_s: float,
+                      progress: Callable[[float], object] = lambda _: None
+                      ) -> TrajectoryFeasibility:
+    """
+    Ask the drivability checker of every transition of a solution's trajectory.
+
+    Where time steps are shorter than `LEAST_STEP_S`, as many are taken together as make it.
+
+    :param dt_s: of the time steps [s]
+    :param progress: is told how much has been asked, 0 to 1.
+    """
+    dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
+    if found.trajectory_type in (TrajectoryType.Input, TrajectoryType.PMInput):
+        return _of_inputs(found, problem, dynamics, dt_s)
+    stride = max(1, round(LEAST_STEP_S / dt_s))
+    states = found.trajectory.state_list[::stride]
+    if len(states) < 2:
+        return TrajectoryFeasibility(None, None, 'the trajectory has no transition')
+    measured = []
+    for number, (now, then) in enumerate(zip(states[:-1], states[1:], strict=True)):
+        try:
+            measured.append(_transition(now, then, dynamics, stride * dt_s))
+        except Exception as error:  # the checker raises whatever its code stumbles over
+            return TrajectoryFeasibility(
+                None, int(now.time_step), one_line(f'{type(error).__name__}: {error}'))
+        progress((number + 1) / (len(states) - 1))
+    feasible = np.array([each[0] for each in measured])
+    worst = np.max([each[1] for each in measured], axis=0).tolist()
+    bad = np.flatnonzero(~feasible)
+    first = int(bad[0]) if len(bad) else None
+    return TrajectoryFeasibility(
+        not len(bad), None if first is None else int(states[first].time_step),
+        '' if first is None else _why(*measured[first][1]), len(feasible), len(bad), worst[0],
+        worst[1], worst[2], worst[3], worst[4], stride * dt_s)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _transition(now: TraceState, then: TraceState, dynamics: VehicleDynamics, step_s: float
+                ) -> tuple[bool, tuple[float, float, float, float, float]]:
+    """Ask of one transition; give the verdict, both errors and what exceeds the three limits."""
+    feasible, inputs = feasibility_checker.state_transition_feasibility(
+        now, then, dynamics, step_s)
+    start, end = dynamics.state_to_array(now)[0], dynamics.state_to_array(then)[0]
+    best = dynamics.input_to_array(inputs)[0]
+    made = dynamics.forward_simulation(start, best, step_s, throw=False)
+    limit = float(dynamics.parameters.longitudinal.a_max)
+    if dynamics.vehicle_model is VehicleModel.PM:
+        needed = math.hypot(*((end[2:4] - start[2:4]) / step_s).tolist())
+        position = math.inf if made is None else math.dist(made[:2], end[:2])
+        return bool(feasible), (position, 0.0, 0.0, 0.0, max(0.0, needed - limit))
+    acceleration = float(end[3] - start[3]) / step_s
+    rate = float(end[2] - start[2]) / step_s
+    bound = dynamics.parameters.steering
+    turn = math.remainder(float(end[4] - start[4]), 2.0 * math.pi) / step_s
+    across = 0.5 * float(start[3] + end[3]) * turn
+    errors = (math.inf, math.inf) if made is None else (
+        math.dist(made[:2], end[:2]),
+        abs(math.remainder(float(made[4] - end[4]), 2.0 * math.pi)))
+    return bool(feasible), (
+        *errors, max(0.0, abs(acceleration) - limit),
+        max(0.0, rate - float(bound.v_max), float(bound.v_min) - rate),
+        max(0.0, math.hypot(acceleration, across) - limit))
+
+
+def _why(position: float, heading: float, acceleration: float, rate: float,
+         friction: float) -> str:
+    if acceleration > _ROUNDING:
+        return f'it needs {acceleration:.2f} m/s^2 more than the greatest acceleration'
+    if rate > _ROUNDING:
+        return f'it steers {rate:.2f} rad/s faster than the model can'
+    if friction > _ROUNDING:
+        return f'along and across it needs {friction:.2f} m/s^2 more than the tyres give'
+    if not math.isfinite(position):
+        return 'no inputs within the limits were found'
+    return (f'the model comes out {100.0 * position:.1f} cm and {math.degrees(heading):.2f} deg '
+            'beside it')
+
+
+def _of_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
+               dynamics: VehicleDynamics, dt_s: float) -> TrajectoryFeasibility:
+    """Ask of a solution that holds inputs: each within bounds and friction."""
+    try:
+        feasible, made = feasibility_checker.input_vector_feasibility(
+            problem.initial_state, found.trajectory, dynamics, dt_s)
+    except Exception as error:  # the checker raises whatever its code stumbles over
+        return TrajectoryFeasibility(None, None, one_line(f'{type(error).__name__}: {error}'))
+    last = int(made.state_list[-1].time_step)
+    return TrajectoryFeasibility(
+        bool(feasible), None if feasible else last,
+        '' if feasible else 'its input is beyond the bounds or the friction circle',
+        len(found.trajectory.state_list), 0 if feasible else 1, step_s=dt_s)
+
+
+def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
+              dt_s: float) -> Trajectory:
+    """
+    Give a solution's states: of inputs what the model makes of them, until one is beyond bounds.
+
+    :raises ValueError: if the model cannot be driven with them.
+    """
+    if found.trajectory_type not in (TrajectoryType.Input, TrajectoryType.PMInput):
+        return found.trajectory
+    dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
+    try:
+        return feasibility_checker.input_vector_feasibility(
+            problem.initial_state, found.trajectory, dynamics, dt_s)[1]
+    except Exception as error:  # the checker raises whatever its code stumbles over
+        raise ValueError(one_line(f'{type(error).__name__}: {error}')) from error
