@@ -109,9 +109,9 @@ def read_plans(path: Path, epoch: int | None = None,
             av = plans[message.topic]
             lapse_ns = times.answered(av, stamp_ns, message.log_time_ns)
             plan, fault = _plan(reader, message, av, run)
-            asked = kept.get((av, stamp_ns))
+            asked, n = kept.get((av, stamp_ns)), run.game.scheduler.tick_of_stamp(stamp_ns)
             yield RecordedPlan(
-                av, stamp_ns, run.game.scheduler.tick_of_stamp(stamp_ns),
+                av, stamp_ns, None if n is None else run.game.scheduler.k(n),
                 math.nan if lapse_ns is None else lapse_ns * 1e-9, plan, fault,
                 None if asked is None else _told(reader, asked, av))
 

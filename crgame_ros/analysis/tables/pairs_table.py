@@ -129,11 +129,10 @@ class _Collected:
         if not self._rows or self._ids is None:
             return
         ks, subjects, counts = np.array(self._steps).T
-        scheduler = self._run.record.log.game.scheduler
         ks, subjects = np.repeat(ks, counts), np.repeat(subjects, counts)
         values = np.concatenate(self._values)
         self._pairs.add({
-            'run': self._run.id, 'k': ks, 'time_s': (ks - scheduler.k0) * scheduler.time_step_s,
+            'run': self._run.id, 'k': ks, 'time_s': self._run.times_s(ks),
             'subject': self._ids.take(pa.array(subjects)),
             'other': self._ids.take(pa.array(np.concatenate(self._others))),
             **{name: values[:, column] for column, name in enumerate(MEASURES)}})

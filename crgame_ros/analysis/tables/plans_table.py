@@ -105,7 +105,7 @@ def _row(run: TabulatedRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally)
     scheduler = run.record.log.game.scheduler
     row: dict[str, Any] = {
         'av': found.av, 'number': tally.answers, 'k': found.k, 'latency_s': found.latency_s,
-        'time_s': None if found.k is None else (found.k - scheduler.k0) * scheduler.time_step_s}
+        'time_s': None if found.k is None else float(run.times_s(np.array(found.k)))}
     refusal: str | None = found.fault
     if found.plan is not None:
         row |= _planned(run, found, av)

@@ -141,7 +141,7 @@ class _StateRows:
         commands = self._commands(part, here.shape[1])
         found: dict[str, Any] = {
             'run': self._run.id, 'k': ks[here],
-            'time_s': (ks[here] - log.game.scheduler.k0) * log.game.scheduler.time_step_s,
+            'time_s': self._run.times_s(ks[here]),
             **{name: pa.DictionaryArray.from_arrays(pa.array(who), texts).cast(pa.string())
                for name, texts in self._texts.items()},
             'length': self._sizes[who, 0], 'width': self._sizes[who, 1],
@@ -162,8 +162,7 @@ class _StateRows:
         """Give what led to each state (steps, everybody, 4), NaN where nothing did."""
         log, record = self._run.record.log, self._run.record
         found = np.full((part.stop - part.start, everybody, len(COMMAND_COLUMNS)), np.nan)
-        scheduler = log.game.scheduler
-        wanted = (log.ks[part] - scheduler.k0) * scheduler.steps_per_tick
+        wanted = self._run.steps_of(log.ks[part])
         places = np.minimum(np.searchsorted(record.ns, wanted), max(len(record.ns) - 1, 0))
         if len(record.ns):
             known = record.ns[places] == wanted

@@ -22,6 +22,8 @@ from crgame_ros.analysis.criticality.criticality import VehicleCriticality
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.recording.recorded_plans import RecordedPlan
 from crgame_ros.recording.run_record import RunRecord
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass
@@ -60,7 +62,11 @@ class TabulatedRun:
         game = {item.id: item for item in self.record.log.game.vehicles}
         return tuple(game[item.id] for item in self.record.log.vehicles)
 
-    def step_of(self, row: int) -> int:
-        """Give the simulation step n of a row of the log."""
+    def steps_of(self, ks: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Give the simulation steps n of scenario steps k."""
         scheduler = self.record.log.game.scheduler
-        return (int(self.record.log.ks[row]) - scheduler.k0) * scheduler.steps_per_tick
+        return np.asarray((ks - scheduler.k0) * scheduler.steps_per_tick)
+
+    def times_s(self, ks: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Give the times of scenario steps k since the run's start, alike in all tables [s]."""
+        return np.asarray(self.steps_of(ks) * self.record.log.game.scheduler.dt_s)
