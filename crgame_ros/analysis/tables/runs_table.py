@@ -34,7 +34,8 @@ TIMING = {
     'timeout_ratio': ('timeout_ratio', '1', 1.0, 'share of cycles busier than a step'),
     'time_efficiency': ('time_efficiency', '1', 1.0, 'time efficiency eta_t, as a fraction'),
     'precision_ratio': ('precision_ratio', '1', 1.0, 'precision ratio P_r'),
-    'duration_s': ('wall_duration_s', 's', 1.0, "duration on the run's own time line"),
+    'duration_s': ('timed_duration_s', 's', 1.0, 'measured duration, without pauses and scaled by '
+                   'the real-time factor'),
     'rate_hz': ('rate_hz', 'Hz', 1.0, 'simulation steps per second'),
     'dropped_ms': ('dropped_s', *_MS, 'time by which drift resets moved the schedule'),
     'worst_lag_ms': ('worst_lag_s', *_MS, 'greatest lag behind the schedule in force'),
@@ -93,7 +94,7 @@ RUN_PARTS = (
         Column('duration_s', NUMBER, 's', 'simulated time between those two'),
         Column('real_time_factor', NUMBER, '1', 'simulated over wall time, as the game asked'),
         Column('humans', INTEGER, '1', 'driven vehicles of humans'),
-        Column('avs', INTEGER, '1', 'AVs'),
+        Column('avs', INTEGER, '1', 'autonomous vehicles (AVs)'),
         Column('objects', INTEGER, '1', 'everything else that may appear'),
         Column('agents', INTEGER, '1', 'of these, agents of traffic'),
         Column('planners', TEXT, '', 'planner of each AV, as a JSON object'),
