@@ -31,9 +31,10 @@ _MEDIA_TYPES = {'parquet': 'application/vnd.apache.parquet', 'csv': 'text/csv'}
 DESCRIPTION = (
     'Tables of runs of crgame_ros. SI units and radians; positions are in the frame map of the '
     'simulation. A value that is missing is null in Parquet; in CSV a missing number is '
-    f'{NOT_A_NUMBER}, any other missing value an empty field. Infinite numbers are inf and -inf. '
-    'Texts have no control characters but tabs and ends of lines; in CSV those that a spreadsheet '
-    f'would take for a formula (= + - @, tab, carriage return) begin with {FORMULA_GUARD}.')
+    f'{NOT_A_NUMBER}, any other missing value an empty field; empty texts are missing. Infinite '
+    'numbers are inf and -inf. Texts have no control characters but tabs and ends of lines; in '
+    'CSV those that a spreadsheet would take for a formula (= + - @, tab, carriage return) begin '
+    f'with {FORMULA_GUARD}.')
 
 
 class WrittenTable(NamedTuple):

@@ -80,8 +80,8 @@ def _timing(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
 
 RUN_PARTS = (
     TablePart((
-        RUN, Column('benchmark_id', TEXT, '', 'of its scenario'),
-        Column('title', TEXT, '', 'of its game, for people'),
+        RUN, Column('benchmark_id', TEXT, '', 'of its scenario', empty='it has none'),
+        Column('title', TEXT, '', 'of its game, for people', empty='it has none'),
         Column('epoch', INTEGER, '1', 'counts resets from 0'),
         Column('scenario_sha256', TEXT, '', "of the scenario file's text"),
         Column('game_sha256', TEXT, '', "of the game file's text", empty='it has no game file'),
@@ -99,7 +99,8 @@ RUN_PARTS = (
         Column('agents', INTEGER, '1', 'of these, agents of traffic'),
         Column('planners', TEXT, '', 'planner of each AV, as a JSON object'),
         Column('events', INTEGER, '1', 'rows of events'),
-        Column('notices', TEXT, '', 'what of the run is not in here, one line each'),
+        Column('notices', TEXT, '', 'what of the run is not in here, one line each',
+               empty='all is'),
     ), _identity),
     TablePart((
         *(Column(name, NUMBER, unit, what, variant='as docs/timing.md defines it', empty=UNTIMED)

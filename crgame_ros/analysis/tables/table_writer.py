@@ -37,8 +37,8 @@ class TableWriter:
     """
     Writes the rows of one table.
 
-    Numbers that are NaN are missing: null in Parquet, `NaN` in CSV, where other missing values are
-    empty fields. CSV is RFC 4180, UTF-8; infinite numbers are inf and -inf.
+    Numbers that are NaN and texts that are empty are missing: null in Parquet; in CSV `NaN` and an
+    empty field. CSV is RFC 4180, UTF-8; infinite numbers are inf and -inf.
 
     :param declaration: the table.
     :param path: of the file to write.
@@ -125,9 +125,9 @@ def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
     if isinstance(values, pa.Array):
         return values
     if not _are_many(values):
-        return pa.repeat(pa.scalar(_plain_text(values), kind), rows)
+        return pa.repeat(pa.scalar(None if values == '' else _plain_text(values), kind), rows)
     if kind == TEXT:
-        values = [None if text is None else _plain_text(text) for text in values]
+        values = [_plain_text(text) if text else None for text in values]
     return pa.array(values, kind, from_pandas=True)
 
 

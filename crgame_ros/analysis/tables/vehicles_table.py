@@ -118,7 +118,8 @@ VEHICLE_PARTS = (
     TablePart((
         RUN, Column('id', TEXT, '', 'of the vehicle'),
         Column('role', TEXT, '', 'who drives it', values=('human', 'autonomous')),
-        Column('driver', TEXT, '', "the game's driver of a human, or the AV's planner"),
+        Column('driver', TEXT, '', "the game's driver of a human, or the AV's planner",
+               empty='the game does not say'),
         Column('vehicle_model', TEXT, '', 'name of its vehicle type'),
         Column('length', NUMBER, 'm', 'extent along its heading'),
         Column('width', NUMBER, 'm', 'extent across its heading'),
