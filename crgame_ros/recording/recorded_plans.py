@@ -25,11 +25,11 @@ from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import plan_from_joints, vehicle_joint_names, vehicles_from_joints
 from crgame_ros.messages.plan import Plan
+from crgame_ros.messages.request_head import request_head
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.vehicle.state import VehicleState
-import numpy as np
 
 # Requests that are kept whole until they are answered; they are large, and the engine, too, looks
 # no further back.
@@ -113,7 +113,7 @@ def read_plans(path: Path, epoch: int | None = None,
             yield RecordedPlan(
                 av, stamp_ns, None if n is None else run.game.scheduler.k(n),
                 math.nan if lapse_ns is None else lapse_ns * 1e-9, plan, fault,
-                None if asked is None else _told(reader, asked, av))
+                None if asked is None else _told(asked, av))
 
 
 def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[Plan | None, str]:
@@ -124,14 +124,13 @@ def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[
         return None, error.what
 
 
-def _told(reader: BagReader, message: BagMessage, av: str) -> VehicleState | None:
+def _told(message: BagMessage, av: str) -> VehicleState | None:
     """Give the state of the AV itself in a request; None if it does not say."""
     try:
-        request = reader.decode(message).message
-        places = [request.joint_names.index(name) for name in vehicle_joint_names(av)]
-        point = request.points[0]
-        joints = [np.asarray(row)[places]
-                  for row in (point.positions, point.velocities, point.accelerations)]
-    except (InputError, ValueError, LookupError):
+        head = request_head(message.data, message.topic)
+    except InputError:
         return None
-    return VehicleState(*vehicles_from_joints(*joints).tolist())
+    if head.names != vehicle_joint_names(av):
+        return None
+    state, = vehicles_from_joints(head.positions, head.velocities, head.accelerations).tolist()
+    return VehicleState(*state)
