@@ -192,15 +192,17 @@ def main() -> int:
             print('recording …', flush=True)
             SyntheticRun(values.duration, values.objects).record(run / 'bag')
         for file_format in values.to:
-            start_s = time.perf_counter()
+            start_s, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
             subprocess.run([sys.executable, '-m', 'crgame_ros.cli', 'export', str(run), '--to',
                             file_format, '--out', str(Path(name) / 'tables')], check=True)
             lapse_s = time.perf_counter() - start_s
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
             # Of the largest child so far; the next one needs as much or is not seen.
-            peak_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024e-6
+            peak_mb = after.ru_maxrss * 1024e-6
             size_mb = sum(path.stat().st_size for path in (Path(name) / 'tables').iterdir()) * 1e-6
-            print(f'{file_format}: {lapse_s:.1f} s (wanted {WANTED_S:g}), {peak_mb:.0f} MB at '
-                  f'most (wanted {WANTED_MB:g}), {size_mb:.0f} MB of files', flush=True)
+            print(f'{file_format}: {lapse_s:.1f} s (wanted {WANTED_S:g}), '
+                  f'{cpu_s:.1f} s of CPU, {peak_mb:.0f} MB at most (wanted {WANTED_MB:g}), {size_mb:.0f} MB of files', flush=True)
             missed |= lapse_s > WANTED_S or peak_mb > WANTED_MB
     return int(missed)
 

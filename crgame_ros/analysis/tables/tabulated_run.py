@@ -58,7 +58,7 @@ class TabulatedRun:
 
     @property
     def driven(self) -> tuple[DrivenVehicle, ...]:
-        """The driven vehicles, as the game has them, in the order of the log's."""
+        """Give the driven vehicles, as the game has them, in the order of the log's."""
         game = {item.id: item for item in self.record.log.game.vehicles}
         return tuple(game[item.id] for item in self.record.log.vehicles)
 

@@ -91,8 +91,8 @@ def _worst_columns() -> list[Column]:
             value,
             Column(f'{value.name}_of', TEXT, '', f'id of whom the worst {name} is of',
                    empty=NOBODY),
-            Column(f'{value.name}_time_s', NUMBER, 's', f"time of the worst {name} since the "
-                   "run's start", variant='the first such moment', empty=NOBODY)]
+            Column(f'{value.name}_time_s', NUMBER, 's', f'time of the worst {name}, since the '
+                   'start of the run', variant='the first such moment', empty=NOBODY)]
     return columns
 
 
