@@ -201,8 +201,9 @@ def main() -> int:
             # Of the largest child so far; the next one needs as much or is not seen.
             peak_mb = after.ru_maxrss * 1024e-6
             size_mb = sum(path.stat().st_size for path in (Path(name) / 'tables').iterdir()) * 1e-6
-            print(f'{file_format}: {lapse_s:.1f} s (wanted {WANTED_S:g}), '
-                  f'{cpu_s:.1f} s of CPU, {peak_mb:.0f} MB at most (wanted {WANTED_MB:g}), {size_mb:.0f} MB of files', flush=True)
+            print(f'{file_format}: {lapse_s:.1f} s (wanted {WANTED_S:g}), {cpu_s:.1f} s of CPU, '
+                  f'{peak_mb:.0f} MB at most (wanted {WANTED_MB:g}), {size_mb:.0f} MB of files',
+                  flush=True)
             missed |= lapse_s > WANTED_S or peak_mb > WANTED_MB
     return int(missed)
 

@@ -27,6 +27,8 @@ from crgame_ros.analysis.tables.recorded_run import run_name
 from crgame_ros.analysis.tables.run_tables import TABLES, write_tables
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.cli import main
+from crgame_ros.errors import InputError
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.game_file import load_game
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
@@ -316,6 +318,16 @@ def test_broken_recordings_give_a_line_and_no_file(
     lines = capsys.readouterr().err.splitlines()
     assert len([line for line in lines if line.startswith('error: ')]) == 1
     assert not (tmp_path / 'out').exists() or not list((tmp_path / 'out').iterdir())
+
+
+@pytest.mark.parametrize(('n', 'k'), [(10**400, 1), (10, 10**30)])
+def test_numbers_beyond_all_bounds_give_a_line(recorded: Recorded, tmp_path: Path, n: int,
+                                               k: int) -> None:
+    """JSON has no largest number; a column has."""
+    record = replace(run_record_of(recorded.result), fired=(FiredEvent('x', n, k, 'trigger'),))
+    with pytest.raises(InputError, match='out of all bounds'):
+        write_tables([TabulatedRun('a', record)], tmp_path, 'parquet')
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_interruption_leaves_no_half_file(recorded: Recorded, tmp_path: Path,

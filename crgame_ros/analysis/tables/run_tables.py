@@ -14,7 +14,7 @@
 # limitations under the License.
 """All tables of runs, and how they are filled."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -26,9 +26,11 @@ from crgame_ros.analysis.tables.runs_table import RUN_PARTS, RUNS
 from crgame_ros.analysis.tables.states_table import state_rows, STATES
 from crgame_ros.analysis.tables.table_folder import TableFolder
 from crgame_ros.analysis.tables.table_part import part_rows
-from crgame_ros.analysis.tables.table_writer import Format
+from crgame_ros.analysis.tables.table_writer import Format, TableWriter
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS, VEHICLES
+from crgame_ros.errors import InputError
+import pyarrow as pa
 
 TABLES: tuple[TableDeclaration, ...] = (
     RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS)
@@ -50,16 +52,25 @@ def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
     :raises InputError: if a scenario cannot be used, or the folder not be written.
     """
     with TableFolder(out, TABLES, file_format, 'tables') as folder:
-        writers = folder.writers
         for run in runs:
-            for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):
-                writers[STATES.name].add(rows)
-            write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name],
-                              partial(progress, f'measuring {run.id}'))
-            for rows in plan_rows(run):
-                writers[PLANS.name].add(rows)
-            for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS),
-                                 (RUNS, RUN_PARTS)):
-                if (values := part_rows(parts, run))['run']:
-                    writers[table.name].add(values)
-        return {name: writer.rows for name, writer in writers.items()}
+            try:
+                _add_run(run, folder.writers, progress)
+            except (OverflowError, pa.ArrowInvalid) as error:
+                # Documents of a recording may hold any number.
+                raise InputError(f'a number in it is out of all bounds ({error})', run.id,
+                                 'the recording is damaged; record again') from error
+        return {name: writer.rows for name, writer in folder.writers.items()}
+
+
+def _add_run(run: TabulatedRun, writers: Mapping[str, TableWriter],
+             progress: Callable[[str, float], object]) -> None:
+    """Add the rows of a run to all tables; vehicles and runs come last, for they sum it up."""
+    for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):
+        writers[STATES.name].add(rows)
+    write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name],
+                      partial(progress, f'measuring {run.id}'))
+    for rows in plan_rows(run):
+        writers[PLANS.name].add(rows)
+    for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
+        if (values := part_rows(parts, run))['run']:
+            writers[table.name].add(values)
