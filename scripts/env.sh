@@ -160,7 +160,7 @@ _crgame_explain() {
         "$log"; then
         reason='the package index cannot be reached: check the network, proxy and pip settings'
     elif grep -q 'No space left' "$log"; then
-        reason="the disk is full: .venv takes 0.9 GB in $root"
+        reason="the disk is full: .venv takes 1.4 GB in $root"
     else
         reason=$(grep -E '^ERROR|^error|Error:' "$log" | tail -n 1)
     fi

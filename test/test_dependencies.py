@@ -44,6 +44,7 @@ THIRD_PARTY = {
     'numpy': ('numpy', 'python3-numpy'),
     'packaging': ('packaging', 'python3-packaging'),
     'plotly': ('plotly', None),
+    'pyarrow': ('pyarrow', None),
     'rosbags': ('rosbags', None),
     'scipy': ('scipy', 'python3-scipy'),
     'shapely': ('shapely', 'python3-shapely'),

@@ -265,7 +265,7 @@ class Criticality:
         away[subject] = np.nan
         others = np.flatnonzero(away - self._radii - self._radii[subject] < NEAR)
         values = np.empty((len(others), len(MEASURES)))
-        values[:, :_OF_LEADER] = _UNDEFINED
+        values[:, :_OF_LEADER] = WITHOUT_LEADER
         self._approach(subject, others, moves, outlines, values)
         path = self._paths.at(subject, *poses[subject].tolist())
         leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
@@ -329,4 +329,5 @@ def _convex(corners: FloatArray) -> FloatArray:
 
 
 # Of who leads nobody.
-_UNDEFINED = _of_leader(math.nan, 0.0, 0.0, 0.0, 0.0)
+# The measures of car following to somebody who is not the leader.
+WITHOUT_LEADER = _of_leader(math.nan, 0.0, 0.0, 0.0, 0.0)

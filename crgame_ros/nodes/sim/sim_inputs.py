@@ -22,9 +22,9 @@ from typing import Any, TYPE_CHECKING
 from crgame_ros.errors import InputError
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
+from crgame_ros.messages.request_head import request_head
 from crgame_ros.messages.status_values import read_status, status_truth
 from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
-from crgame_ros.ros.request_head import request_head
 from crgame_ros.ros.ros_messages import from_time
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.setup import Setup

@@ -1,0 +1,99 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A column and a table as they are declared: what is written, and what the dictionary says."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+NUMBER, INTEGER, TEXT, FLAG = pa.float64(), pa.int64(), pa.string(), pa.bool_()
+
+
+@dataclass(frozen=True)
+class Column:
+    """
+    A column of a table.
+
+    :param name: in the files.
+    :param type: of its values: NUMBER, INTEGER, TEXT or FLAG.
+    :param unit: SI; 1 for a bare number, empty for what is no quantity.
+    :param definition: in a sentence, without its unit.
+    :param reference_point: of the vehicle or object that a position or motion is of.
+    :param variant: which of several usual ways of computing it.
+    :param empty: when it has no value; empty for a column that always has one.
+    :param values: the only ones that it can have; empty for no such list.
+    """
+
+    name: str
+    type: pa.DataType  # noqa: A003
+    unit: str
+    definition: str
+    reference_point: str = ''
+    variant: str = ''
+    empty: str = ''
+    values: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """Name of its type in Table Schemas: number, integer, string or boolean."""
+        return {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string',
+                FLAG: 'boolean'}[self.type]
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """Give what is said of it beside name and type, without what is empty."""
+        given = {'unit': self.unit, 'description': self.definition,
+                 'referencePoint': self.reference_point, 'variant': self.variant,
+                 'emptyWhere': self.empty}
+        return {key: text for key, text in given.items() if text}
+
+
+class TableDeclaration:
+    """
+    A table.
+
+    :param name: of its file.
+    :param row: what a row is.
+    :param key: columns that no two rows have alike.
+    :param columns: in the order of the files.
+    """
+
+    def __init__(self, name: str, row: str, key: tuple[str, ...],
+                 columns: Iterable[Column]) -> None:
+        self.name = name
+        self.row = row
+        self.key = key
+        self.columns = tuple(columns)
+        # A Parquet file that has lost its dictionary still explains itself.
+        self.schema = pa.schema([
+            pa.field(column.name, column.type, nullable=column.name not in key,
+                     metadata=column.notes) for column in self.columns],
+            metadata={'row': row, 'key': ','.join(key)})
+
+
+RUN = Column('run', TEXT, '', "the run: its folder's name, a colon and its epoch, which counts "
+             'resets from 0')
+
+
+def step_columns(of: str) -> tuple[Column, Column]:
+    """
+    Declare a scenario step and its time.
+
+    :param of: what happens then.
+    """
+    return (Column('k', INTEGER, '1', f'scenario time step of {of}'),
+            Column('time_s', NUMBER, 's', f"time of {of} since the run's start",
+                   variant='simulated time, (k - k0) times the scenario time step'))

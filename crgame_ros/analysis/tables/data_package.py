@@ -1,0 +1,99 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The data dictionary beside the tables: a Frictionless Data Package with Table Schemas."""
+
+from collections.abc import Sequence
+import hashlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from crgame_ros import __version__
+from crgame_ros.analysis.tables.column import Column, FLAG, TableDeclaration
+from crgame_ros.analysis.tables.table_writer import Format, FORMULA_GUARD, NOT_A_NUMBER
+
+PACKAGE_FILE = 'datapackage.json'
+CREATOR = 'crgame_ros'
+# https://datapackage.org/standard/data-package/, version 2
+_PROFILE = 'https://datapackage.org/profiles/2.0/{}.json'
+_MEDIA_TYPES = {'parquet': 'application/vnd.apache.parquet', 'csv': 'text/csv'}
+DESCRIPTION = (
+    'Tables of runs of crgame_ros. SI units and radians; positions are in the frame map of the '
+    'simulation. A value that is missing is null in Parquet; in CSV a missing number is '
+    f'{NOT_A_NUMBER}, any other missing value an empty field; empty texts are missing. Infinite '
+    'numbers are inf and -inf. Texts have no control characters but tabs and ends of lines; in '
+    'CSV those that a spreadsheet would take for a formula (= + - @, tab, carriage return) begin '
+    f'with {FORMULA_GUARD}.')
+
+
+class WrittenTable(NamedTuple):
+    """A table's file."""
+
+    declaration: TableDeclaration
+    path: Path
+    name: str
+    rows: int
+
+
+def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str) -> dict[str, Any]:
+    """
+    Describe tables that have been written.
+
+    :param name: of the package.
+    """
+    return {
+        '$schema': _PROFILE.format('datapackage'), 'name': name, 'title': f'Runs: {name}',
+        'description': DESCRIPTION, 'createdBy': f'{CREATOR} {__version__}',
+        'resources': [_resource(table, file_format) for table in tables]}
+
+
+def table_schema(declaration: TableDeclaration) -> dict[str, Any]:
+    """Give the Table Schema of a table."""
+    schema: dict[str, Any] = {
+        '$schema': _PROFILE.format('tableschema'),
+        'fields': [_field(column, column.name in declaration.key)
+                   for column in declaration.columns],
+        'missingValues': ['', NOT_A_NUMBER], 'primaryKey': list(declaration.key)}
+    if declaration.key != ('run',):
+        schema['foreignKeys'] = [{'fields': ['run'],
+                                  'reference': {'resource': 'runs', 'fields': ['run']}}]
+    return schema
+
+
+def _resource(table: WrittenTable, file_format: Format) -> dict[str, Any]:
+    with table.path.open('rb') as stream:
+        digest = hashlib.file_digest(stream, 'sha256').hexdigest()
+    resource: dict[str, Any] = {
+        'name': table.declaration.name, 'type': 'table', 'path': table.name,
+        'format': file_format, 'mediatype': _MEDIA_TYPES[file_format],
+        'description': f'One row is {table.declaration.row}.', 'rows': table.rows,
+        'bytes': table.path.stat().st_size, 'hash': f'sha256:{digest}',
+        'schema': table_schema(table.declaration)}
+    if file_format == 'csv':
+        resource['encoding'] = 'utf-8'
+        resource['dialect'] = {'delimiter': ',', 'lineTerminator': '\r\n', 'quoteChar': '"',
+                               'doubleQuote': True, 'header': True}
+    return resource
+
+
+def _field(column: Column, key: bool) -> dict[str, Any]:
+    field: dict[str, Any] = {'name': column.name, 'type': column.kind, **column.notes}
+    constraints: dict[str, Any] = {'required': True} if key else {}
+    if column.values:
+        constraints['enum'] = list(column.values)
+    if constraints:
+        field['constraints'] = constraints
+    if column.type == FLAG:
+        field |= {'trueValues': ['TRUE'], 'falseValues': ['FALSE']}
+    return field

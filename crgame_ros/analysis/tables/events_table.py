@@ -1,0 +1,53 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The table of events: what took effect when, and who or what made it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from crgame_ros.analysis.tables.column import Column, RUN, step_columns, TEXT
+from crgame_ros.analysis.tables.table_part import declare, TablePart
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.game.events import ACTIONS
+
+UNKNOWN = 'the game does not know the event'
+
+
+def _fired(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    game = run.record.log.game
+    specs = {spec.name: spec for spec in game.events}
+    fired = run.record.fired
+    known = [specs.get(event.name) for event in fired]
+    return {
+        'run': [run.id] * len(fired), 'k': [event.k for event in fired],
+        'time_s': [event.n * game.scheduler.dt_s for event in fired],
+        'name': [event.name for event in fired],
+        'kind': [None if spec is None else spec.kind for spec in known],
+        'label': [None if spec is None else spec.label for spec in known],
+        'by': [event.by for event in fired],
+        'object': [None if spec is None else spec.object_id for spec in known]}
+
+
+EVENT_PARTS = (
+    TablePart((
+        RUN, *step_columns('its effect'),
+        Column('name', TEXT, '', 'of the event in the game'),
+        Column('kind', TEXT, '', 'what it does', empty=UNKNOWN, values=tuple(ACTIONS)),
+        Column('label', TEXT, '', 'text for people', empty=UNKNOWN),
+        Column('by', TEXT, '', 'whether somebody triggered it, or its condition came true',
+               values=('trigger', 'condition')),
+        Column('object', TEXT, '', 'id of the obstacle that it changes or puts',
+               empty='it changes no obstacle')), _fired),)
+EVENTS = declare('events', 'an event that took effect', ('run', 'name'), EVENT_PARTS)

@@ -1,0 +1,76 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""All tables of runs, and how they are filled."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from pathlib import Path
+
+from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.analysis.tables.events_table import EVENT_PARTS, EVENTS
+from crgame_ros.analysis.tables.pairs_table import CROSSINGS, PAIRS, write_criticality
+from crgame_ros.analysis.tables.plans_table import plan_rows, PLANS
+from crgame_ros.analysis.tables.runs_table import RUN_PARTS, RUNS
+from crgame_ros.analysis.tables.states_table import state_rows, STATES
+from crgame_ros.analysis.tables.table_folder import TableFolder
+from crgame_ros.analysis.tables.table_part import part_rows
+from crgame_ros.analysis.tables.table_writer import Format, TableWriter
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS, VEHICLES
+from crgame_ros.errors import InputError
+import pyarrow as pa
+
+TABLES: tuple[TableDeclaration, ...] = (
+    RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS)
+
+
+def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
+                 progress: Callable[[str, float], object] = lambda _what, _share: None,
+                 ) -> dict[str, int]:
+    """
+    Write the tables of runs and their dictionary into a folder; all are there whole, or none.
+
+    One run after the other is taken, so that memory is that of one.
+
+    :param runs: ids must differ.
+    :param out: the folder; an earlier export in it is replaced.
+    :param file_format: Parquet or CSV.
+    :param progress: is told what of which run is under way, and how much of it is done, 0 to 1.
+    :return: rows by table.
+    :raises InputError: if a scenario cannot be used, or the folder not be written.
+    """
+    with TableFolder(out, TABLES, file_format, 'tables') as folder:
+        for run in runs:
+            try:
+                _add_run(run, folder.writers, progress)
+            except (OverflowError, pa.ArrowInvalid) as error:
+                # Documents of a recording may hold any number.
+                raise InputError(f'a number in it is out of all bounds ({error})', run.id,
+                                 'the recording is damaged; record again') from error
+        return {name: writer.rows for name, writer in folder.writers.items()}
+
+
+def _add_run(run: TabulatedRun, writers: Mapping[str, TableWriter],
+             progress: Callable[[str, float], object]) -> None:
+    """Add the rows of a run to all tables; vehicles and runs come last, for they sum it up."""
+    for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):
+        writers[STATES.name].add(rows)
+    write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name],
+                      partial(progress, f'measuring {run.id}'))
+    for rows in plan_rows(run):
+        writers[PLANS.name].add(rows)
+    for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
+        if (values := part_rows(parts, run))['run']:
+            writers[table.name].add(values)

@@ -1,0 +1,61 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Columns that one computation fills: whoever has more to say of a row adds a part."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from crgame_ros.analysis.tables.column import Column, TableDeclaration
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+
+
+@dataclass(frozen=True)
+class TablePart:
+    """
+    Some columns of a table whose rows all parts know: `vehicles`, `events`, `runs`.
+
+    :param columns: what it fills.
+    :param values: gives the values of a run by column, in the order of the table's rows; columns
+        that it leaves out stay empty.
+    """
+
+    columns: tuple[Column, ...]
+    values: Callable[[TabulatedRun], Mapping[str, Sequence[Any]]]
+
+
+def declare(name: str, row: str, key: tuple[str, ...],
+            parts: Sequence[TablePart]) -> TableDeclaration:
+    """Declare a table of parts; the first says which rows there are."""
+    return TableDeclaration(name, row, key, (column for part in parts for column in part.columns))
+
+
+def part_rows(parts: Sequence[TablePart], run: TabulatedRun) -> dict[str, Any]:
+    """
+    Give all columns of a run's rows.
+
+    :raises ValueError: if a part has other rows than the first, or a column of another part.
+    """
+    found: dict[str, Any] = {}
+    for part in parts:
+        values = part.values(run)
+        names = {column.name for column in part.columns}
+        if not values.keys() <= names or values.keys() & found.keys():
+            raise ValueError(f'columns that are not of this part: {sorted(values.keys() - names)}')
+        found.update(values)
+    lengths = {len(values) for values in found.values()}
+    if len(lengths) > 1:
+        raise ValueError(f'parts disagree about the rows: {sorted(lengths)}')
+    return found

@@ -1,0 +1,156 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One table's file, written in pieces: memory is that of a piece, however long the run."""
+
+from collections.abc import Mapping
+import csv
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from crgame_ros.analysis.tables.column import NUMBER, TableDeclaration, TEXT
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+Format = Literal['parquet', 'csv']
+FORMATS: tuple[Format, ...] = ('parquet', 'csv')
+# Rows that are kept until they are written together: a row group of Parquet.
+PIECE_ROWS = 65_536
+# What spreadsheets take for a formula (OWASP, CSV injection) gets this in front.
+FORMULA_BEGINS, FORMULA_GUARD = ('=', '+', '-', '@', '\t', '\r'), "'"
+NOT_A_NUMBER = 'NaN'
+
+
+class TableWriter:
+    """
+    Writes the rows of one table.
+
+    Numbers that are NaN and texts that are empty are missing: null in Parquet; in CSV `NaN` and an
+    empty field. CSV is RFC 4180, UTF-8; infinite numbers are inf and -inf.
+
+    :param declaration: the table.
+    :param path: of the file to write.
+    :param file_format: Parquet or CSV.
+    :ivar rows: that have been added.
+    """
+
+    def __init__(self, declaration: TableDeclaration, path: Path, file_format: Format) -> None:
+        self.declaration = declaration
+        self.rows = 0
+        self._kept: list[pa.RecordBatch] = []
+        self._kept_rows = 0
+        self._csv = self._parquet = None
+        if file_format == 'csv':
+            self._stream = path.open('w', encoding='utf-8', newline='')
+            self._csv = csv.writer(self._stream)
+            self._csv.writerow([column.name for column in declaration.columns])
+        else:
+            self._parquet = pq.ParquetWriter(path, declaration.schema, compression='zstd')
+
+    def add(self, columns: Mapping[str, Any]) -> None:
+        """
+        Add rows.
+
+        :param columns: values by column: arrays, lists, or a single value for all rows; columns
+            that are not named stay empty.
+        :raises KeyError: if a column is not declared.
+        """
+        unknown = columns.keys() - set(self.declaration.schema.names)
+        if unknown:
+            raise KeyError(f'{self.declaration.name}: no columns {sorted(unknown)}')
+        rows = max((len(values) for values in columns.values() if _are_many(values)), default=1)
+        if not rows:
+            return
+        self._kept.append(pa.RecordBatch.from_arrays(
+            [_array(columns.get(column.name), column.type, rows)
+             for column in self.declaration.columns], schema=self.declaration.schema))
+        self.rows += rows
+        self._kept_rows += rows
+        if self._kept_rows >= PIECE_ROWS:
+            self._write()
+
+    def _write(self) -> None:
+        piece = pa.Table.from_batches(self._kept, self.declaration.schema)
+        self._kept, self._kept_rows = [], 0
+        if self._parquet is not None:
+            self._parquet.write_table(piece.combine_chunks(), row_group_size=len(piece))
+        elif self._csv is not None:
+            for batch in piece.to_batches(max_chunksize=PIECE_ROWS // 8):
+                self._csv.writerows(zip(*map(_spelled, batch.columns), strict=True))
+
+    def close(self) -> None:
+        """Write what is left, and let go of the file."""
+        if self._kept:
+            self._write()
+        self.release()
+
+    def release(self) -> None:
+        """Let go of the file as it is."""
+        if self._parquet is not None:
+            self._parquet.close()
+        if self._csv is not None:
+            self._stream.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.release()
+
+
+def _are_many(values: Any) -> bool:
+    return hasattr(values, '__len__') and not isinstance(values, str)
+
+
+def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
+    """Give a column's values in its type; NaN becomes missing."""
+    if values is None:
+        return pa.nulls(rows, kind)
+    if isinstance(values, pa.Array):
+        return values
+    if not _are_many(values):
+        return pa.repeat(pa.scalar(None if values == '' else _plain_text(values), kind), rows)
+    if kind == TEXT:
+        values = [_plain_text(text) if text else None for text in values]
+    return pa.array(values, kind, from_pandas=True)
+
+
+def _plain_text(value: Any) -> Any:
+    """Give text that every reader takes: no control characters but tabs and ends of lines."""
+    if not isinstance(value, str) or value.isprintable():
+        return value
+    text = value.encode('utf-8', 'replace').decode('utf-8')
+    return ''.join(character if character.isprintable() or character in '\t\n\r '
+                   or ord(character) >= 0xa0 else '\N{REPLACEMENT CHARACTER}'
+                   for character in text)
+
+
+def _spelled(column: pa.Array) -> list[Any]:
+    """Give a column's values as CSV has them."""
+    values: list[Any] = column.to_pylist()
+    if column.type == NUMBER:
+        # Full precision, and always with a point, an exponent or as inf: never an integer's look.
+        return [NOT_A_NUMBER if value is None else value for value in values]
+    if column.type == TEXT:
+        return [FORMULA_GUARD + text if text and text.startswith(FORMULA_BEGINS) else text
+                for text in values]
+    if column.type == pa.bool_():
+        # In capitals, as R wants them; the others take them too.
+        return [None if flag is None else 'TRUE' if flag else 'FALSE' for flag in values]
+    return values

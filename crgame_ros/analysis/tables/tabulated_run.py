@@ -1,0 +1,72 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A run that becomes rows of the tables, and what is known of it only once it was measured."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from crgame_ros.analysis.criticality.criticality import VehicleCriticality
+from crgame_ros.game.driven_vehicle import DrivenVehicle
+from crgame_ros.recording.recorded_plans import RecordedPlan
+from crgame_ros.recording.run_record import RunRecord
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass
+class PlanTally:
+    """What was counted of an AV's plans: answers, and those that pass the engine's check."""
+
+    answers: int = 0
+    passing: int = 0
+    checked: int = 0
+    latencies_s: list[float] = field(default_factory=list)
+
+
+@dataclass
+class TabulatedRun:
+    """
+    A run to tabulate.
+
+    :param id: that is in every row.
+    :param record: how everybody moved, what drivers did, and events.
+    :param timing: as `recording.timing_report` gives it; None where nobody measured it.
+    :param plans: gives the recorded plans, one by one; None where they were not recorded.
+    :ivar criticality: by vehicle, once `pairs` has been written.
+    :ivar tallies: by AV, once `plans` has been written.
+    """
+
+    id: str  # noqa: A003
+    record: RunRecord
+    timing: Mapping[str, Any] | None = None
+    plans: Callable[[], Iterable[RecordedPlan]] | None = None
+    criticality: dict[str, VehicleCriticality] = field(default_factory=dict)
+    tallies: dict[str, PlanTally] = field(default_factory=dict)
+
+    @property
+    def driven(self) -> tuple[DrivenVehicle, ...]:
+        """Give the driven vehicles, as the game has them, in the order of the log's."""
+        game = {item.id: item for item in self.record.log.game.vehicles}
+        return tuple(game[item.id] for item in self.record.log.vehicles)
+
+    def steps_of(self, ks: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Give the simulation steps n of scenario steps k."""
+        scheduler = self.record.log.game.scheduler
+        return np.asarray((ks - scheduler.k0) * scheduler.steps_per_tick)
+
+    def times_s(self, ks: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Give the times of scenario steps k since the run's start, alike in all tables [s]."""
+        return np.asarray(self.steps_of(ks) * self.record.log.game.scheduler.dt_s)

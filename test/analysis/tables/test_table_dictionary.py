@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The dictionary: every column is explained, from one declaration, wherever it is read."""
+
+from pathlib import Path
+import subprocess
+import sys
+
+from crgame_ros.analysis.criticality.criticality import MEASURES
+from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.analysis.tables.data_package import table_schema
+from crgame_ros.analysis.tables.pairs_table import PAIRS
+from crgame_ros.analysis.tables.run_tables import TABLES
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+UNITS = {'', '1', 'm', 's', 'rad', 'Hz', 'm/s', 'm/s^2', 'rad/s', 's^2'}
+
+
+def test_the_page_is_up_to_date() -> None:
+    done = subprocess.run([sys.executable, ROOT / 'scripts' / 'make_table_docs.py', '--check'],
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize('table', TABLES, ids=lambda table: table.name)
+def test_every_column_is_explained(table: TableDeclaration) -> None:
+    """Names once, SI units, definitions, keys that exist and are never empty."""
+    names = [column.name for column in table.columns]
+    assert len(set(names)) == len(names)
+    for column in table.columns:
+        assert column.name.isidentifier()
+        assert column.name.islower()
+        assert column.unit in UNITS
+        assert len(column.definition) > 3
+        assert column.kind != 'number' or column.unit
+        assert not (column.name.endswith('_s') and column.unit not in ('s', 'm')), column.name
+        assert not column.empty or column.name not in table.key
+    assert set(table.key) <= set(names)
+
+
+def test_measures_are_defined_by_themselves() -> None:
+    """Unit and definition of each are those that the measure says of itself."""
+    columns = {column.name: column for column in PAIRS.columns}
+    assert list(columns)[-len(MEASURES):] == list(MEASURES)
+    for name, measure in MEASURES.items():
+        assert columns[name].unit == measure.unit
+        assert columns[name].definition == measure.definition
+
+
+def test_a_table_schema_says_what_the_standard_wants() -> None:
+    """The words of Table Schema, of a column of each kind."""
+    schema = {table.name: table_schema(table) for table in TABLES}
+    fields = {field['name']: field for field in schema['states']['fields']}
+    assert fields['k']['type'] == 'integer'
+    assert fields['k']['constraints'] == {'required': True}
+    assert fields['reverse']['type'] == 'boolean'
+    assert (fields['reverse']['trueValues'], fields['reverse']['falseValues']) \
+        == (['TRUE'], ['FALSE'])
+    assert fields['x_center']['unit'] == 'm'
+    assert fields['x_center']['referencePoint'] == 'center'
+    assert 'scripted' in fields['role']['constraints']['enum']
+    for name, found in schema.items():
+        assert found['missingValues'] == ['', 'NaN']
+        assert ('foreignKeys' in found) is (name != 'runs')
