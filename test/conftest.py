@@ -29,8 +29,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from worker_roles import (  # noqa: E402 - importable from here on
     ALONE,
-    among_graphs,
     group_of,
+    in_company,
     keeps_to_the_clock,
     order_of,
     own_domain_id,
@@ -83,21 +83,23 @@ def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
 @pytest.fixture(scope='module', autouse=True)
 def _company(request: pytest.FixtureRequest,
              tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep from each other those that keep to the clock, and from them what computes."""
+    """Keep from each other, and from what computes, those that keep to the clock."""
     first = next(item for item in request.session.items if item.path == request.path)
     group = group_of(first, ROOT / 'test')
+    own = tmp_path_factory.getbasetemp()
+    # Workers have folders beside each other; a session without any has nobody to wait for.
+    folder = own.parent if 'PYTEST_XDIST_WORKER' in os.environ else own
+    file = folder / 'company.lock'
     if not keeps_to_the_clock(group):
         step_back()
-        yield
+        with in_company(file):
+            yield
         return
     # A collection in the heap that all other tests have left stops this process for half a
     # second: whoever drives a vehicle from here would fall silent, and be braked.
     gc.collect()
     gc.freeze()
-    own = tmp_path_factory.getbasetemp()
-    # Workers have folders beside each other; a session without any has nobody to wait for.
-    folder = own.parent if 'PYTEST_XDIST_WORKER' in os.environ else own
-    with among_graphs(folder / 'graphs.lock', alone=group == ALONE):
+    with in_company(file, alone=group == ALONE):
         yield
     gc.unfreeze()
 

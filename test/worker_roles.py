@@ -30,7 +30,7 @@ REAL_TIME_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
 # These in there do not: they compute, or start what nobody waits for.
 TIMELESS = {'cockpit/test_replay_backend', 'cockpit/test_scene', 'ros/test_markers',
             'ros/test_number_parameters', 'ros/test_ros_messages'}
-# The group of those that no graph may run beside: they assert what clocks show.
+# The group of those that nothing may run beside: they assert what clocks show.
 ALONE = 'alone'
 GRAPH_WORKERS = 2
 MAX_WORKERS = 4
@@ -105,20 +105,20 @@ def step_back() -> None:
     """
     Let a worker compute, for good, only in what others leave of the processors.
 
-    Whoever wakes up takes the place of an idle task at once, so that clocks don't show it.
+    Whoever wakes up takes the place of an idle task at once.
     """
     if int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1')) > 1:
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
 @contextmanager
-def among_graphs(file: Path, *, alone: bool) -> Iterator[None]:
+def in_company(file: Path, *, alone: bool = False) -> Iterator[None]:
     """
-    Wait until no other worker runs a graph, or only until nobody is alone.
+    Wait until no other worker runs anything, or only until nobody is alone.
 
     Who wants to be alone gets there last: others don't wait for it while some of them work.
 
-    :param file: that all workers with graphs lock.
+    :param file: that all workers lock.
     """
     with file.open('a') as handle:
         fcntl.flock(handle, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
