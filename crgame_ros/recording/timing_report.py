@@ -27,6 +27,7 @@ from crgame_ros.messages.status_values import read_status
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.export import write_text
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.recorded_plans import OpenRequests
 from crgame_ros.recording.run_contacts import recorded_contacts
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_log import RunLog
@@ -128,7 +129,7 @@ class _Collector:
         self.violations: list[dict[str, Any]] = []
         self.verdicts: list[VehicleDrivability] = []
         self._lasting: dict[str, set[str]] = defaultdict(set)
-        self._asked_ns: dict[tuple[str, int], int] = {}
+        self._open = OpenRequests()
         self._latencies_ms: dict[str, list[float]] = defaultdict(list)
         self._first_latency_ms: dict[str, float] = {}
         self._answers: dict[str, int] = defaultdict(int)
@@ -143,8 +144,7 @@ class _Collector:
             return
         # Of requests and plans, which are large, the stamp is enough.
         if topic in self._requests:
-            # A request that was sent again counts from the last time before its answer.
-            self._asked_ns[self._requests[topic], stamp_ns] = log_time_ns
+            self._open.sent(self._requests[topic], stamp_ns, log_time_ns)
         elif topic in self._plans:
             self._take_plan(self._plans[topic], stamp_ns, log_time_ns)
         else:
@@ -161,10 +161,10 @@ class _Collector:
 
     def _take_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1
-        asked_ns = self._asked_ns.pop((av, stamp_ns), None)
-        if asked_ns is None:
+        lapse_ns = self._open.answered(av, stamp_ns, log_time_ns)
+        if lapse_ns is None:
             return
-        latency_ms = (log_time_ns - asked_ns) * 1e-6
+        latency_ms = lapse_ns * 1e-6
         if stamp_ns == self._run.game.scheduler.clock_offset_ns:
             # The run waits for this answer, and the planner for its imports.
             self._first_latency_ms[av] = latency_ms

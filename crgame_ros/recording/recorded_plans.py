@@ -1,0 +1,137 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The plans of a recorded run, one after the other, each with the request that it answers."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import header_stamp_ns
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.joints import plan_from_joints, vehicle_joint_names, vehicles_from_joints
+from crgame_ros.messages.plan import Plan
+from crgame_ros.recording.epochs import Epoch, read_epoch
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.storage import BagMessage
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+
+# Requests that are kept whole until they are answered; they are large, and the engine, too, looks
+# no further back.
+_KEPT = 64
+
+
+class RecordedPlan(NamedTuple):
+    """
+    A planner's answer as it was recorded.
+
+    :param av: whose.
+    :param stamp_ns: of the request that it answers [ns]
+    :param k: scenario step of that request; None if the stamp is that of no step.
+    :param latency_s: log time between the request, as it was sent last, and this first answer
+        to it; NaN of every further one, and where the request was not recorded [s]
+    :param plan: in the AV's scenario coordinates; None if what came was none.
+    :param fault: why it was none, empty of a plan.
+    :param told: where its planner was told that the AV is, in the same coordinates; None where
+        the request was not recorded.
+    """
+
+    av: str
+    stamp_ns: int
+    k: int | None
+    latency_s: float
+    plan: Plan | None
+    fault: str
+    told: VehicleState | None
+
+
+class OpenRequests:
+    """When requests were sent that have not been answered yet."""
+
+    def __init__(self) -> None:
+        self._asked_ns: dict[tuple[str, int], int] = {}
+
+    def sent(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
+        """Note a request; one that was sent again counts from the last time."""
+        self._asked_ns[av, stamp_ns] = log_time_ns
+
+    def answered(self, av: str, stamp_ns: int, log_time_ns: int) -> int | None:
+        """
+        Give the log time that an answer has taken [ns].
+
+        :return: None where no request with that stamp is open.
+        """
+        asked_ns = self._asked_ns.pop((av, stamp_ns), None)
+        return None if asked_ns is None else log_time_ns - asked_ns
+
+
+def read_plans(path: Path, epoch: int | None = None,
+               progress: Callable[[float], object] | None = None) -> Iterator[RecordedPlan]:
+    """
+    Read the plans of a run in the order in which they were recorded, without keeping them.
+
+    :param path: a recording, finished or cut off.
+    :param epoch: which run, where a recording holds several; None for the last.
+    :param progress: is told how much of the recording has been read, 0 to 1.
+    :raises InputError: if the recording lacks its documents, or is damaged inside.
+    """
+    with BagReader(path, parts=True, progress=progress) as reader:
+        run = read_epoch(reader, epoch)
+        requests = {f'/{av.id}/plan_request': av.id for av in run.game.avs}
+        plans = {f'/{av.id}/plan': av.id for av in run.game.avs}
+        times, kept = OpenRequests(), OrderedDict[tuple[str, int], BagMessage]()
+        for message in reader.messages((*requests, *plans)):
+            stamp_ns = header_stamp_ns(message.data)
+            if not run.holds(stamp_ns, message.log_time_ns):
+                continue
+            if message.topic in requests:
+                av = requests[message.topic]
+                times.sent(av, stamp_ns, message.log_time_ns)
+                kept[av, stamp_ns] = message
+                if len(kept) > _KEPT * len(requests):
+                    kept.popitem(last=False)
+                continue
+            av = plans[message.topic]
+            lapse_ns = times.answered(av, stamp_ns, message.log_time_ns)
+            plan, fault = _plan(reader, message, av, run)
+            asked = kept.get((av, stamp_ns))
+            yield RecordedPlan(
+                av, stamp_ns, run.game.scheduler.tick_of_stamp(stamp_ns),
+                math.nan if lapse_ns is None else lapse_ns * 1e-9, plan, fault,
+                None if asked is None else _told(reader, asked, av))
+
+
+def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[Plan | None, str]:
+    try:
+        series = from_joint_trajectory(reader.decode(message).message, message.topic)
+        return plan_from_joints(series, av, run.game.scheduler.time_step_ns), ''
+    except InputError as error:
+        return None, error.what
+
+
+def _told(reader: BagReader, message: BagMessage, av: str) -> VehicleState | None:
+    """Give the state of the AV itself in a request; None if it does not say."""
+    try:
+        request = reader.decode(message).message
+        places = [request.joint_names.index(name) for name in vehicle_joint_names(av)]
+        point = request.points[0]
+        joints = [np.asarray(row)[places]
+                  for row in (point.positions, point.velocities, point.accelerations)]
+    except (InputError, ValueError, LookupError):
+        return None
+    return VehicleState(*vehicles_from_joints(*joints).tolist())
