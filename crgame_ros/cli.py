@@ -36,6 +36,7 @@ Tools around crgame_ros, the driving simulator for motion planning.
   crgame offline   run a game as fast as it can, without ROS
   crgame convert   turn a recording into a CommonRoad scenario
   crgame measure   how critical a recorded run was, and how it was driven
+  crgame figures   a paper's figures of recorded runs
   crgame replay    the recorded human against other planners
   crgame recover   finish a recording whose recorder was killed
   crgame info      what is in a recording
@@ -93,6 +94,7 @@ def _build_parser() -> argparse.ArgumentParser:
     convert.set_defaults(command=_convert)
     _add_measure(commands.add_parser('measure',
                                      help='how critical a run was, and how it was driven'))
+    _add_figures(commands.add_parser('figures', help="a paper's figures of recorded runs"))
     _add_replay(commands.add_parser('replay',
                                     help='the recorded human against other planners'))
     recover = commands.add_parser('recover', help='finish a killed recording')
@@ -114,6 +116,11 @@ def _build_parser() -> argparse.ArgumentParser:
 
 def _add_measure(parser: argparse.ArgumentParser) -> None:
     from crgame_ros.analysis.measure_command import add_arguments
+    add_arguments(parser)
+
+
+def _add_figures(parser: argparse.ArgumentParser) -> None:
+    from crgame_ros.analysis.pictures.figures_command import add_arguments
     add_arguments(parser)
 
 

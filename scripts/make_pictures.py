@@ -16,10 +16,13 @@
 
 from pathlib import Path
 
+from crgame_ros.analysis.pictures.figure_style import figure_bytes
 from crgame_ros.analysis.pictures.run_figure import draw_run
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory, share_directory
+from crgame_ros.recording.export import write_bytes
+from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 
@@ -34,7 +37,7 @@ def main() -> None:
         request = RunRequest(game=Path(scenarios_directory() / f'{name}.yaml'))
         result = run_offline(build_setup(effective_game(request)))
         path = folder / f'{name}.png'
-        draw_run(result, times_s).savefig(path, dpi=110)
+        write_bytes(figure_bytes(draw_run(run_record_of(result), times_s), 'png'), path)
         print(path)
 
 
