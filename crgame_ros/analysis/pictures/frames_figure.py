@@ -82,7 +82,7 @@ def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] 
         figure.legend(handles=handles, loc='lower left', ncols=4 * columns, borderaxespad=0.1,
                       bbox_to_anchor=(0.0, 0.0), handlelength=1.6, columnspacing=1.2,
                       handletextpad=0.5, borderpad=0.1, labelspacing=0.4)
-        _draw_scale(figure, metre, legend - 0.5 * LEGEND_LINE - 3.0)
+        _draw_scale(figure, metre, 0.5 * LEGEND_LINE)
     return figure
 
 
