@@ -30,6 +30,7 @@ from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
+from PIL import Image
 import pytest
 
 pytestmark = pytest.mark.xdist_group('figures')
@@ -144,10 +145,17 @@ def test_frames_at_given_times(run: Path, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ['frames.png']
 
 
-def test_a_run_becomes_a_film(run: Path, tmp_path: Path) -> None:
-    """And nothing else, unless figures are asked for."""
-    assert main(['figures', str(run), '--video', str(tmp_path / 'run.gif')]) == 0
-    assert [path.name for path in tmp_path.iterdir()] == ['run.gif']
+def test_a_run_becomes_a_film(result: OfflineResult, recorder: Any, tmp_path: Path) -> None:
+    """Of its first second; and nothing else is made, unless figures are asked for."""
+    messages = [each for each in recorder.messages(result, log_ns=LOG_NS)
+                if each[2] <= LOG_NS + 1_005_000_000]
+    recorder.ours(tmp_path / 'run' / 'bag', messages)
+    film = tmp_path / 'films' / 'run.gif'
+    assert main(['figures', str(tmp_path / 'run'), '--video', str(film)]) == 0
+    assert [path.name for path in film.parent.iterdir()] == ['run.gif']
+    with Image.open(film) as pictures:
+        assert pictures.n_frames == 11
+    assert not (tmp_path / 'run' / 'figures').exists()
 
 
 @pytest.mark.parametrize('words', [

@@ -96,15 +96,16 @@ def new_figure(columns: int, height: float) -> Figure:
     return figure
 
 
-def figure_bytes(figure: Figure, file_format: str) -> bytes:
+def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION) -> bytes:
     """
     Give a figure as a file has it, without a date: equal figures give equal bytes.
 
     :param file_format: one of `FORMATS`.
+    :param resolution: of PNG [dots per inch].
     """
     buffer = BytesIO()
     with paper_style():
-        figure.savefig(buffer, format=file_format, dpi=RESOLUTION,
+        figure.savefig(buffer, format=file_format, dpi=resolution,
                        metadata=_METADATA[file_format])
     return buffer.getvalue()
 

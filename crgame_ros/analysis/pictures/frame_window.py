@@ -38,7 +38,7 @@ LEAST_BESIDE = 2.5
 # No window is smaller [m].
 LEAST_LENGTH, LEAST_HEIGHT = 45.0, 15.0
 # Longer than high at least, and at most, by so much.
-SQUAREST, LONGEST = 1.0, 6.5
+SQUAREST, LONGEST = 1.0, 9.0
 # A camera that stands shows so much at most; beyond that it goes with the vehicle in focus [m].
 MOST_STANDING = 110.0
 

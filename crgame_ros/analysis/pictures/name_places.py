@@ -64,26 +64,28 @@ def place_names(frame: SceneFrame, text_height: float,
             continue
         size = np.array((CHARACTER_WIDTH * len(body.id), 1.0)) * text_height
         low, high = body.corners.min(axis=0), body.corners.max(axis=0)
-        best, least = np.zeros(2), np.inf
-        for attempt in range(_ATTEMPTS):
-            away = 0.5 * (high - low) + 0.5 * size + text_height * (_GAP + attempt * _STEP)
-            for direction in _DIRECTIONS:
-                middle = 0.5 * (low + high) + direction * away
-                middle = np.clip(middle, -half + 0.7 * size, half - 0.7 * size)
-                box = np.concatenate((middle - 0.5 * size, middle + 0.5 * size))
-                cost = (10.0 * sum(_overlap(box, other) for other in boxes) / size.prod()
-                        + 0.02 * _inside(box, ways) + 0.1 * attempt)
-                if cost < least:
-                    best, least = middle, cost
+        attempts = np.repeat(np.arange(_ATTEMPTS), len(_DIRECTIONS))
+        away = 0.5 * (high - low) + 0.5 * size + text_height * (
+            _GAP + attempts[:, None] * _STEP)
+        middles = np.clip(0.5 * (low + high) + np.tile(_DIRECTIONS, (_ATTEMPTS, 1)) * away,
+                          -half + 0.7 * size, half - 0.7 * size)
+        tried = np.concatenate((middles - 0.5 * size, middles + 0.5 * size), axis=1)
+        cost = (10.0 * _overlaps(tried, np.array(boxes)) / size.prod()
+                + 0.02 * _counts(tried, ways) + 0.1 * attempts)
+        best = middles[int(np.argmin(cost))]
         boxes.append(np.concatenate((best - 0.5 * size, best + 0.5 * size)))
         names.append(PlacedName(body.id, float(best[0]), float(best[1]), body.colour))
     return tuple(names)
 
 
-def _overlap(box: FloatArray, other: FloatArray) -> float:
-    sides = np.minimum(box[2:], other[2:]) - np.maximum(box[:2], other[:2])
-    return float(np.maximum(sides, 0.0).prod())
+def _overlaps(tried: FloatArray, others: FloatArray) -> FloatArray:
+    """Give what each box (T, 4) has in common with all others (B, 4) [m^2]."""
+    sides = (np.minimum(tried[:, None, 2:], others[None, :, 2:])
+             - np.maximum(tried[:, None, :2], others[None, :, :2]))
+    return np.asarray(np.maximum(sides, 0.0).prod(axis=2).sum(axis=1))
 
 
-def _inside(box: FloatArray, points: FloatArray) -> int:
-    return int(np.count_nonzero(((points > box[:2]) & (points < box[2:])).all(axis=1)))
+def _counts(tried: FloatArray, points: FloatArray) -> FloatArray:
+    """Count the points (N, 2) in each box (T, 4)."""
+    inside = (points > tried[:, None, :2]) & (points < tried[:, None, 2:])
+    return np.asarray(inside.all(axis=2).sum(axis=1), dtype=np.float64)

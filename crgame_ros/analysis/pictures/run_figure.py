@@ -35,7 +35,7 @@ import numpy as np
 _BELOW, _GAP, _MARGIN = 1.7, 0.04, 0.45
 _POINTS = 72.0
 # Frames show at least so much road [m].
-LEAST = 105.0
+LEAST = 145.0
 
 
 def draw_run(record: RunRecord, times_s: Sequence[float]) -> Figure:

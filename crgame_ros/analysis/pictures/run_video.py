@@ -14,25 +14,28 @@
 # limitations under the License.
 """A run as a video from above, in real time: MP4 by ffmpeg, or GIF by Pillow."""
 
-from collections.abc import Callable
-from io import BytesIO
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 import math
 import os
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import Any
 
 from crgame_ros.analysis.pictures.figure_style import new_figure, paper_style
 from crgame_ros.analysis.pictures.frame_axes import draw_frame
+from crgame_ros.analysis.pictures.frame_window import FrameWindow
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.errors import InputError
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
 from PIL import Image
 
 # Of the picture [px], and the height of what it shows in widths.
 WIDTHS_PX = {'.mp4': 1280, '.gif': 720}
-_FLATTEST, _HIGHEST = 0.2, 0.6
+_FLATTEST, _HIGHEST = 0.3, 0.6
 # Nobody sees more pictures in a second.
 MOST_RATE = 30.0
 # Around the vehicle in focus [m].
@@ -56,22 +59,26 @@ def write_video(scene: FrameScene, path: Path,
     step_s = scene.log.game.scheduler.time_step_s
     stride = max(1, math.ceil(1.0 / (MOST_RATE * step_s) - 1e-9))
     rows = range(0, len(scene.log.ks), stride)
-    windows = scene.windows(rows, standing=False, reach=VIDEO_REACH)
-    figure = _empty(path.suffix, windows[0].height / windows[0].length)
+    figure, windows = _prepared(path.suffix, scene.windows(
+        rows, standing=False, reach=VIDEO_REACH))
     writer = _writer(path.suffix, 1.0 / (stride * step_s))
     temporary = path.with_name(f'.{path.stem}.{os.getpid()}.part{path.suffix}')
     try:
         with paper_style(), writer.saving(figure, str(temporary), _INCH_PX):
+            axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
             for number, (row, window) in enumerate(zip(rows, windows, strict=True)):
-                figure.clear()
-                axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+                # Axes are dear to make.
+                for artist in (*axes.patches, *axes.lines, *axes.collections, *axes.texts):
+                    artist.remove()
                 frame = scene.at(int(scene.log.ks[row]), window)
                 draw_frame(axes, frame, figure.get_figwidth() * _POINTS / window.length,
                            f'{frame.time_s:.1f} s')
-                axes.set_ylim(*_limits(axes.get_xlim(), figure))
                 writer.grab_frame()
                 progress((number + 1) / len(rows))
         temporary.replace(path)
+    except CalledProcessError as error:
+        raise InputError('ffmpeg could not write it', str(path),
+                         'see that it has libx264, or name a *.gif') from error
     except OSError as error:
         raise InputError(f'cannot be written ({error.strerror or error})', str(path),
                          'choose a folder that can be written') from error
@@ -86,20 +93,20 @@ def video_path(path: Path) -> Path:
     return path.with_suffix('.gif') if lacks else path
 
 
-def _empty(suffix: str, flatness: float) -> Figure:
+def _prepared(suffix: str, windows: Sequence[FrameWindow]
+              ) -> tuple[Figure, list[FrameWindow]]:
+    """Make an empty picture, and the windows as high or long as to fill it."""
+    length, height = windows[0].length, windows[0].height
     width = WIDTHS_PX[suffix]
     # Video codecs want even numbers of pixels.
-    height = 2 * round(0.5 * width * min(max(flatness, _FLATTEST), _HIGHEST))
+    lines = 2 * round(0.5 * width * min(max(height / length, _FLATTEST), _HIGHEST))
+    length = max(length, height * width / lines)
     figure = new_figure(1, 1.0)
     figure.set_layout_engine('none')
-    figure.set_size_inches(width / _INCH_PX, height / _INCH_PX)
-    return figure
-
-
-def _limits(across: tuple[float, float], figure: Figure) -> tuple[float, float]:
-    """Give limits of the vertical axis at the scale of the horizontal one [m]."""
-    half = 0.5 * (across[1] - across[0]) * figure.get_figheight() / figure.get_figwidth()
-    return -half, half
+    figure.set_dpi(_INCH_PX)
+    figure.set_size_inches(width / _INCH_PX, lines / _INCH_PX)
+    return figure, [replace(window, length=length, height=length * lines / width)
+                    for window in windows]
 
 
 def _writer(suffix: str, rate: Any) -> AbstractMovieWriter:
@@ -124,9 +131,10 @@ class _GifWriter(PillowWriter):
 
     def grab_frame(self, **savefig_kwargs: Any) -> None:
         """Take a picture."""
-        buffer = BytesIO()
-        self.fig.savefig(buffer, format='rgba', dpi=self.dpi, **savefig_kwargs)
-        picture = Image.frombytes('RGBA', self.frame_size, buffer.getvalue()).convert('RGB')
+        canvas = self.fig.canvas
+        assert isinstance(canvas, FigureCanvasAgg)
+        canvas.draw()
+        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB')
         self._taken.append(picture.quantize(128))
 
     def finish(self) -> None:

@@ -129,6 +129,8 @@ class FrameScene:
         places = log.vehicle_states[:, :, :2].reshape(-1, 2)
         low, high = places.min(axis=0) - 2.0 * REACH, places.max(axis=0) + 2.0 * REACH
         self.road = PicturedRoad(network, (*low.tolist(), *high.tolist()))
+        self._reaches = np.array([item.shape.radius + abs(item.rear_to_center)
+                                  for item in log.descriptions])
         self._cut: tuple[FrameWindow, RoadInWindow] | None = None
 
     def at(self, k: int, window: FrameWindow, labelled: Collection[str] | None = None,
@@ -198,10 +200,14 @@ class FrameScene:
         bodies = []
         half = 0.5 * np.array((window.length, window.height))
         count = len(self.log.vehicles)
+        away = np.hypot(*(poses[:, :2] - (window.x, window.y)).T)
+        near = away < np.hypot(*half) + self._reaches
         for i in (*range(count, len(poses)), *reversed(range(count))):
+            # Of whoever is absent the comparison with NaN is false.
+            if not near[i]:
+                continue
             item = self.log.descriptions[i]
             corners = window.of(footprints([item], poses[i:i + 1])[0])
-            # Comparisons with NaN, of whoever is absent, are false.
             if not ((corners.max(axis=0) > -half) & (corners.min(axis=0) < half)).all():
                 continue
             bodies.append(FrameBody(

@@ -15,6 +15,7 @@
 """Videos last as long as the run, one picture for each scenario step."""
 
 from dataclasses import replace
+import os
 from pathlib import Path
 
 from crgame_ros.analysis.pictures import run_video
@@ -65,6 +66,19 @@ def test_with_ffmpeg_it_is_mp4(cut_in: RunRecord, tmp_path: Path) -> None:
     """An ISO file, which says so in its first bytes."""
     written = write_video(FrameScene(_short(cut_in, 4)), tmp_path / 'run.mp4')
     assert written.read_bytes()[4:8] == b'ftyp'
+
+
+def test_an_ffmpeg_that_fails_is_told_in_a_line(cut_in: RunRecord, tmp_path: Path,
+                                                monkeypatch: pytest.MonkeyPatch) -> None:
+    """One without the codec, for instance."""
+    program = tmp_path / 'bin' / 'ffmpeg'
+    program.parent.mkdir()
+    program.write_text('#!/bin/sh\n[ "$1" = -version ] || { cat >/dev/null; exit 1; }\n')
+    program.chmod(0o755)
+    monkeypatch.setenv('PATH', f'{program.parent}:{os.environ["PATH"]}')
+    with pytest.raises(InputError, match='ffmpeg could not write it'):
+        write_video(FrameScene(_short(cut_in, 2)), tmp_path / 'run.mp4')
+    assert [path.name for path in tmp_path.iterdir()] == ['bin']
 
 
 @pytest.mark.parametrize('name', ['run.avi', 'missing/run.gif'])
