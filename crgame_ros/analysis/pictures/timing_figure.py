@@ -56,12 +56,12 @@ class TimedRun:
 
     @property
     def scheduled_s(self) -> FloatArray:
-        """Ideal starts S_n on the original anchor (`docs/timing.md`) (R) [s]."""
+        """Scheduled starts S_n on the original anchor (`docs/timing.md`) (R) [s]."""
         return np.asarray(self.cycles.column('ideal_s') - self.cycles.column('dropped_s'))
 
     @property
     def actual_s(self) -> FloatArray:
-        """Starts tau_n as they happened (R) [s]."""
+        """Measured starts tau_n (R) [s]."""
         return self.cycles.column('actual_s')
 
     @property
