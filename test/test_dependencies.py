@@ -29,6 +29,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 # By imported name: the pip package, and the rosdep key; None: Debian has none that would do.
 THIRD_PARTY = {
+    'PIL': ('pillow', 'python3-pil'),
     'aiohttp': ('aiohttp', 'python3-aiohttp'),
     'commonroad': ('commonroad-io', None),
     'commonroad_clcs': ('commonroad-clcs', None),

@@ -168,9 +168,14 @@ def write_text(text: str, path: Path) -> None:
 
     :raises InputError: if it cannot be written.
     """
+    write_bytes(text.encode(), path)
+
+
+def write_bytes(content: bytes, path: Path) -> None:
+    """Write a file as `write_text` does."""
     temporary = path.with_name(f'.{path.name}.{os.getpid()}.part')
     try:
-        temporary.write_text(text, encoding='utf-8')
+        temporary.write_bytes(content)
         temporary.replace(path)
     except OSError as error:
         raise InputError(f'cannot be written ({error.strerror})', str(path),

@@ -12,147 +12,80 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Pictures of a run: snapshots from above and profiles over time (as CRG figures 8 and 9)."""
+"""A run at a glance: frames at some times, velocities and distances below."""
 
 from collections.abc import Sequence
-import math
 
-from crgame_ros.game.objects import ObjectDescription
-from crgame_ros.geometry.outline import outline, placed
-from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.roads.road_surface import lanelet_ring
-from crgame_ros.simulation.offline import OfflineResult
-from crgame_ros.vehicle.state import StateColumn
+from crgame_ros.analysis.pictures.figure_style import new_figure, paper_style, WIDTHS
+from crgame_ros.analysis.pictures.frame_axes import draw_frame
+from crgame_ros.analysis.pictures.profiles_figure import (
+    draw_line,
+    draw_over_time,
+    log_times,
+    OVER_TIME,
+)
+from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.game.objects import Role
+from crgame_ros.recording.run_record import RunRecord
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-# Okabe and Ito's palette, told apart by the colour-blind: humans vermilion, AVs blue.
-HUMAN_COLOUR = '#d55e00'
-AV_COLOURS = ('#0072b2', '#56b4e9', '#009e73')
-OBJECT_COLOUR = '#777777'
-ROAD_COLOUR = '#d9d9d9'
-# Of road beyond the outermost vehicle's rear axle [m].
-MARGIN = 8.0
+# Of the panels below, between panels, and of the page [inch].
+_BELOW, _GAP, _MARGIN = 1.7, 0.04, 0.45
+_POINTS = 72.0
+# Frames show at least so much road [m].
+LEAST = 145.0
 
 
-def colour_of(vehicle_id: str) -> str:
-    """Give a driven vehicle its colour."""
-    if vehicle_id.startswith('hv'):
-        return HUMAN_COLOUR
-    return AV_COLOURS[int(vehicle_id[2:]) % len(AV_COLOURS)]
-
-
-def draw_run(result: OfflineResult, times_s: Sequence[float], *, reach: float = 45.0) -> Figure:
+def draw_run(record: RunRecord, times_s: Sequence[float]) -> Figure:
     """
-    Draw a run: one view from above for each time, and profiles below.
+    Draw a run over the two columns of a page.
 
-    :param times_s: times of the snapshots [s]
-    :param reach: half the length of road shown around the first AV [m]; more where another driven
-        vehicle would be left out, at most three times as much.
+    :param record: of a recording or an offline run.
+    :param times_s: of the frames, since the start of the run [s]
     """
-    rows = len(times_s)
-    window = _window(result, times_s, reach)
-    figure = Figure(figsize=(9.0, 0.95 * rows + 3.0), layout='constrained')
-    grid = figure.add_gridspec(rows + 3, 2)
-    for row, time_s in enumerate(times_s):
-        _snapshot(figure.add_subplot(grid[row, :]), result, time_s, window)
-    _profile(figure.add_subplot(grid[rows:, 0]), result, StateColumn.SPEED, 'speed [m/s]')
-    _gap(figure.add_subplot(grid[rows:, 1]), result)
+    scene = FrameScene(record.log)
+    ks = [scene.k_at(time_s) for time_s in times_s]
+    windows = scene.windows([scene.row(k) for k in ks], standing=False, least=LEAST)
+    width = WIDTHS[2]
+    metre = width / windows[0].length
+    height = windows[0].height * metre
+    total = len(ks) * (height + _GAP) + _BELOW
+    with paper_style():
+        figure = new_figure(2, total)
+        figure.set_layout_engine('none')
+        for row, (k, window) in enumerate(zip(ks, windows, strict=True)):
+            axes = figure.add_axes((0.0, 1.0 - ((row + 1) * height + row * _GAP) / total,
+                                    1.0, height / total))
+            frame = scene.at(k, window)
+            draw_frame(axes, frame, metre * _POINTS, f'{frame.time_s:g} s')
+        place = 0.5 * width - _MARGIN - 0.1
+        for number, draw in enumerate((_draw_speeds, _draw_distances)):
+            axes = figure.add_axes(((_MARGIN + 0.5 * number * width) / width, 0.36 / total,
+                                    place / width, (_BELOW - 0.5) / total))
+            draw(axes, record, scene)
+            axes.set_xlabel('time [s]')
+            axes.grid(visible=True)
+            if axes.lines:
+                axes.legend()
     return figure
 
 
-def _at(result: OfflineResult, time_s: float) -> tuple[int, Array, '_View']:
-    """Give the step, the states (V, 8) and the view from the first AV, else the first human."""
-    setup = result.setup
-    n = min(round(time_s / setup.scheduler.dt_s), len(result.vehicle_states) - 1)
-    states = result.vehicle_states[n]
-    return n, states, _View(states[len(setup.humans)] if setup.avs else states[0])
+def _draw_speeds(axes: Axes, record: RunRecord, scene: FrameScene) -> None:
+    draw_over_time(axes, record, scene.styles, *OVER_TIME['velocity'])
 
 
-def _window(result: OfflineResult, times_s: Sequence[float],
-            reach: float) -> tuple[float, float]:
-    """Choose how far back and ahead all snapshots show, so that they have one scale [m]."""
-    ahead = np.concatenate([view.of(states[:, :2])[:, 0] for _, states, view in (
-        _at(result, time_s) for time_s in times_s)])
-    return (float(np.clip(ahead.min() - MARGIN, -3.0 * reach, -0.6 * reach)),
-            float(np.clip(ahead.max() + MARGIN, 1.4 * reach, 3.0 * reach)))
-
-
-def _snapshot(axes: Axes, result: OfflineResult, time_s: float,
-              window: tuple[float, float]) -> None:
-    setup = result.setup
-    n, states, view = _at(result, time_s)
-    for lanelet in setup.loaded.scenario.lanelet_network.lanelets:
-        axes.add_patch(Polygon(view.of(lanelet_ring(lanelet)), facecolor=ROAD_COLOUR,
-                               edgecolor='white', linewidth=0.8))
-    tick = n // setup.scheduler.steps_per_tick
-    for description, pose in zip(setup.obstacles.descriptions, result.object_poses[tick],
-                                 strict=True):
-        if math.isfinite(pose[0]):
-            _footprint(axes, view, description, pose, OBJECT_COLOUR)
-    for description, state in zip(setup.vehicle_descriptions, states, strict=True):
-        center = shifted(state[:3], description.rear_to_center)
-        _footprint(axes, view, description, center, colour_of(description.id))
-    axes.set_xlim(*window)
-    half_height = 0.065 * (window[1] - window[0])
-    axes.set_ylim(-half_height, half_height)
-    axes.set_aspect('equal')
-    axes.set_yticks([])
-    axes.set_xticks([])
-    axes.set_ylabel(f'{time_s:g} s', rotation=0, ha='right', va='center')
-
-
-class _View:
-    """Coordinates seen from a vehicle, heading to the right."""
-
-    def __init__(self, focus: Array) -> None:
-        cos, sin = math.cos(focus[2]), math.sin(focus[2])
-        self._origin = focus[:2]
-        self._turn = np.array(((cos, -sin), (sin, cos)))
-
-    def of(self, points: Array) -> Array:
-        """Map points (N, 2) from map."""
-        mapped: Array = np.asarray((points - self._origin) @ self._turn, dtype=np.float64)
-        return mapped
-
-
-def _footprint(axes: Axes, view: _View, description: ObjectDescription, center: Array,
-               colour: str) -> None:
-    corners = placed(outline(description.shape), center)
-    axes.add_patch(Polygon(view.of(corners), facecolor=colour, edgecolor='black', linewidth=0.6,
-                           zorder=3))
-
-
-def _times(result: OfflineResult) -> Array:
-    return np.asarray(np.arange(len(result.vehicle_states)) * result.setup.scheduler.dt_s,
-                      dtype=np.float64)
-
-
-def _profile(axes: Axes, result: OfflineResult, column: StateColumn, label: str) -> None:
-    for vehicle_id in result.setup.vehicle_ids:
-        axes.plot(_times(result), result.states_of(vehicle_id)[:, column],
-                  color=colour_of(vehicle_id), label=vehicle_id)
-    axes.set_xlabel('time [s]')
-    axes.set_ylabel(label)
-    axes.grid(alpha=0.3)
-    axes.legend()
-
-
-def _gap(axes: Axes, result: OfflineResult) -> None:
-    """Plot the distance between the first human's vehicle and each AV."""
-    setup = result.setup
-    if setup.humans:
-        human = result.states_of(setup.humans[0].id)
-        for av in setup.avs:
-            state = result.states_of(av.id)
-            axes.plot(_times(result), np.hypot(human[:, 0] - state[:, 0],
-                                               human[:, 1] - state[:, 1]),
-                      color=colour_of(av.id), label=f'{av.id} to {setup.humans[0].id}')
-        axes.legend()
-    axes.set_xlabel('time [s]')
+def _draw_distances(axes: Axes, record: RunRecord, scene: FrameScene) -> None:
+    """Draw the distance between the first human's vehicle and each AV."""
+    log = record.log
+    roles = [item.role for item in log.vehicles]
     axes.set_ylabel('distance of rear axles [m]')
-    axes.grid(alpha=0.3)
+    if Role.HUMAN not in roles:
+        return
+    human = roles.index(Role.HUMAN)
+    for i, item in enumerate(log.vehicles):
+        if item.role is Role.AUTONOMOUS:
+            away = log.vehicle_states[:, i, :2] - log.vehicle_states[:, human, :2]
+            draw_line(axes, log_times(record), np.hypot(*away.T), item.id, scene.styles, i)
+    axes.set_xlim(*log_times(record)[[0, -1]])

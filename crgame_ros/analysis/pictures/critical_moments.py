@@ -1,0 +1,168 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The moments of a run that a paper would show: contacts, worst values, and events."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+import math
+from typing import Any, NamedTuple, Protocol
+
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
+from crgame_ros.recording.run_record import RunRecord
+
+# Moments so close to each other are one [s].
+TOGETHER_S = 1.0
+# Longer times to collision are no moment [s].
+NOTICED_S = 10.0
+# Groups, in the order of their ranks.
+_CONTACT, _CRITICAL, _EVENT, _NOTICED, _CLOSE = range(5)
+# Of a value that is zero, to be divided by.
+_LEAST = 1e-3
+
+
+class Moment(NamedTuple):
+    """
+    A moment worth a look.
+
+    :param time_s: since the start of the run [s]
+    :param why: what happens, in a few words.
+    :param vehicles: whose moment it is, who drives first.
+    """
+
+    time_s: float
+    why: str
+    vehicles: tuple[str, ...]
+
+
+class Touching(Protocol):
+    """What of a contact is needed: of `Contact`, or of an entry in `timing.json`."""
+
+    @property
+    def vehicle_id(self) -> str:
+        """Give the driven vehicle."""
+
+    @property
+    def other_id(self) -> str:
+        """Give what it touched."""
+
+    @property
+    def n(self) -> int:
+        """Give the simulation step."""
+
+
+class Touch(NamedTuple):
+    """An entry of `contacts` in `timing.json`."""
+
+    vehicle_id: str
+    other_id: str
+    n: int
+
+    @classmethod
+    def of(cls, entry: Mapping[str, Any]) -> 'Touch':
+        """Read one."""
+        return cls(entry['vehicle'], entry['with'], entry['n'])
+
+
+class _Ranked(NamedTuple):
+    """A moment with what it is ranked by, smaller first."""
+
+    group: int
+    rank: float
+    moment: Moment
+
+
+def critical_moments(record: RunRecord, criticality: Criticality,
+                     contacts: Sequence[Touching] = ()) -> tuple[Moment, ...]:
+    """
+    Find the moments of a run, the most critical one first.
+
+    Contacts come first, then values beyond their thresholds by how far they are beyond, events as
+    they fired, the smallest ttc that is not critical, and at last the smallest distance of each
+    vehicle. Moments within `TOGETHER_S` of a
+    more critical one are told as part of it, at its time.
+
+    :param criticality: of the same run (`measure_log`).
+    :param contacts: of the run.
+    """
+    scheduler = record.log.game.scheduler
+    dt_s = scheduler.dt_s
+    found = [_contact(item.n * dt_s, (item.vehicle_id, item.other_id)) for item in contacts]
+    found += _critical(criticality)
+    found += [_Ranked(_EVENT, event.n * dt_s, Moment(
+        event.n * dt_s, f'event {event.name}', ())) for event in record.fired]
+    found += _close(criticality, (record.log.ks[0] - scheduler.k0) * scheduler.time_step_s)
+    moments: list[Moment] = []
+    for _, _, moment in sorted(found):
+        for place, other in enumerate(moments):
+            if abs(other.time_s - moment.time_s) <= TOGETHER_S:
+                moments[place] = _merged(other, moment)
+                break
+        else:
+            moments.append(moment)
+    return tuple(moments)
+
+
+def _critical(criticality: Criticality) -> Iterator[_Ranked]:
+    limits = criticality.thresholds
+    for vehicle in criticality.report():
+        for name, limit in (('ttc', limits.ttc_s), ('drac', limits.drac)):
+            worst = vehicle.worst.get(name)
+            value = 0.0 if worst is None else worst.value
+            if worst is None or value == 0.0 or math.isinf(value):
+                # They touch.
+                continue
+            excess = limit / value if MEASURES[name].worst < 0 else value / limit
+            if excess > 1.0 or name == 'ttc' and value < NOTICED_S:
+                yield _Ranked(_CRITICAL if excess > 1.0 else _NOTICED, -excess, Moment(
+                    worst.time_s,
+                    f'{name} of {vehicle.vehicle_id} to {worst.other} is {value:.2f} '
+                    f'{MEASURES[name].unit}', (vehicle.vehicle_id, worst.other)))
+        for crossing in vehicle.crossings:
+            if crossing.pet_s < limits.pet_s:
+                first, second = (criticality.ids[i] for i in (crossing.first, crossing.second))
+                yield _Ranked(_CRITICAL, -limits.pet_s / max(crossing.pet_s, _LEAST), Moment(
+                    crossing.entered_s,
+                    f'{second} enters {crossing.pet_s:.2f} s after {first} has left (pet)',
+                    tuple(sorted((first, second), key=lambda each: each != vehicle.vehicle_id))))
+
+
+def _close(criticality: Criticality, start_s: float) -> Iterator[_Ranked]:
+    driven = [vehicle.vehicle_id for vehicle in criticality.report()]
+    for vehicle in criticality.report():
+        worst = vehicle.worst.get('min_distance')
+        if worst is None or worst.time_s == start_s and worst.value > 0.0:
+            # How far apart they begin says nothing of the run.
+            continue
+        both = vehicle.vehicle_id, worst.other
+        # Of two driven vehicles both say the same.
+        pair = tuple(sorted(both, key=driven.index)) if worst.other in driven else both
+        yield _contact(worst.time_s, pair) if worst.value == 0.0 else _Ranked(
+            _CLOSE, worst.value, Moment(
+                worst.time_s, f'{named(pair)} are {worst.value:.2f} m apart', pair))
+
+
+def _contact(time_s: float, pair: tuple[str, ...]) -> _Ranked:
+    return _Ranked(_CONTACT, time_s, Moment(time_s, f'{named(pair)} touch', pair))
+
+
+def named(names: Collection[str]) -> str:
+    """Name vehicles in a sentence."""
+    *others, last = names or ('nobody',)
+    return f'{", ".join(others)} and {last}' if others else last
+
+
+def _merged(moment: Moment, later: Moment) -> Moment:
+    """Tell a less critical moment as part of another."""
+    why = moment.why if later.why in moment.why else f'{moment.why}; {later.why}'
+    return Moment(moment.time_s, why, tuple(dict.fromkeys((*moment.vehicles, *later.vehicles))))

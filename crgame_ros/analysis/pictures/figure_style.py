@@ -1,0 +1,141 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How pictures for papers look, and how they are written: the same run gives the same bytes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BytesIO
+from typing import Any
+
+from crgame_ros.game.objects import ObjectDescription, Role
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+# Of IEEE's two-column pages, by the number of columns [inch].
+WIDTHS = {1: 3.5, 2: 7.16}
+FORMATS = ('svg', 'pdf', 'png')
+# Of PNG, as journals ask for line art beside photographs [dots per inch].
+RESOLUTION = 300
+# Okabe and Ito's palette, told apart by the colour-blind: humans warm, AVs cold colours.
+HUMAN_COLOURS = ('#d55e00', '#e69f00', '#cc79a7')
+AV_COLOURS = ('#0072b2', '#56b4e9', '#009e73')
+OBJECT_COLOUR = '#8c8c8c'
+PERSON_COLOUR = '#4d4d4d'
+PERSONS = ('pedestrian', 'bicycle', 'motorcycle')
+ROAD_COLOUR, LANE_COLOUR = '#ebebeb', '#ffffff'
+EDGE_COLOUR, DIVIDER_COLOUR = '#7f7f7f', '#9a9a9a'
+INK = '#222222'
+# The same without colours: where one drives more than there are of each, they begin anew.
+HUMAN_DASHES = ('-', (0, (6, 1, 1, 1)), (0, (6, 1, 1, 1, 1, 1)))
+AV_DASHES = ((0, (4, 1.2)), (0, (1.2, 1.2)), (0, (4, 1.2, 1.2, 1.2)))
+HUMAN_MARKERS, AV_MARKERS = ('o', 'v', 'P'), ('s', '^', 'D')
+
+_SETTINGS: dict[Any, Any] = {
+    'font.family': 'STIXGeneral', 'mathtext.fontset': 'stix', 'font.size': 8.0,
+    'axes.titlesize': 8.0, 'axes.labelsize': 8.0, 'xtick.labelsize': 7.0, 'ytick.labelsize': 7.0,
+    'legend.fontsize': 7.0, 'axes.linewidth': 0.6, 'axes.labelpad': 1.5,
+    'grid.linewidth': 0.4, 'grid.color': '#d0d0d0',
+    'xtick.major.width': 0.5, 'ytick.major.width': 0.5, 'xtick.direction': 'in',
+    'ytick.direction': 'in', 'lines.linewidth': 1.1, 'lines.markersize': 3.5,
+    'legend.frameon': False, 'legend.handlelength': 2.6, 'axes.axisbelow': True,
+    # Text as paths in SVG needs no font where it is read; PDF embeds TrueType, as IEEE asks.
+    'svg.fonttype': 'path', 'svg.hashsalt': 'crgame_ros', 'pdf.fonttype': 42}
+# Nothing in a file tells when it was made.
+_METADATA = {'svg': {'Date': None, 'Creator': 'crgame_ros'},
+             'pdf': {'CreationDate': None, 'Creator': 'crgame_ros'},
+             'png': {'Software': 'crgame_ros'}}
+
+
+@dataclass(frozen=True)
+class VehicleStyle:
+    """
+    How one driven vehicle is drawn everywhere.
+
+    :param colour: as #rrggbb.
+    :param dashes: line style of matplotlib.
+    :param marker: of matplotlib.
+    """
+
+    colour: str
+    dashes: str | tuple[float, tuple[float, ...]]
+    marker: str
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """Draw in the style of the papers, whatever the user's own settings; they come back after."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_SETTINGS)
+        yield
+
+
+def new_figure(columns: int, height: float) -> Figure:
+    """
+    Make an empty figure that no display and no other figure knows of.
+
+    :param columns: of the page that it takes, 1 or 2.
+    :param height: [inch]
+    """
+    figure = Figure(figsize=(WIDTHS[columns], height), layout='constrained')
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION) -> bytes:
+    """
+    Give a figure as a file has it, without a date: equal figures give equal bytes.
+
+    :param file_format: one of `FORMATS`.
+    :param resolution: of PNG [dots per inch].
+    """
+    buffer = BytesIO()
+    with paper_style():
+        figure.savefig(buffer, format=file_format, dpi=resolution,
+                       metadata=_METADATA[file_format])
+    return buffer.getvalue()
+
+
+def vehicle_styles(descriptions: tuple[ObjectDescription, ...]) -> dict[str, VehicleStyle]:
+    """Give each driven vehicle its style, by id."""
+    styles = {}
+    for role, colours, dashes, markers in (
+            (Role.HUMAN, HUMAN_COLOURS, HUMAN_DASHES, HUMAN_MARKERS),
+            (Role.AUTONOMOUS, AV_COLOURS, AV_DASHES, AV_MARKERS)):
+        for number, item in enumerate(each for each in descriptions if each.role is role):
+            place = number % len(colours)
+            styles[item.id] = VehicleStyle(colours[place], dashes[place], markers[place])
+    return styles
+
+
+def object_colour(description: ObjectDescription) -> str:
+    """Give the colour of what nobody drives: who walks or rides is darker."""
+    return PERSON_COLOUR if description.type in PERSONS else OBJECT_COLOUR
+
+
+def shade(colour: str) -> str:
+    """Give a darker shade of a colour, for text on the road."""
+    return '#' + ''.join(f'{round(0.7 * level):02x}' for level in _levels(colour))
+
+
+def tint(colour: str) -> str:
+    """Give a lighter tint of a colour, as on white with 60 % of it."""
+    return '#' + ''.join(f'{round(255 - 0.6 * (255 - level)):02x}' for level in _levels(colour))
+
+
+def _levels(colour: str) -> tuple[int, ...]:
+    return tuple(int(colour[i:i + 2], 16) for i in (1, 3, 5))

@@ -1,0 +1,241 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""`crgame figures`: draw the figures of a paper from recorded runs."""
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+import math
+from pathlib import Path
+import sys
+from typing import TYPE_CHECKING
+
+from crgame_ros.errors import InputError
+
+if TYPE_CHECKING:  # A command that draws nothing starts without matplotlib.
+    from crgame_ros.analysis.pictures.pictured_run import PicturedRun
+    from matplotlib.figure import Figure
+
+DESCRIPTION = """\
+Draw the figures and the table of the CommonRoad-Game paper from recorded runs.
+
+  frames    the scene around the most critical moments, or at given times (figures 8, 10, 12)
+  profiles  heading, position and velocity of each driven vehicle (figures 9, 11, 13)
+  timing    ideal and realized time line, errors (figure 14)
+  table     the timing metrics as text, CSV, Markdown and LaTeX (table I)
+
+  crgame figures runs/NAME
+  crgame figures runs/NAME --figures frames --at 8:10:0.4 --format pdf --columns 1
+  crgame figures runs/A runs/B --label Proposed --label Naive --figures timing,table
+  crgame figures runs/NAME --video run.mp4
+
+The same run gives the same files, to the byte. docs/figures.md tells more."""
+
+FIGURES = ('frames', 'profiles', 'timing', 'table')
+FOLDER = 'figures'
+MOST_PANELS = 60
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    add = parser.add_argument
+    add('runs', type=Path, nargs='+', metavar='RUN', help='folder of a run, or its recording')
+    add('--out', type=Path, metavar='DIR', help='folder to write to; files of the same names in '
+        'it are replaced (default: "figures" in the folder of the first run)')
+    add('--figures', default=None, metavar='LIST',
+        help=f'which of {",".join(FIGURES)} (default: all)')
+    add('--format', default='svg', metavar='LIST', help='which of svg,pdf,png (default: svg)')
+    add('--columns', type=int, choices=(1, 2), default=2,
+        help='of a two-column page that a figure takes: 1 is 3.5 inches wide, 2 7.16 (default: 2)')
+    add('--at', metavar='TIMES', help='times of the frames in seconds since the start of the run, '
+        'as 2,5,8 or FROM:TO:STEP (default: around the most critical moments)')
+    add('--moments', type=int, default=3, metavar='N',
+        help='how many moments have frames, and are marked in profiles (default: 3)')
+    add('--panels', type=int, default=6, metavar='N', help='frames of a moment (default: 6)')
+    add('--spacing', type=float, default=0.2, metavar='S',
+        help='between the frames of a moment (default: 0.2)')
+    add('--more', action='store_true', help='profiles of acceleration and steering angle, too')
+    add('--label', action='append', default=[], metavar='NAME',
+        help='name of a run in timing figure and table; once for each run')
+    add('--epoch', type=int, help='which run of a recording that holds several '
+        '(resets count them from 0; default: the last)')
+    add('--video', type=Path, metavar='FILE', help='write the run as FILE.mp4 (a GIF where there '
+        'is no ffmpeg) or FILE.gif, in real time; figures only where --figures names some')
+    parser.set_defaults(command=figures)
+
+
+def figures(values: argparse.Namespace) -> int:
+    """Draw what was asked for, and print the files with what they show."""
+    from crgame_ros.analysis.pictures.figure_style import FORMATS
+    from crgame_ros.analysis.pictures.pictured_run import PicturedRun
+    wanted = _listed('--figures', values.figures, FIGURES) if values.figures is not None \
+        else (() if values.video else FIGURES)
+    formats = _listed('--format', values.format, FORMATS)
+    times_s = None if values.at is None else _times(values.at)
+    _check(values)
+    say = partial(print, file=sys.stderr, flush=True)
+    runs = [PicturedRun(path, label, values.epoch, say) for path, label in zip(
+        values.runs, values.label or [None] * len(values.runs), strict=True)]
+    folder = values.out or runs[0].folder / FOLDER
+    for number, run in enumerate(runs):
+        # Each run's own figures lie in a folder of its own where there are several.
+        own = folder / _name(number, runs) if len(runs) > 1 else folder
+        if 'frames' in wanted:
+            for name, figure, caption in _frames(run, values, times_s):
+                _write(figure, own / name, formats, caption)
+        if 'profiles' in wanted:
+            _write(_profiles(run, values), own / 'profiles', formats, 'heading angle, position '
+                   f'and velocity{" and more" if values.more else ""} of {run.label}')
+    if 'timing' in wanted or 'table' in wanted:
+        _timing(runs, folder, wanted, formats, values.columns,
+                say if values.figures is None else None)
+    if values.video:
+        _video(runs[0], values.video, say)
+    return 0
+
+
+def _check(values: argparse.Namespace) -> None:
+    """Refuse numbers that no figure can be made of."""
+    for name, least, most in (('moments', 1, 100), ('panels', 1, MOST_PANELS)):
+        if not least <= getattr(values, name) <= most:
+            raise InputError(f'is {getattr(values, name)}', f'--{name}',
+                             f'give {least} to {most}')
+    if not 0.0 < values.spacing < math.inf:
+        raise InputError(f'is {values.spacing}', '--spacing', 'give a positive number of seconds')
+    if values.label and len(values.label) != len(values.runs):
+        raise InputError(f'given {len(values.label)} times for {len(values.runs)} runs',
+                         '--label', 'give one for each run')
+    if values.video and len(values.runs) != 1:
+        raise InputError(f'{len(values.runs)} runs are given', '--video', 'give one run')
+
+
+def _listed(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
+    chosen = tuple(text.replace(',', ' ').split())
+    strange = [each for each in chosen if each not in known]
+    if strange or not chosen:
+        raise InputError(f'is "{text[:60]}"', option, f'choose from {",".join(known)}')
+    return chosen
+
+
+def _times(text: str) -> list[float]:
+    """Read 2,5,8 or FROM:TO:STEP."""
+    try:
+        if ':' in text:
+            first, last, step = (float(part) for part in text.split(':'))
+            count = math.floor((last - first) / step + 1e-9) + 1
+            times = [first + i * step for i in range(min(count, MOST_PANELS + 1))]
+        else:
+            times = [float(part) for part in text.split(',')]
+    except (ValueError, ArithmeticError):
+        times = []
+    if not 1 <= len(times) <= MOST_PANELS or not all(map(math.isfinite, times)):
+        raise InputError(f'is "{text[:60]}"', '--at',
+                         f'give 1 to {MOST_PANELS} times as 2,5,8 or FROM:TO:STEP')
+    return times
+
+
+def _frames(run: 'PicturedRun', values: argparse.Namespace, times_s: list[float] | None
+            ) -> Iterator[tuple[str, 'Figure', str]]:
+    """Give the figures of frames with their names and what they show."""
+    from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
+    scene, log = run.scene, run.record.log
+    scheduler = log.game.scheduler
+    if times_s is not None:
+        ends = [(int(k) - scheduler.k0) * scheduler.time_step_s for k in log.ks[[0, -1]]]
+        for time_s in times_s:
+            if not ends[0] - 1e-6 <= time_s <= ends[1] + 1e-6:
+                raise InputError(f'{time_s:g} s is not in it', str(run.path),
+                                 f'it lasts from {ends[0]:g} to {ends[1]:g} s')
+        yield 'frames', frames_figure(scene, [scene.k_at(each) for each in times_s],
+                                      columns=values.columns), f'{run.label} at {values.at} s'
+        return
+    if not run.moments:
+        print(f'note: nobody came near anybody in {run.path}: no frames; --at names times',
+              file=sys.stderr)
+    for number, moment in enumerate(run.moments[:values.moments], 1):
+        ks = panel_steps(scene, moment.time_s, values.panels, values.spacing)
+        yield (f'frames_{number}',
+               frames_figure(scene, ks, moment.vehicles, values.columns),
+               f'{run.label} around {moment.time_s:.1f} s: {moment.why}')
+
+
+def _profiles(run: 'PicturedRun', values: argparse.Namespace) -> 'Figure':
+    from crgame_ros.analysis.pictures.profiles_figure import (
+        ALL_PROFILES,
+        profiles_figure,
+        USUAL_PROFILES,
+    )
+    return profiles_figure(run.record, run.moments[:values.moments],
+                           ALL_PROFILES if values.more else USUAL_PROFILES, values.columns)
+
+
+def _timing(runs: Sequence['PicturedRun'], folder: Path, wanted: Sequence[str],
+            formats: Sequence[str], columns: int, say: Callable[[str], object] | None) -> None:
+    """
+    Draw the timing and write the table of all runs.
+
+    :param say: takes a note where a run has no cycles; None where that is an error.
+    """
+    from crgame_ros.analysis.pictures.timing_figure import timing_figure
+    from crgame_ros.analysis.pictures.timing_table import TimingTable
+    from crgame_ros.recording.export import prepare_folder, write_text
+    try:
+        timed = [run.timed for run in runs]
+    except InputError as error:
+        if say is None:
+            raise
+        say(f'note: no timing: {error}')
+        return
+    names = ' and '.join(run.label for run in runs)
+    if 'timing' in wanted:
+        _write(timing_figure(timed, columns), folder / 'timing', formats, f'timing of {names}')
+    if 'table' in wanted:
+        table = TimingTable(timed)
+        prepare_folder(folder)
+        for suffix, text in (('txt', table.text()), ('csv', table.csv()),
+                             ('md', table.markdown()), ('tex', table.latex())):
+            write_text(text, folder / f'timing.{suffix}')
+            print(f'{folder / f"timing.{suffix}"}: timing metrics of {names}')
+        print(table.text(), end='')
+
+
+def _write(figure: 'Figure', place: Path, formats: Sequence[str], caption: str) -> None:
+    from crgame_ros.analysis.pictures.figure_style import figure_bytes
+    from crgame_ros.recording.export import prepare_folder, write_bytes
+    prepare_folder(place.parent)
+    for file_format in formats:
+        path = place.with_name(f'{place.name}.{file_format}')
+        write_bytes(figure_bytes(figure, file_format), path)
+        print(f'{path}: {caption}', flush=True)
+
+
+def _video(run: 'PicturedRun', path: Path, say: Callable[[str], object]) -> None:
+    from crgame_ros.analysis.pictures.run_video import video_path, write_video
+    from crgame_ros.recording.export import prepare_folder
+    from crgame_ros.recording.progress import Progress
+    prepare_folder(path.absolute().parent)
+    if video_path(path) != path:
+        say('note: ffmpeg is not installed: the video becomes a GIF')
+    written = write_video(run.scene, path, Progress(say, f'drawing {run.path}'))
+    print(f'{written}: {run.label} in real time')
+
+
+def _name(number: int, runs: Sequence['PicturedRun']) -> str:
+    """Name a run's folder, apart from those of others of the same name."""
+    name = runs[number].name
+    before = sum(run.name == name for run in runs[:number])
+    return f'{name}_{before + 1}' if before else name

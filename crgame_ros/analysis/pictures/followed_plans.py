@@ -1,0 +1,70 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The plans that AVs followed in a recorded run, on its time line and in its coordinates."""
+
+from collections.abc import Callable
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+from crgame_ros.recording.recorded_plans import read_plans
+from crgame_ros.recording.run_log import RunLog
+import numpy as np
+from numpy.typing import NDArray
+
+
+class FollowedPlan(NamedTuple):
+    """
+    A plan of an AV.
+
+    :param start_s: since the start of the run, when it was there [s]
+    :param stamp_s: since the start of the run, of its first pose [s]
+    :param poses: (S, 3) of the rear axle in frame map, scenario steps apart.
+    """
+
+    start_s: float
+    stamp_s: float
+    poses: NDArray[np.float64]
+
+
+def read_followed_plans(bag: Path, log: RunLog,
+                        progress: Callable[[float], object] | None = None
+                        ) -> dict[str, tuple[FollowedPlan, ...]]:
+    """
+    Read the plans of each AV; none where they were not recorded.
+
+    Whether the engine took a plan is not recorded one by one: a refused one counts as well.
+
+    :param log: of the same run.
+    :param progress: is told how much of the recording has been read, 0 to 1.
+    :raises InputError: as `read_plans`.
+    """
+    scheduler = log.game.scheduler
+    found: dict[str, list[FollowedPlan]] = {av.id: [] for av in log.game.avs}
+    for recorded in read_plans(bag, log.game.epoch, progress):
+        av = log.game.av(recorded.av)
+        if recorded.plan is None or recorded.k is None or av is None:
+            continue
+        stamp_s = (recorded.stamp_ns - scheduler.clock_offset_ns) * 1e-9
+        # The run waits for the first answer; a further one to the same request has no latency.
+        waited_s = 0.0 if stamp_s == 0.0 or math.isnan(recorded.latency_s) \
+            else recorded.latency_s * log.game.real_time_factor
+        start_s = stamp_s + waited_s
+        known = found[av.id]
+        if known and start_s < known[-1].start_s:
+            start_s = known[-1].start_s
+        known.append(FollowedPlan(start_s, stamp_s,
+                                  av.transform.to_simulation(recorded.plan.states[:, :3])))
+    return {av_id: tuple(plans) for av_id, plans in found.items() if plans}

@@ -1,0 +1,161 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Rectangles of the map that frames show, chosen so that all frames of a figure have one scale."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.recording.run_log import RunLog
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+FloatArray = NDArray[np.float64]
+
+# Nobody farther from the vehicle in focus has to be shown [m].
+REACH = 100.0
+# Road around the outermost footprint, ahead and behind, and beside [m].
+MARGIN, MARGIN_BESIDE = 7.0, 5.0
+# What stays of that beside where the road lies to the other side [m].
+LEAST_BESIDE = 2.5
+# No window is smaller [m].
+LEAST_LENGTH, LEAST_HEIGHT = 45.0, 15.0
+# Longer than high at least, and at most, by so much.
+SQUAREST, LONGEST = 1.0, 9.0
+# A camera that stands shows so much at most; beyond that it goes with the vehicle in focus [m].
+MOST_STANDING = 110.0
+
+
+@dataclass(frozen=True)
+class FrameWindow:
+    """
+    A rectangle of the map; its own coordinates count from its centre, x along `yaw`.
+
+    :param x: of the centre [m]
+    :param y: of the centre [m]
+    :param yaw: what points to the right in the picture [rad]
+    :param length: extent along that [m]
+    :param height: extent across [m]
+    """
+
+    x: float
+    y: float
+    yaw: float
+    length: float
+    height: float
+
+    def of(self, points: FloatArray) -> FloatArray:
+        """Map points (..., 2) of the map into the window's own coordinates."""
+        return np.asarray((points - (self.x, self.y)) @ _turn(self.yaw))
+
+    def polygon(self, margin: float = 0.0) -> shapely.Polygon:
+        """Give it as a polygon of the map, wider by a margin [m] on every side."""
+        corners = np.array(((1, 1), (-1, 1), (-1, -1), (1, -1))) * (
+            0.5 * self.length + margin, 0.5 * self.height + margin)
+        return shapely.Polygon(corners @ _turn(self.yaw).T + (self.x, self.y))
+
+
+def footprints(descriptions: Sequence[ObjectDescription], poses: FloatArray
+               ) -> list[FloatArray]:
+    """
+    Place outlines in the map, each (..., C, 2) [m].
+
+    :param poses: (..., N, 3) of the reference points: rear axles of driven vehicles, else centres.
+    """
+    return [placed(outline(item.shape), shifted(poses[..., i, :], item.rear_to_center))
+            for i, item in enumerate(descriptions)]
+
+
+def all_poses(log: RunLog, rows: Sequence[int]) -> FloatArray:
+    """Give the poses (R, V + M, 3) of everybody's reference points; NaN where absent."""
+    chosen = list(rows)
+    return np.concatenate((log.vehicle_states[chosen, :, :3], log.object_poses[chosen]), axis=1)
+
+
+def series_windows(log: RunLog, rows: Sequence[int], vehicles: Sequence[str] = (), *,
+                   standing: bool | None = None, reach: float = REACH,
+                   least: float = LEAST_LENGTH,
+                   road: Callable[[FrameWindow], tuple[float, float]] | None = None
+                   ) -> tuple[FrameWindow, ...]:
+    """
+    Choose what the frames of one figure show: the driven vehicles, and who is named.
+
+    A camera that stands is turned as the road is for the vehicle in focus at the middle frame.
+
+    :param rows: of the log, one for each frame.
+    :param vehicles: ids; the first driven one is in focus, without one the first AV or human.
+    :param standing: whether all show the same piece of road; None if that is short enough.
+    :param reach: who is farther from the vehicle in focus need not be shown [m]
+    :param least: no window is shorter [m]
+    :param road: tells from where to where road lies across a window [m]: where the window is
+        higher than need be, it shows the road's middle rather than the vehicles'.
+    :return: windows of one size.
+    :raises InputError: if nobody drives in the run.
+    """
+    focus = _focus(log, vehicles)
+    poses = all_poses(log, rows)
+    wanted = [i for i, item in enumerate(log.descriptions)
+              if item.role.is_ego or item.id in vehicles]
+    corners = footprints([log.descriptions[i] for i in wanted], poses[:, wanted])
+    near = np.hypot(*np.moveaxis(poses[:, wanted, :2] - poses[:, focus, None, :2], -1, 0)) <= reach
+    middle = np.broadcast_to(poses[len(rows) // 2, focus], (len(rows), 3))
+    for centers in (middle, poses[:, focus]) if standing is None else (
+            middle if standing else poses[:, focus],):
+        seen = np.concatenate([
+            ((each[row] - centers[row, :2]) @ _turn(centers[row, 2]))
+            for i, each in enumerate(corners) for row in range(len(rows)) if near[row, i]])
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        if high[0] - low[0] + 2.0 * MARGIN <= MOST_STANDING:
+            break
+    length, height = _size(high - low, least)
+    offset = 0.5 * (low + high)
+
+    def shown(center: FloatArray, height: float) -> FrameWindow:
+        x, y = (center[:2] + _turn(center[2]) @ offset).tolist()
+        return FrameWindow(x, y, float(center[2]), length, height)
+    if road is not None:
+        spare = max(0.0, 0.5 * height - 0.5 * float(high[1] - low[1]) - LEAST_BESIDE)
+        right, left = road(shown(centers[len(rows) // 2], 2.0 * height))
+        offset = offset + (0.0, np.clip(0.5 * (right + left), -spare, spare))
+    return tuple(shown(center, height) for center in centers)
+
+
+def _focus(log: RunLog, vehicles: Sequence[str]) -> int:
+    driven = {item.id: i for i, item in enumerate(log.vehicles)}
+    order = [driven[name] for name in vehicles if name in driven]
+    order += sorted(driven.values(),
+                    key=lambda i: log.descriptions[i].role is not Role.AUTONOMOUS)
+    if not order:
+        raise InputError('nobody drives in it', log.game.benchmark_id,
+                         'frames are made around a driven vehicle')
+    return order[0]
+
+
+def _size(extent: FloatArray, least: float) -> tuple[float, float]:
+    """Give length and height of a window around an extent [m]."""
+    length = max(float(extent[0]) + 2.0 * MARGIN, least)
+    height = max(float(extent[1]) + 2.0 * MARGIN_BESIDE, LEAST_HEIGHT, length / LONGEST)
+    return max(length, SQUAREST * height), height
+
+
+def _turn(yaw: float) -> FloatArray:
+    """Give the matrix that takes coordinates along `yaw` to those of the map."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.array(((cos, -sin), (sin, cos)))

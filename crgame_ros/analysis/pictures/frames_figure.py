@@ -1,0 +1,154 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A figure of frames (as CRG figures 8, 10 and 12): panels around a moment, all at one scale."""
+
+from collections.abc import Sequence
+from string import ascii_lowercase
+
+from crgame_ros.analysis.pictures.figure_style import (
+    AV_COLOURS,
+    HUMAN_COLOURS,
+    INK,
+    new_figure,
+    OBJECT_COLOUR,
+    paper_style,
+    PERSON_COLOUR,
+    tint,
+    WIDTHS,
+)
+from crgame_ros.analysis.pictures.frame_axes import draw_frame, PLAN_DOT, PLAN_WIDTH, TRACE_WIDTH
+from crgame_ros.analysis.pictures.scene_frame import DOTS_S, FrameScene, SceneFrame, TRACE_S
+from crgame_ros.game.objects import Role
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+POINTS = 72.0
+# A metre is at least so large, if a page is wide enough for it [pt].
+LEAST_METRE = 2.6
+# Between panels, and below them for what colours and lines mean [pt].
+GAP, LEGEND_LINE = 3.0, 12.0
+# Of a page [inch].
+MOST_HEIGHT = 9.0
+# Lengths of the scale bar [m]; it is as long as fits into so much [pt].
+_BARS, _BAR = (50, 20, 10, 5, 2, 1), 55.0
+
+
+def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] = (),
+                  columns: int = 2) -> Figure:
+    """
+    Draw panels at scenario steps, each with its time since the start of the run.
+
+    :param vehicles: whom it is about: shown and labelled, beside the driven vehicles.
+    :param columns: of the page that it takes, 1 or 2.
+    :raises InputError: if the run does not hold a step, or nobody drives in it.
+    """
+    windows = scene.windows([scene.row(k) for k in ks], vehicles)
+    labelled = {item.id for item in scene.log.vehicles} | set(vehicles)
+    frames = [scene.at(k, window, labelled) for k, window in zip(ks, windows, strict=True)]
+    width = WIDTHS[columns] * POINTS
+    length, height = windows[0].length, windows[0].height
+    across = _panels_across(len(ks), width, length, height)
+    rows = -(-len(ks) // across)
+    metre = (width - (across - 1) * GAP) / across / length
+    handles = _handles(scene, frames)
+    # In a narrow figure in two lines.
+    legend = 3.0 + LEGEND_LINE * -(-len(handles) // (4 * columns))
+    total = rows * height * metre + (rows - 1) * GAP + legend
+    digits = _digits(scene.log.game.scheduler.time_step_s)
+    with paper_style():
+        figure = new_figure(columns, total / POINTS)
+        figure.set_layout_engine('none')
+        for number, frame in enumerate(frames):
+            row, column = divmod(number, across)
+            axes = figure.add_axes((
+                column * (length * metre + GAP) / width,
+                (total - (row + 1) * height * metre - row * GAP) / total,
+                length * metre / width, height * metre / total))
+            draw_frame(axes, frame, metre,
+                       f'{_letter(number)} {frame.time_s:.{digits}f} s')
+        figure.legend(handles=handles, loc='lower left', ncols=4 * columns, borderaxespad=0.1,
+                      bbox_to_anchor=(0.0, 0.0), handlelength=1.6, columnspacing=1.2,
+                      handletextpad=0.5, borderpad=0.1, labelspacing=0.4)
+        _draw_scale(figure, metre, 0.5 * LEGEND_LINE)
+    return figure
+
+
+def _panels_across(count: int, width: float, length: float, height: float) -> int:
+    """Choose how many panels stand side by side: many, but large enough, and on one page."""
+    best = 1
+    for across in range(2, count + 1):
+        metre = (width - (across - 1) * GAP) / across / length
+        if metre >= LEAST_METRE:
+            best = across
+    while best < count and -(-count // best) * height * width / best / length \
+            > MOST_HEIGHT * POINTS - 2.0 * LEGEND_LINE:
+        best += 1
+    # No last row that is emptier than need be.
+    return -(-count // -(-count // best))
+
+
+def _handles(scene: FrameScene, frames: Sequence[SceneFrame]) -> list[Patch | Line2D]:
+    """Say what colours and lines mean."""
+    roles = {item.role for item in scene.log.vehicles}
+    shown = {body.colour for frame in frames for body in frame.bodies if not body.is_driven}
+    handles: list[Patch | Line2D] = [
+        Patch(facecolor=colour, edgecolor=INK, linewidth=0.5, label=label)
+        for colour, label, wanted in (
+            (HUMAN_COLOURS[0], 'HV', Role.HUMAN in roles),
+            (AV_COLOURS[0], 'AV', Role.AUTONOMOUS in roles),
+            (OBJECT_COLOUR, 'others', OBJECT_COLOUR in shown),
+            (PERSON_COLOUR, 'on foot, bike', PERSON_COLOUR in shown)) if wanted]
+    handles.append(Line2D([], [], color=tint(INK), linewidth=TRACE_WIDTH,
+                          label=f'last {TRACE_S:g} s'))
+    if any(frame.plans for frame in frames):
+        handles.append(Line2D([], [], color=INK, linewidth=PLAN_WIDTH, marker='o',
+                              markersize=PLAN_DOT, label=f'plan, dots {DOTS_S:g} s apart'))
+    return handles
+
+
+def _draw_scale(figure: Figure, metre: float, y: float) -> None:
+    """Draw how long some metres are, at a height above the lower edge [pt]."""
+    bar = next((each for each in _BARS if each * metre <= _BAR), _BARS[-1])
+    width, height = figure.get_size_inches() * POINTS
+    right = width - 2.0
+    left = right - bar * metre
+    for xs, ys in (((left, right), (y, y)), ((left, left), (y - 2, y + 2)),
+                   ((right, right), (y - 2, y + 2))):
+        figure.add_artist(Line2D([x / width for x in xs], [v / height for v in ys], color=INK,
+                                 linewidth=0.8, solid_capstyle='butt'))
+    figure.text((left - 4.0) / width, y / height, f'{bar} m', ha='right', va='center',
+                fontsize=7.0)
+
+
+def _letter(number: int) -> str:
+    return f'({ascii_lowercase[number]})' if number < len(ascii_lowercase) else f'({number + 1})'
+
+
+def _digits(step_s: float) -> int:
+    """Give how many decimals tell a scenario's steps apart."""
+    return next((digits for digits in range(1, 4)
+                 if abs(step_s * 10**digits - round(step_s * 10**digits)) < 1e-6), 3)
+
+
+def panel_steps(scene: FrameScene, time_s: float, panels: int, spacing_s: float
+                ) -> tuple[int, ...]:
+    """Give scenario steps around a time, the panel at it being in the second half."""
+    step_s = scene.log.game.scheduler.time_step_s
+    stride = max(1, round(spacing_s / step_s))
+    first, last = int(scene.log.ks[0]), int(scene.log.ks[-1])
+    begin = scene.k_at(time_s) - panels // 2 * stride
+    begin = max(first, min(begin, last - (panels - 1) * stride))
+    return tuple(k for k in range(begin, begin + panels * stride, stride) if k <= last)

@@ -1,0 +1,103 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A recorded run as figures need it, read part by part as they ask for it."""
+
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+import re
+
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment, Touch
+from crgame_ros.analysis.pictures.followed_plans import read_followed_plans
+from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.pictures.timing_figure import TimedRun
+from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.progress import Progress
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_record import read_run_record, RunRecord
+from crgame_ros.recording.timing_report import timing_report
+
+
+class PicturedRun:
+    """
+    A recording to make figures of.
+
+    :param path: folder of a run, or its recording.
+    :param label: under which figures and tables name it; None for the folder's name.
+    :param epoch: which run, where a recording holds several; None for the last.
+    :param say: takes a line for people, on what takes long.
+    """
+
+    def __init__(self, path: Path, label: str | None, epoch: int | None,
+                 say: Callable[[str], object]) -> None:
+        self.path = path
+        self.bag = recording_in(path)
+        # A recording lies in the folder of its run.
+        self.folder = path if self.bag != path else path.parent
+        resolved = path.resolve()
+        self.label = label or (resolved.parent if re.fullmatch(r'bag(_part\d+)?', resolved.stem)
+                               else resolved).name
+        self._epoch = epoch
+        self._say = say
+
+    @property
+    def name(self) -> str:
+        """Name for files."""
+        return re.sub(r'[^\w.-]+', '_', self.label).lstrip('.') or 'run'
+
+    @cached_property
+    def record(self) -> RunRecord:
+        """
+        Read how everybody moved.
+
+        :raises InputError: if the recording lacks it.
+        """
+        return read_run_record(self.bag, self._epoch, self._progress('reading'))
+
+    @cached_property
+    def scene(self) -> FrameScene:
+        """Read what frames show."""
+        log = self.record.log
+        return FrameScene(log, read_followed_plans(self.bag, log,
+                                                   self._progress('reading plans of')))
+
+    @cached_property
+    def moments(self) -> tuple[Moment, ...]:
+        """Find the moments, the most critical one first."""
+        log = self.record.log
+        touches: tuple[Touch, ...] = ()
+        # Without cycles nobody says at which step; what touches at a tick is found all the same.
+        if log.cycles is not None:
+            report = timing_report(self.bag, log=log)
+            touches = tuple(map(Touch.of, report['contacts'] or ()))
+        return critical_moments(
+            self.record, measure_log(log, progress=self._progress('measuring')), touches)
+
+    @cached_property
+    def timed(self) -> TimedRun:
+        """
+        Read the cycles, for which nothing else need be recorded.
+
+        :raises InputError: if there are none.
+        """
+        with BagReader(self.bag, parts=True) as reader:
+            game = read_epoch(reader, self._epoch).game
+            return TimedRun(self.label, read_cycles(reader, game.epoch), game.scheduler.dt_s)
+
+    def _progress(self, what: str) -> Progress:
+        return Progress(self._say, f'{what} {self.path}')

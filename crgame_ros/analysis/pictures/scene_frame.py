@@ -1,0 +1,230 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A run at one moment, seen from above: what every renderer of frames draws."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+import math
+
+from crgame_ros.analysis.pictures.figure_style import (
+    object_colour,
+    vehicle_styles,
+)
+from crgame_ros.analysis.pictures.followed_plans import FollowedPlan
+from crgame_ros.analysis.pictures.frame_road import PicturedRoad, RoadInWindow
+from crgame_ros.analysis.pictures.frame_window import (
+    all_poses,
+    footprints,
+    FrameWindow,
+    LEAST_LENGTH,
+    REACH,
+    series_windows,
+)
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.scenario.loading import parse_scenario
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Of the way behind each driven vehicle that is drawn [s].
+TRACE_S = 2.0
+# Between the dots on plans [s].
+DOTS_S = 0.5
+# What is shorter shows no front [m].
+SHOWS_FRONT = 2.5
+# Corners of the mark at the front of a vehicle, in lengths and widths.
+_FRONT = np.array(((0.12, 0.32), (0.38, 0.0), (0.12, -0.32)))
+
+
+@dataclass(frozen=True)
+class FrameBody:
+    """
+    A footprint in a window's coordinates [m].
+
+    :param id: whose it is.
+    :param corners: (C, 2)
+    :param front: (3, 2) corners of the mark at its front; none of what is short.
+    :param colour: as #rrggbb.
+    :param is_driven: by a human or a planner.
+    :param is_labelled: whether its id is written beside it.
+    """
+
+    id: str  # noqa: A003
+    corners: FloatArray
+    front: FloatArray | None
+    colour: str
+    is_driven: bool
+    is_labelled: bool
+
+
+@dataclass(frozen=True)
+class FrameLine:
+    """
+    A way of a driven vehicle's rear axle in a window's coordinates [m].
+
+    :param id: whose it is.
+    :param points: (N, 2), a scenario step apart.
+    :param colour: as #rrggbb.
+    :param is_av: whether a planner drives it.
+    :param dots: at every so many points there is a dot, from the first one on.
+    """
+
+    id: str  # noqa: A003
+    points: FloatArray
+    colour: str
+    is_av: bool
+    dots: int = 1
+
+
+@dataclass(frozen=True)
+class SceneFrame:
+    """
+    Everything that a window shows at one moment.
+
+    :param time_s: since the start of the run [s]
+    :param traces: where driven vehicles have come from.
+    :param plans: what the AVs were following.
+    """
+
+    time_s: float
+    window: FrameWindow
+    road: RoadInWindow
+    bodies: tuple[FrameBody, ...]
+    traces: tuple[FrameLine, ...]
+    plans: tuple[FrameLine, ...]
+
+
+class FrameScene:
+    """
+    A run to make frames of.
+
+    :param log: of a recording or an offline run.
+    :param plans: that the AVs followed, by id.
+    :raises InputError: if the scenario in it cannot be used.
+    """
+
+    def __init__(self, log: RunLog,
+                 plans: Mapping[str, Sequence[FollowedPlan]] | None = None) -> None:
+        self.log = log
+        self.styles = vehicle_styles(log.vehicles)
+        self._plans = plans or {}
+        self._starts = {av: np.array([plan.start_s for plan in known])
+                        for av, known in self._plans.items()}
+        network = parse_scenario(log.xml_text, '/scenario/xml').scenario.lanelet_network
+        places = log.vehicle_states[:, :, :2].reshape(-1, 2)
+        low, high = places.min(axis=0) - 2.0 * REACH, places.max(axis=0) + 2.0 * REACH
+        self.road = PicturedRoad(network, (*low.tolist(), *high.tolist()))
+        self._reaches = np.array([item.shape.radius + abs(item.rear_to_center)
+                                  for item in log.descriptions])
+        self._cut: tuple[FrameWindow, RoadInWindow] | None = None
+
+    def at(self, k: int, window: FrameWindow, labelled: Collection[str] | None = None,
+           trace_s: float = TRACE_S) -> SceneFrame:
+        """
+        Look at a scenario step.
+
+        :param labelled: whose ids are written; None for all driven vehicles.
+        :param trace_s: how long a way behind them is drawn [s]
+        :raises InputError: if the log does not hold the step.
+        """
+        row = self.row(k)
+        scheduler = self.log.game.scheduler
+        time_s = (k - scheduler.k0) * scheduler.time_step_s
+        if self._cut is None or self._cut[0] != window:
+            self._cut = (window, self.road.within(window))
+        first = max(0, row - round(trace_s / scheduler.time_step_s))
+        states = self.log.vehicle_states[first:row + 1]
+        traces = tuple(FrameLine(item.id, window.of(states[:, i, :2]), self.styles[item.id].colour,
+                                 item.role is Role.AUTONOMOUS)
+                       for i, item in enumerate(self.log.vehicles) if row > first)
+        plans = tuple(FrameLine(av, window.of(plan[:, :2]), self.styles[av].colour, True,
+                                max(1, round(DOTS_S / scheduler.time_step_s)))
+                      for av in self._plans
+                      if (plan := self._plan(av, time_s)) is not None)
+        return SceneFrame(time_s, window, self._cut[1], self._bodies(row, window, labelled),
+                          traces, plans)
+
+    def windows(self, rows: Sequence[int], vehicles: Sequence[str] = (), *,
+                standing: bool | None = None, reach: float = REACH,
+                least: float = LEAST_LENGTH) -> tuple[FrameWindow, ...]:
+        """Choose what frames show, as `series_windows`, with as much of the road as there is."""
+        return series_windows(self.log, rows, vehicles, standing=standing, reach=reach,
+                              least=least, road=self.road.across)
+
+    def row(self, k: int) -> int:
+        """
+        Give the row of the log that holds a scenario step.
+
+        :raises InputError: if there is none.
+        """
+        ks = self.log.ks
+        if not ks[0] <= k <= ks[-1]:
+            raise InputError(f'has no scenario step {k}', self.log.game.benchmark_id,
+                             f'give one of {ks[0]} to {ks[-1]}')
+        return int(k - ks[0])
+
+    def k_at(self, time_s: float) -> int:
+        """Give the scenario step nearest to a time since the start of the run, within the log."""
+        scheduler = self.log.game.scheduler
+        k = scheduler.k0 + round(time_s / scheduler.time_step_s)
+        return int(np.clip(k, self.log.ks[0], self.log.ks[-1]))
+
+    def _plan(self, av: str, time_s: float) -> FloatArray | None:
+        """Give what was left (S, 3) of the plan that an AV was following; None if nothing."""
+        number = int(np.searchsorted(self._starts[av], time_s + 1e-9, side='right')) - 1
+        if number < 0:
+            return None
+        plan, step_s = self._plans[av][number], self.log.game.scheduler.time_step_s
+        left = plan.poses[max(0, math.floor((time_s - plan.stamp_s) / step_s + 1e-6)):]
+        return left if len(left) else None
+
+    def _bodies(self, row: int, window: FrameWindow,
+                labelled: Collection[str] | None) -> tuple[FrameBody, ...]:
+        """Give who is at least partly in the window; driven vehicles are drawn last, on top."""
+        poses = all_poses(self.log, [row])[0]
+        bodies = []
+        half = 0.5 * np.array((window.length, window.height))
+        count = len(self.log.vehicles)
+        away = np.hypot(*(poses[:, :2] - (window.x, window.y)).T)
+        near = away < np.hypot(*half) + self._reaches
+        for i in (*range(count, len(poses)), *reversed(range(count))):
+            # Of whoever is absent the comparison with NaN is false.
+            if not near[i]:
+                continue
+            item = self.log.descriptions[i]
+            corners = window.of(footprints([item], poses[i:i + 1])[0])
+            if not ((corners.max(axis=0) > -half) & (corners.min(axis=0) < half)).all():
+                continue
+            bodies.append(FrameBody(
+                item.id, corners, window.of(front_mark(item, poses[i])) if _has_front(item)
+                else None, self.styles[item.id].colour if item.role.is_ego
+                else object_colour(item), item.role.is_ego,
+                item.role.is_ego if labelled is None else item.id in labelled))
+        return tuple(bodies)
+
+
+def front_mark(description: ObjectDescription, pose: FloatArray) -> FloatArray:
+    """Give the corners (3, 2) in the map of the mark at the front of a footprint [m]."""
+    shape = description.shape
+    ahead = _FRONT * (shape.length, shape.width) + (description.rear_to_center, 0.0)
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    return np.asarray(ahead @ np.array(((cos, sin), (-sin, cos))) + pose[:2])
+
+
+def _has_front(description: ObjectDescription) -> bool:
+    return description.shape.kind == 'rectangle' and description.shape.length > SHOWS_FRONT

@@ -1,0 +1,83 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Moments of runs that are known by hand."""
+
+from collections.abc import Callable
+
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment, Touch
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_record import RunRecord
+import numpy as np
+import pytest
+
+Make = Callable[..., RunLog]
+
+
+def _record(log: RunLog, *fired: FiredEvent) -> RunRecord:
+    return RunRecord(log, np.empty(0, dtype=np.int64), np.empty((0, 2, 4)), fired)
+
+
+def _approach(straight: Make, steps: int, after: int) -> tuple[RunLog, float]:
+    """Let the human drive at 10 m/s for some steps of 0.1 s and then stand, 40 m behind the AV."""
+    times_s = 0.1 * np.arange(steps + after)
+    x = 300.0 + 10.0 * np.minimum(times_s, 0.1 * steps)
+    log = straight(x.tolist(), [10.0] * steps + [0.0] * after, 300.0 + 40.0)
+    human, av = log.vehicles
+    gap = 40.0 + av.rear_to_center - human.rear_to_center - 0.5 * (
+        human.shape.length + av.shape.length)
+    return log, gap
+
+
+def test_the_smallest_ttc_is_the_moment(straight: Make) -> None:
+    """It is met at the last step at speed: (gap - 10 m/s 2.9 s) / 10 m/s; distances join it."""
+    log, gap = _approach(straight, 30, 40)
+    moments = critical_moments(_record(log), measure_log(log))
+    ttc_s = (gap - 29.0) / 10.0
+    assert 0.0 < ttc_s < 3.0
+    first = moments[0]
+    assert first.time_s == pytest.approx(2.9)
+    assert f'ttc of hv0 to av0 is {ttc_s:.2f} s' in first.why
+    assert set(first.vehicles) == {'hv0', 'av0'}
+    # They are nearest at 3.0 s: within a second of it, so it is one moment.
+    assert f'hv0 and av0 are {gap - 30.0:.2f} m apart' in first.why and len(moments) == 1
+
+
+def test_contacts_come_first_events_after_what_is_critical(straight: Make) -> None:
+    """Whatever their times; within a second the more critical one tells the other."""
+    log, _ = _approach(straight, 30, 40)
+    fired = [FiredEvent('brake', 600, 60, 'trigger'), FiredEvent('gone', 300, 30, 'condition')]
+    moments = critical_moments(_record(log, *fired), measure_log(log),
+                               [Touch('hv0', 'o7', 450)])
+    assert [each.time_s for each in moments] == pytest.approx([4.5, 2.9, 6.0])
+    assert moments[0] == Moment(4.5, 'hv0 and o7 touch', ('hv0', 'o7'))
+    assert moments[1].why.endswith('event gone; hv0 and av0 are '
+                                   + moments[1].why.split(' are ')[-1])
+    assert moments[2].why == 'event brake'
+
+
+def test_who_touches_is_found_without_recorded_contacts(straight: Make) -> None:
+    """At the first tick at which the gap is closed."""
+    log, gap = _approach(straight, 50, 5)
+    (first, *_) = critical_moments(_record(log), measure_log(log))
+    assert first.time_s == pytest.approx(np.ceil(gap) / 10.0, abs=0.1)
+    assert first.why.startswith('hv0 and av0 touch') and 'inf' not in first.why
+
+
+def test_where_nothing_happens_there_is_no_moment(straight: Make) -> None:
+    """Both stand: how far apart they begin is none."""
+    log = straight([300.0] * 10, [0.0] * 10, 340.0)
+    assert critical_moments(_record(log), measure_log(log)) == ()
