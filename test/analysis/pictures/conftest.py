@@ -72,6 +72,7 @@ def straight(cut_in: RunRecord) -> Callable[..., RunLog]:
         states[:, 1, StateColumn.X] = av_x
         return replace(
             cut_in.log, ks=cut_in.log.ks[:len(human_x)], vehicle_states=states,
+            published_states=states,
             object_poses=cut_in.log.object_poses[:len(human_x)],
             object_velocities=cut_in.log.object_velocities[:len(human_x)])
     return make
