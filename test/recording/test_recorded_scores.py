@@ -61,18 +61,16 @@ def run(result: OfflineResult, recorder: Any, tmp_path_factory: pytest.TempPathF
     folder: Path = tmp_path_factory.mktemp('scored') / 'run'
     messages = recorder.messages(result)
     at_ns = messages[-1][2] + 1
+    counts = {'requests': 30, 'accepted': 28, 'refused': 1, 'skipped': 0, 'timed_out': 0,
+              'realigned': 0, 'steps_without_plan': 2, 'last_refusal': 'too far',
+              'worst_lateral_error': 0.25}
     statuses = [
-        ('sim_node: av0 plans', 'following its plan', dict(
-            requests=30, accepted=28, refused=1, skipped=0, timed_out=0, realigned=0,
-            steps_without_plan=2, age_ms=40.0, last_refusal='too far',
-            worst_lateral_error=0.25)),
-        ('sim_node: av0 plans', 'following its plan', dict(age_ms=60.0, requests=30, accepted=28)),
-        ('planner_node: av0', 'braking: 3 m are missing', dict(
-            plans=30, fallbacks=3, plan_time_ms=12.0)),
-        ('planner_node: av0', 'braking: 4.5 m are missing', dict(
-            plans=30, fallbacks=4, plan_time_ms=14.0))]
-    statuses[1][2].update({key: value for key, value in statuses[0][2].items()
-                           if key not in statuses[1][2]})
+        ('sim_node: av0 plans', 'following its plan', {'age_ms': 40.0, **counts}),
+        ('sim_node: av0 plans', 'following its plan', {'age_ms': 60.0, **counts}),
+        ('planner_node: av0', 'braking: 3 m are missing',
+         {'plans': 30, 'fallbacks': 3, 'plan_time_ms': 12.0}),
+        ('planner_node: av0', 'braking: 4.5 m are missing',
+         {'plans': 30, 'fallbacks': 4, 'plan_time_ms': 14.0})]
     messages += [('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', at_ns + number,
                   recorder.status(2_000_000_000, name, message, **values))
                  for number, (name, message, values) in enumerate(statuses)]

@@ -34,12 +34,12 @@ class ChosenType(NamedTuple):
     """
     The vehicle type of CommonRoad that stands for a vehicle.
 
-    :param type: number 1 to 4 in benchmark ids.
+    :param kind: number 1 to 4 in benchmark ids.
     :param difference: sum of what length, width, wheelbase and the place of the centre differ by
         [m]
     """
 
-    type: VehicleType
+    kind: VehicleType
     difference: float
 
     @property

@@ -141,8 +141,9 @@ def drive_among(vehicle_id: str, shape: Shape, rear_to_center: float, poses: Flo
     shapes = (len(poses), len(obstacles.ids), 3)
     places = np.array([state.poses for state in states]).reshape(shapes)
     moves = np.array([state.velocities for state in states]).reshape(shapes)
+    tracks = _tracks(obstacles.descriptions, places, np.hypot(moves[..., 0], moves[..., 1]))
     return ScoredDrive(vehicle_id, loaded.time_step_s, shape, rear_to_center, poses, speeds,
-                 _tracks(obstacles.descriptions, places, np.hypot(moves[..., 0], moves[..., 1])))
+                       tracks)
 
 
 def _tracks(descriptions: Sequence[ObjectDescription], poses: FloatArray, speeds: FloatArray,

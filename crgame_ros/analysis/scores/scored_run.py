@@ -86,20 +86,20 @@ class _Run:
         """Score one vehicle by its number, and the id of its planning problem in the export."""
         log = self._log
         item, driven = log.vehicles[number], log.game.vehicles[number]
-        kind = choose_type(driven.vehicle)
-        states = driven_states(log, number, kind.type)
+        chosen = choose_type(driven.vehicle)
+        states = driven_states(log, number, chosen.kind)
         problem = self._scored.problem(problem_id)
         trajectory = until_goal(states, goal_step(problem, states))
-        solved = PlanningProblemSolution(problem_id, VehicleModel.KS, kind.type, CostFunction.JB1,
-                                         trajectory)
-        remarks = [] if kind.is_exact else [
-            f'no vehicle type of CommonRoad has its dimensions: KS{kind.type.value} is nearest, '
-            f'{kind.difference:.2f} m off in all']
+        solved = PlanningProblemSolution(problem_id, VehicleModel.KS, chosen.kind,
+                                         CostFunction.JB1, trajectory)
+        remarks = [] if chosen.is_exact else [
+            f'no vehicle type of CommonRoad has its dimensions: KS{chosen.kind.value} is nearest, '
+            f'{chosen.difference:.2f} m off in all']
         av = log.game.av(item.id)
         return VehicleScores(
             item.id, 'human' if item.role is Role.HUMAN else 'autonomous',
             '' if av is None else av.planner,
-            self._judge.judge(solved, trajectory, exact_type=kind.is_exact, progress=progress),
+            self._judge.judge(solved, trajectory, exact_type=chosen.is_exact, progress=progress),
             self._score_drive(number, remarks),
             find_goal(problem, states, log.game.scheduler.time_step_s), plans, tuple(remarks))
 

@@ -71,7 +71,7 @@ def test_the_first_touch_is_found(roads: RoadNetwork) -> None:
 
 
 def test_who_is_absent_is_not_touched(roads: RoadNetwork) -> None:
-    """NaN is nowhere."""
+    """Who has no pose is nowhere."""
     gone = track(0.0, 40.0)
     gone.poses[:45] = np.nan
     mine = drive(10.0, Track('o1', 'vehicle', gone.shape, gone.poses, gone.speeds))
