@@ -63,17 +63,17 @@ class Curve:
 
     @cached_property
     def steps(self) -> FloatArray:
-        """Lengths of the segments, (n - 1) [m]."""
+        """Give the lengths of the segments, (n - 1) [m]."""
         return np.asarray(np.hypot(*np.diff(self.points, axis=0).T))
 
     @cached_property
     def directions(self) -> FloatArray:
-        """Unit vectors along the segments, (n - 1, 2)."""
+        """Give unit vectors along the segments, (n - 1, 2)."""
         return np.asarray(np.diff(self.points, axis=0) / self.steps[:, None])
 
     @cached_property
     def _bends(self) -> FloatArray:
-        """Curvature of the segments, and of the straight parts before and behind, (n + 1)."""
+        """Give the curvature of segments, and of the straight parts at both ends, (n + 1)."""
         return np.concatenate(([0.0], np.diff(self.heading) / np.diff(self.s), [0.0]))
 
     def heading_at(self, s: FloatArray) -> FloatArray:
