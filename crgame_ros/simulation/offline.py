@@ -134,6 +134,13 @@ class PlannerSeat:
                 VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
                 setup.open_occupancy())
 
+    def proceed(self, result: StepResult) -> None:
+        """Take in what a step has brought, and hand over what is due."""
+        self.crew.apply([event.name for event in result.fired])
+        if self.id in result.requests:
+            self.ask(result.requests[self.id])
+        self.deliver()
+
     def ask(self, request: JointSeries) -> None:
         """Plan now; the answer is due after the latency (at once for the first request)."""
         if self.perception is not None:
@@ -200,10 +207,7 @@ def run_offline(
         if perceiving and simulation.n % perceive_every == 0:
             _perceive(simulation, perceiving)
         for seat in seats:
-            seat.crew.apply([event.name for event in result.fired])
-            if seat.id in result.requests:
-                seat.ask(result.requests[seat.id])
-            seat.deliver()
+            seat.proceed(result)
         trace.add(simulation, result, effective_s)
         if trace.stop is not None:
             break

@@ -97,9 +97,8 @@ def _told(rows: dict[int, FloatArray], *more: tuple[str, FloatArray]) -> list[Me
             label.split(','), found)) for i, (label, found) in enumerate(more)]
 
 
-def test_of_each_vehicle_the_most_critical_values_go_out(rows: dict[int, FloatArray],
-                                                        parked: OfflineResult,
-                                                        tmp_path: Path) -> None:
+def test_of_each_vehicle_the_most_critical_values_go_out(
+        rows: dict[int, FloatArray], parked: OfflineResult, tmp_path: Path) -> None:
     """Measured by the server, where nobody recorded any: value by value, and to whom."""
     bag = record(tmp_path / 'bag', recorder.messages(parked))
     found = _asked(bag)

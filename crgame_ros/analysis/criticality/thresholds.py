@@ -30,7 +30,6 @@ class Thresholds(NamedTuple):
     drac: float = 3.0
     pet_s: float = 2.0
 
-
     def exceeded(self, measure: str, value: float) -> bool:
         """Tell whether a value is critical; of measures without a threshold none is."""
         return {'ttc': value < self.ttc_s, 'drac': value > self.drac,

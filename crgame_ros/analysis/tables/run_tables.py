@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
+from crgame_ros.analysis.tables.behaviour_tables import BEHAVIOUR_TABLES, write_behaviour
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.events_table import EVENT_PARTS, EVENTS
 from crgame_ros.analysis.tables.pairs_table import CROSSINGS, PAIRS, write_criticality
@@ -33,7 +34,7 @@ from crgame_ros.errors import InputError
 import pyarrow as pa
 
 TABLES: tuple[TableDeclaration, ...] = (
-    RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS)
+    RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES)
 
 
 def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
@@ -71,6 +72,8 @@ def _add_run(run: TabulatedRun, writers: Mapping[str, TableWriter],
                       partial(progress, f'measuring {run.id}'))
     for rows in plan_rows(run):
         writers[PLANS.name].add(rows)
+    progress(f'measuring how people drove in {run.id}', 0.0)
+    write_behaviour(run, writers)
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         if (values := part_rows(parts, run))['run']:
             writers[table.name].add(values)

@@ -16,8 +16,11 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
+from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import VehicleCriticality
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.recording.recorded_plans import RecordedPlan
@@ -55,6 +58,11 @@ class TabulatedRun:
     plans: Callable[[], Iterable[RecordedPlan]] | None = None
     criticality: dict[str, VehicleCriticality] = field(default_factory=dict)
     tallies: dict[str, PlanTally] = field(default_factory=dict)
+
+    @cached_property
+    def behaviour(self) -> tuple[DriverBehaviour, ...]:
+        """Measure how each vehicle was driven, in the order of the log's."""
+        return measure_behaviour(self.record)
 
     @property
     def driven(self) -> tuple[DrivenVehicle, ...]:

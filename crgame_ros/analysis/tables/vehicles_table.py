@@ -19,6 +19,7 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.criticality.thresholds import USUAL
+from crgame_ros.analysis.tables.behaviour_tables import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.pairs_table import FOOTPRINTS, measure_column
 from crgame_ros.analysis.tables.table_part import declare, TablePart
@@ -157,5 +158,6 @@ VEHICLE_PARTS = (
         Column('latency_p50_s', NUMBER, 's', 'median latency, of all answers with one',
                variant='interpolated linearly', empty=UNRECORDED),
         Column('latency_max_s', NUMBER, 's', 'greatest latency, that of the first plan included',
-               empty=UNRECORDED)), _planning))
+               empty=UNRECORDED)), _planning),
+    VEHICLE_BEHAVIOUR)
 VEHICLES = declare('vehicles', 'a driven vehicle of a run', ('run', 'id'), VEHICLE_PARTS)
