@@ -84,7 +84,8 @@ setup(
     license='Apache-2.0',
     python_requires='>=3.11,<3.13',
     packages=find_packages(exclude=['test', 'test.*']),
-    package_data={PACKAGE: ['py.typed', 'cockpit/page/*', 'cockpit/page/**/*']},
+    package_data={PACKAGE: ['py.typed', 'cockpit/page/*', 'cockpit/page/**/*',
+                            'analysis/report/page/*']},
     data_files=data_files(),
     zip_safe=False,
     # What is imported, at the versions of requirements.txt. Those that other packages need in turn

@@ -58,6 +58,8 @@ TOOLS = (
           'crgame_ros.analysis.export_command'),
     _Tool('figures', "a paper's figures of recorded runs, and videos",
           'crgame_ros.analysis.pictures.figures_command'),
+    _Tool('report', 'a recorded run, or several side by side, as one HTML file',
+          'crgame_ros.analysis.report.report_command'),
     _Tool('replay', 'the recorded human against other planners', 'crgame_ros.replay_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',
           'crgame_ros.analysis.validate_command'),

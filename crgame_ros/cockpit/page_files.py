@@ -17,10 +17,10 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 import hashlib
-import importlib.util
 from pathlib import Path
 
 from crgame_ros.errors import CrgameError
+from crgame_ros.paths import plotly_script
 
 PAGE = Path(__file__).resolve().parent / 'page'
 INDEX = '/'
@@ -62,7 +62,7 @@ def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
     if index is None:
         raise CrgameError(f'{directory}: the page of the cockpit is missing; '
                           'install crgame_ros again')
-    return {**table, INDEX: index, PLOTLY: _read(_plotly_script())}
+    return {**table, INDEX: index, PLOTLY: _read(plotly_script())}
 
 
 def _page_files(directory: Path) -> Iterator[tuple[str, PageFile]]:
@@ -74,14 +74,3 @@ def _page_files(directory: Path) -> Iterator[tuple[str, PageFile]]:
 def _read(path: Path) -> PageFile:
     body = path.read_bytes()
     return PageFile(body, TYPES[path.suffix], hashlib.sha256(body).hexdigest()[:32])
-
-
-def _plotly_script() -> Path:
-    # Importing plotly costs a second; only its script is wanted.
-    spec = importlib.util.find_spec('plotly')
-    for directory in spec.submodule_search_locations or () if spec is not None else ():
-        script = Path(directory) / 'package_data' / 'plotly.min.js'
-        if script.is_file():
-            return script
-    raise CrgameError('the package plotly is missing, which draws the diagrams of the cockpit; '
-                      'install it: pip install plotly')

@@ -21,7 +21,7 @@ from typing import Any
 from crgame_ros.recording.run_folder import FINISHED_MARK, run_folder
 
 # Of a run: its game and recordings, and what is made from them.
-_KINDS = ('game.yaml', 'bag*', '*.xml', 'timing*.json')
+_KINDS = ('game.yaml', 'bag*', '*.xml', 'timing*.json', 'report*.html')
 
 
 def files_document(session: Path, epoch: int) -> dict[str, Any]:

@@ -69,6 +69,7 @@ class RunRequest:
     :param replay: recording to show in the page; nothing is simulated then.
     :param realtime_priority: SCHED_FIFO for the simulation.
     :param namespace: of all nodes, topics and services.
+    :param no_report: without the report, one HTML file, at the end of each run.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
@@ -87,6 +88,7 @@ class RunRequest:
     out: Path | None = None
     problems: tuple[int, ...] = ()
     namespace: str = '/'
+    no_report: bool = False
 
 
 class _Parser(argparse.ArgumentParser):
@@ -129,6 +131,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         'domain')
     add('--out', type=Path, metavar='DIR',
         help="folder for this run's files (default: runs/<time>_<scenario>)")
+    add('--no-report', action='store_true',
+        help='without report.html, which tells of a run that is over and takes some seconds')
     return parser
 
 

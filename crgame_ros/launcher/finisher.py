@@ -19,9 +19,15 @@ from pathlib import Path
 import subprocess
 import sys
 import time
+from typing import TYPE_CHECKING
 
+from crgame_ros.launcher.interruption import writing
+from crgame_ros.launcher.run_report import write_run_report
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
+
+if TYPE_CHECKING:  # It takes a second to import.
+    from crgame_ros.recording.finish import FinishedRecording
 
 LOOK_S = 0.5
 
@@ -34,11 +40,14 @@ class Finisher:
 
     :param session: folder of the session, which is that of its first run.
     :param say: prints one line.
+    :param reports: whether each run gets a report, once its other files are written.
     """
 
-    def __init__(self, session: Path, say: Callable[[str], None]) -> None:
+    def __init__(self, session: Path, say: Callable[[str], None], reports: bool = True) -> None:
         self._session = session
         self._say = say
+        self._reports = reports
+        self._finished: list[FinishedRecording] = []
         self._process: subprocess.Popen[str] | None = None
         self._codes: dict[Path, int] = {}
         self._folder = session
@@ -72,17 +81,31 @@ class Finisher:
         folders = run_folders(self._session)
         for folder in folders:
             if folder not in self._codes:
-                self._codes[folder] = finish_run(folder, self._say)
+                self._codes[folder] = finish_run(
+                    folder, self._say,
+                    finished=self._finished.append if self._reports else lambda _: None)
             (folder / FINISHED_MARK).unlink(missing_ok=True)
         codes = set(self._codes.values())
         # A first game that nobody drove, before they chose another one, is no failure.
         return 0 if OK in codes and codes <= {OK, EMPTY} else 1
 
+    def write_reports(self) -> None:
+        """Write the reports of what `finish_all` has finished; a second signal leaves them out."""
+        if not self._finished:
+            return
+        try:
+            with writing(self._say, 'still writing the report; once more leaves it out'):
+                for each in self._finished:
+                    write_run_report(each, self._say)
+        except KeyboardInterrupt:
+            self._say(f'no report; `crgame report {self._session}` writes it')
+
     def _start(self, folder: Path) -> None:
         self._folder = folder
         # Ctrl-C is for the launcher, which then finishes all by itself.
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'crgame_ros.recording.finish', str(folder)],
+            [sys.executable, '-m', 'crgame_ros.launcher.finish_process', str(folder),
+             *([] if self._reports else ['--no-report'])],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             text=True, start_new_session=True)
 

@@ -40,12 +40,16 @@ def say(text: str) -> None:
         os.kill(os.getpid(), signal.SIGHUP)
 
 
+_RECOVERED = 'still writing the files; once more leaves that to `crgame recover`'
+
+
 @contextmanager
-def writing(tell: Callable[[str], None]) -> Iterator[None]:
+def writing(tell: Callable[[str], None], warning: str = _RECOVERED) -> Iterator[None]:
     """
     Let the files of a run be written whatever signal comes; a second one is meant.
 
     :param tell: prints one line.
+    :param warning: what it prints at the first signal.
     """
     heard = 0
 
@@ -54,7 +58,7 @@ def writing(tell: Callable[[str], None]) -> Iterator[None]:
         heard += 1
         if heard > 1:
             raise KeyboardInterrupt
-        tell('still writing the files; once more leaves that to `crgame recover`')
+        tell(warning)
 
     before = {number: signal.signal(number, on_signal) for number in ENDING}
     try:

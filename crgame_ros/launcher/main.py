@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         announce(plan)
         # Killed processes leave 4 MB each.
         remove_stale()
-        finisher = Finisher(plan.folder, say)
+        finisher = Finisher(plan.folder, say, not request.no_report)
         try:
             with held(os.environ['ROS_DOMAIN_ID'], request.namespace):
                 specs = node_specs(plan)
@@ -66,6 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             plan.claim.unlink(missing_ok=True)
         with writing(say):
             code = max(code, finisher.finish_all())
+        finisher.write_reports()
         say(f'again: ./run.sh {plan.game_file}; tools: ./crgame --help')
         return code
     except CrgameError as error:

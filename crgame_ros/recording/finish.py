@@ -12,17 +12,12 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""
-Completing a run's recording, and deriving the scenario and the timing report from it.
-
-`python -m crgame_ros.recording.finish FOLDER` does it beside a graph that goes on.
-"""
+"""Completing a run's recording, and deriving the scenario and the timing report from it."""
 
 from collections.abc import Callable
 from functools import partial
-import os
 from pathlib import Path
-import sys
+from typing import Any, NamedTuple
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.conversion import convert_log, read_last_run
@@ -37,18 +32,34 @@ from crgame_ros.recording.timing_report import write_timing_report
 
 # Exit codes.
 OK, FAILED, EMPTY = 0, 1, 3
-# The run that goes on comes first.
-_NICE = 10
 _NOTHING = 'nothing was recorded: the run ended before its first step'
 
 
-def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True) -> int:
+class FinishedRecording(NamedTuple):
+    """
+    A recording whose scenario and timing report have been written.
+
+    :param bag: its folder.
+    :param suffix: of the names of files that are made from it, empty for the first of a run.
+    :param log: the run in it.
+    :param timing: what its timing report says; None where there is none.
+    """
+
+    bag: Path
+    suffix: str
+    log: RunLog
+    timing: dict[str, Any] | None
+
+
+def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True,
+               finished: Callable[[FinishedRecording], object] = lambda _: None) -> int:
     """
     Complete the recordings of a run, and write the files that are made from them.
 
     :param folder: of the run.
     :param say: takes one line for people.
     :param progress: whether to say how far it is, where it takes long.
+    :param finished: is given each recording that could be read, once its files are written.
     :return: OK, FAILED if something could not be written, EMPTY if nothing was recorded.
     """
     code = OK
@@ -64,8 +75,10 @@ def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True
     for bag in runs:
         # The first gives the run's files their names, later ones their own.
         suffix = bag.name.removeprefix(runs[0].name)
-        scenario = folder / f'{bag.name}.xml' if suffix else folder
-        results.append(_derive(bag, folder / f'timing{suffix}.json', scenario, say, tell))
+        code_of, done = _derive(bag, suffix, say, tell)
+        results.append(code_of)
+        if done is not None:
+            finished(done)
     if not runs:
         say(f'{folder}: {_NOTHING}')
     if set(results) <= {EMPTY}:
@@ -81,26 +94,31 @@ def _tell_nobody(_line: str) -> None:
     """Take word of progress that nobody reads in time."""
 
 
-def _derive(bag: Path, report: Path, scenario: Path, say: Callable[[str], object],
-            tell: Callable[[str], object]) -> int:
+def _derive(bag: Path, suffix: str, say: Callable[[str], object],
+            tell: Callable[[str], object]) -> tuple[int, FinishedRecording | None]:
     """Write what is made from one recording: timing report and scenario agree on its steps."""
+    folder = bag.parent
     if not _has_cycles(bag):
-        say(f'{bag.parent}: {_NOTHING}')
-        return EMPTY
+        say(f'{folder}: {_NOTHING}')
+        return EMPTY, None
     logs: list[RunLog] = []
     try:
         reading = Progress(tell, f'reading {bag}')
         code = _attempt(lambda: logs.append(read_last_run(bag, reading)), say)
     except RunTooShortError as error:
-        say(f'{bag.parent}: {error.what}')
-        return EMPTY
+        say(f'{folder}: {error.what}')
+        return EMPTY, None
     # What cannot be made a scenario still has its timing.
     log = logs[0] if logs else None
+    reports: list[dict[str, Any]] = []
     timing = Progress(tell, f'reading the timing of {bag}')
-    code |= _attempt(partial(write_timing_report, bag, report, log=log, progress=timing), say)
-    if log is not None:
-        code |= _attempt(partial(convert_log, log, bag, scenario), say)
-    return code
+    code |= _attempt(lambda: reports.append(write_timing_report(
+        bag, folder / f'timing{suffix}.json', log=log, progress=timing)), say)
+    if log is None:
+        return code, None
+    scenario = folder / f'{bag.name}.xml' if suffix else folder
+    code |= _attempt(partial(convert_log, log, bag, scenario), say)
+    return code, FinishedRecording(bag, suffix, log, reports[0] if reports else None)
 
 
 def _has_cycles(bag: Path) -> bool:
@@ -126,14 +144,3 @@ def _attempt(step: Callable[[], object], say: Callable[[str], object]) -> int:
         say(f'error: {type(error).__name__}: {error}')
         return FAILED
     return OK
-
-
-def main() -> int:
-    """Finish the run in the folder that the command line names."""
-    os.nice(_NICE)
-    # What it says is read when it has ended.
-    return finish_run(Path(sys.argv[1]), lambda line: print(line, flush=True), progress=False)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

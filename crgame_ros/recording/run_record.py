@@ -61,7 +61,15 @@ def read_run_record(path: Path, epoch: int | None = None,
 
     Without recorded cycles there are no commands.
     """
-    log = read_run_log(path, epoch, progress)
+    return record_of_log(path, read_run_log(path, epoch, progress))
+
+
+def record_of_log(path: Path, log: RunLog) -> RunRecord:
+    """
+    Read what else there is of a run that has been read from a recording.
+
+    :raises InputError: if its events cannot be read.
+    """
     vehicles = [item.id for item in log.vehicles]
     fired = read_run_events(path, log.game.epoch).fired
     orders = read_seat_orders(path, log.game.epoch)

@@ -33,10 +33,11 @@ def test_every_argument() -> None:
         'games/mine.yaml', '--scenario', 'road.xml', '--driver', 'evdev:Logitech G29',
         '--planner', 'idm', '--planner', 'mine.py:Mine', '--duration', '20', '--rate', '200',
         '--real-time-factor', '0.5', '--headless', '--port', '9000', '--listen', '0.0.0.0',
-        '--realtime-priority', '--out', 'there'])
+        '--realtime-priority', '--no-report', '--out', 'there'])
     assert request == RunRequest(
         Path('games/mine.yaml'), Path('road.xml'), 'evdev:Logitech G29', ('idm', 'mine.py:Mine'),
-        20.0, 200.0, 0.5, True, 9000, '0.0.0.0', realtime_priority=True, out=Path('there'))
+        20.0, 200.0, 0.5, True, 9000, '0.0.0.0', realtime_priority=True, no_report=True,
+        out=Path('there'))
 
 
 @pytest.mark.parametrize(('arguments', 'named'), [

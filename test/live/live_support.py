@@ -70,15 +70,17 @@ class Launcher:
     :param out: folder of the run; None leaves the choice to the launcher.
     :param cwd: where it is started.
     :param headless: without the cockpit.
+    :param report: with the report at the end, which only its own test needs.
     :param domain: that of another run; one of its own if not given.
     """
 
     def __init__(self, arguments: Sequence[str | Path], out: Path | None = None,
-                 cwd: Path = ROOT, *, headless: bool = True, domain: int | None = None) -> None:
+                 cwd: Path = ROOT, *, headless: bool = True, domain: int | None = None,
+                 report: bool = False) -> None:
         self.domain = own_domain_id() if domain is None else domain
         self.out = out or cwd
         words = [*map(str, arguments), *(['--out', str(out)] if out else []),
-                 *(['--headless'] if headless else [])]
+                 *(['--headless'] if headless else []), *([] if report else ['--no-report'])]
         environment = {key: value for key, value in os.environ.items()
                        if not key.startswith('CRGAME_')}
         self._process = subprocess.Popen(

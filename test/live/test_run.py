@@ -65,7 +65,7 @@ NODES = {'sim_node', 'driver_node_hv0', 'planner_node_av0', 'recorder_node', 'dr
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Launcher]:
     """Run the cut-in game to the end of its short duration."""
     with Launcher([CUT_IN, '--duration', DURATION_S],
-                  tmp_path_factory.mktemp('finished') / 'run') as launcher:
+                  tmp_path_factory.mktemp('finished') / 'run', report=True) as launcher:
         assert launcher.wait() == 0, launcher.text
         yield launcher
 
@@ -85,10 +85,10 @@ def _poses(bag: Path) -> dict[int, dict[str, tuple[float, float, float]]]:
     return {(stamp_ns - start_ns) // STEP_NS: value for stamp_ns, value in poses.items()}
 
 
-def _check_outputs(out: Path, benchmark_id: str) -> None:
-    """Check that the four outputs are there and the recording is finished."""
+def _check_outputs(out: Path, benchmark_id: str, *more: str) -> None:
+    """Check that the four outputs are there, and more, and the recording is finished."""
     assert {path.name for path in out.iterdir()} == {
-        'bag', f'{benchmark_id}.xml', 'timing.json', 'game.yaml'}
+        'bag', f'{benchmark_id}.xml', 'timing.json', 'game.yaml', *more}
     assert sorted(path.suffix for path in (out / 'bag').iterdir()) == ['.mcap', '.yaml']
     metadata = read_metadata(out / 'bag')
     with BagReader(out / 'bag') as reader:
@@ -97,9 +97,11 @@ def _check_outputs(out: Path, benchmark_id: str) -> None:
     CommonRoadFileReader(str(out / f'{benchmark_id}.xml')).open()
 
 
-def test_a_run_leaves_its_four_outputs(finished: Launcher) -> None:
-    """Bag with metadata, scenario, timing report and game; the nodes start once and all end."""
-    _check_outputs(finished.out, BENCHMARK_ID)
+def test_a_run_leaves_its_outputs(finished: Launcher) -> None:
+    """Bag with metadata, scenario, timing, game and report; the nodes start once and all end."""
+    _check_outputs(finished.out, BENCHMARK_ID, 'report.html')
+    # The report comes after everything that nobody can make up for.
+    assert finished.text.index('/timing.json') < finished.text.index('writing ')
     assert {name for name, _ in finished.started} == NODES
     assert len(finished.started) == len(NODES)
     assert not any(is_node(pid) for _, pid in finished.started)

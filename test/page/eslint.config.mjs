@@ -38,7 +38,7 @@ export default [
     },
   },
   {
-    files: ['crgame_ros/cockpit/page/js/**/*.js'],
+    files: ['crgame_ros/cockpit/page/js/**/*.js', 'crgame_ros/analysis/report/page/*.js'],
     languageOptions: { globals: globals.browser },
   },
   {

@@ -1,0 +1,131 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Several runs side by side: a table, and what they have in common in one plot each."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from crgame_ros.analysis.criticality.criticality import MEASURES
+from crgame_ros.analysis.report.criticality_section import is_critical, marked
+from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
+from crgame_ros.analysis.report.report_section import Dash, Plot, PlotLine, Section
+from crgame_ros.analysis.report.report_text import free, NOTHING, number, share, table
+from crgame_ros.analysis.report.run_section import title_of
+from crgame_ros.analysis.report.story_section import moment
+from crgame_ros.vehicle.state import StateColumn
+
+# Lines of runs are told apart by these colours, and those of their vehicles by dashes.
+_COLOURS = ('human-0', 'av-0', 'av-2', 'human-2', 'human-1', 'av-1')
+_DASHES: tuple[Dash, ...] = ('solid', 'dash', 'dot')
+# More lines in one plot nobody reads.
+_MOST_LINES = 18
+_COMPARED = {'ttc': 'least TTC [s]', 'thw': 'least THW [s]', 'gap': 'least gap [m]',
+             'drac': 'greatest DRAC [m/s²]', 'min_distance': 'least distance [m]'}
+
+
+def comparison_section(runs: Sequence[ReportRun]) -> Section:
+    """Compare runs: the letters stand for them in plots."""
+    head = ('', *(f'{letter(i)}: {free(run.name)}' for i, run in enumerate(runs)))
+    rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
+    return Section('comparison', 'Comparison', table(
+        'The runs side by side; of measures the worst of all driven vehicles', head, rows,
+        'numbers comparison'), tuple(_plots(runs)))
+
+
+def letter(place: int) -> str:
+    """Give the letter of a run; after Z come AA, AB, …"""
+    first, last = divmod(place, 26)
+    return (letter(first - 1) if first else '') + chr(ord('A') + last)
+
+
+def _rows() -> Iterator[tuple[str, Callable[[ReportRun], str]]]:
+    yield 'game', lambda run: free(title_of(run))
+    yield 'scenario', lambda run: free(run.log.game.benchmark_id)
+    yield 'drivers', lambda run: ', '.join(
+        f'{item.id} {free(item.driver)}' for item in run.log.game.humans) or NOTHING
+    yield 'planners', lambda run: ', '.join(
+        f'{item.id} {free(item.planner)}' for item in run.log.game.avs) or NOTHING
+    yield 'seed', lambda run: str(run.log.game.seed)
+    yield 'length [s]', lambda run: number(float(run.times_s[-1]), 1)
+    for name, words in _COMPARED.items():
+        yield words, lambda run, name=name: worst_of_all(run, name)  # type: ignore[misc]
+    yield 'time below the threshold of TTC [s]', lambda run: number(sum(
+        each.tet_s for each in run.criticality.report()))
+    yield 'least PET [s]', _least_pet
+    yield 'contacts', lambda run: _told(run, lambda timing: str(len(timing['contacts']))
+                                        if timing['contacts'] is not None else NOTHING)
+    yield 'violations', lambda run: _told(
+        run, lambda timing: str(timing['drivability']['violations']))
+    yield 'events that took effect', lambda run: str(len(run.record.fired))
+    yield 'plans accepted', accepted
+    yield 'worst latency p99 [ms]', _latency
+    yield 'greatest cumulative error [ms]', lambda run: _told(
+        run, lambda timing: number(timing['max_cumulative_error_ms'], 1))
+
+
+def worst_of_all(run: ReportRun, name: str) -> str:
+    """Write the worst value of a measure of all vehicles of a run, leading to its moment."""
+    found = [each.worst[name] for each in run.criticality.report() if name in each.worst]
+    if not found:
+        return NOTHING
+    sign = MEASURES[name].worst
+    worst = max(found, key=lambda each: sign * each.value)
+    critical = is_critical(name, worst.value, run.criticality.thresholds)
+    return f'{marked(number(worst.value), critical)} <small>at {moment(run, worst.time_s)}</small>'
+
+
+def accepted(run: ReportRun) -> str:
+    """Write how many plans of all AVs were accepted."""
+    entries = () if run.timing is None else run.timing['planners'].values()
+    asked, taken = (sum(entry[key] or 0 for entry in entries) for key in ('requests', 'accepted'))
+    return f'{taken} of {asked} ({share(taken, asked)})' if asked else NOTHING
+
+
+def _told(run: ReportRun, say: Callable[[Any], str]) -> str:
+    return NOTHING if run.timing is None else say(run.timing)
+
+
+def _least_pet(run: ReportRun) -> str:
+    found = [each for vehicle in run.criticality.report() for each in vehicle.crossings]
+    if not found:
+        return NOTHING
+    least = min(found, key=lambda each: each.pet_s)
+    text = marked(number(least.pet_s), least.pet_s < run.criticality.thresholds.pet_s)
+    return f'{text} <small>at {moment(run, least.entered_s)}</small>'
+
+
+def _latency(run: ReportRun) -> str:
+    entries = () if run.timing is None else run.timing['planners'].values()
+    known = [entry['latency_ms']['p99'] for entry in entries if entry['latency_ms']]
+    return number(max(known), 1) if known else NOTHING
+
+
+def _plots(runs: Sequence[ReportRun]) -> Iterator[Plot]:
+    units = {name: MEASURES[name].unit.replace('^2', '²') for name in PLOTTED}
+    yield _plot(runs, 'speed', 'Speed', 'm/s', lambda run, i: run.log.vehicle_states[
+        :, i, StateColumn.SPEED], None)
+    for name, words, bounds in (('ttc', 'Time to collision', (0.0, 10.0)),
+                                ('min_distance', 'Distance', None)):
+        place = PLOTTED.index(name)
+        yield _plot(runs, name.replace('_', '-'), words, units[name],
+                    lambda run, i, place=place: run.course[i, place], bounds)  # type: ignore[misc]
+
+
+def _plot(runs: Sequence[ReportRun], key: str, words: str, unit: str,
+          values: Callable[[ReportRun, int], Any], bounds: tuple[float, float] | None) -> Plot:
+    lines = [PlotLine(f'{letter(place)} {item.id}', run.times_s, values(run, i),
+                  _COLOURS[place % len(_COLOURS)], _DASHES[i % len(_DASHES)])
+             for place, run in enumerate(runs) for i, item in enumerate(run.log.vehicles)]
+    return Plot(key, words, unit, tuple(lines[:_MOST_LINES]), bounds=bounds)

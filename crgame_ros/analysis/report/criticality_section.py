@@ -1,0 +1,121 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How critical a run was: the worst values, and each measure over time."""
+
+from collections.abc import Iterator, Sequence
+
+from crgame_ros.analysis.criticality.criticality import MEASURES, VehicleCriticality
+from crgame_ros.analysis.criticality.thresholds import Thresholds
+from crgame_ros.analysis.report.motion_section import dash_of
+from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
+from crgame_ros.analysis.report.report_section import Plot, PlotLimit, PlotLine, Section
+from crgame_ros.analysis.report.report_text import note, number, plain, table
+from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.story_moments import is_told, TWICE, WORDS
+from crgame_ros.analysis.report.story_section import moment
+import numpy as np
+from numpy.typing import NDArray
+
+# Longer times say nothing: plots begin without them. [s]
+_SHOWN_S = 10.0
+# Of decelerations nobody can reach more [m/s^2].
+_SHOWN_DRAC = 12.0
+
+
+def criticality_section(run: ReportRun) -> Section:
+    """Show what was critical."""
+    limits = run.criticality.thresholds
+    measured = run.criticality.report()
+    html = note('Each row is the most critical value of the whole run, of whom, and when; the '
+                'time leads to the picture of that moment. Bold and ‼ mark what is beyond a '
+                f'threshold: TTC below {limits.ttc_s:g} s, DRAC above {limits.drac:g} m/s², '
+                f'PET below {limits.pet_s:g} s.')
+    for vehicle in measured:
+        rows = list(_worst(run, vehicle, limits))
+        caption = f'Worst values of {named(run, vehicle.vehicle_id)}'
+        html += table(caption, ('measure', 'worst', 'unit', 'against', 'at [s]'), rows,
+                      'numbers worst') if rows else f'<p>{caption}: nobody was near.</p>'
+    html += table('Time below the threshold of TTC', (
+        'vehicle', f'TTC below {limits.ttc_s:g} s [s]', 'integral below it [s²]'), [
+            (named(run, vehicle.vehicle_id), number(vehicle.tet_s), number(vehicle.tit))
+            for vehicle in measured], 'numbers')
+    crossings = [row for vehicle in measured for row in _crossings(run, vehicle, limits)]
+    if crossings:
+        html += table('Ways that crossed: post-encroachment time (PET)', (
+            'vehicle', 'first', 'second', 'second entered at [s]', 'PET [s]'), crossings,
+            'numbers')
+    return Section('criticality', 'Criticality', html, tuple(_plots(run, limits)))
+
+
+def is_critical(name: str, value: float, limits: Thresholds) -> bool:
+    """Tell whether a measure's value is beyond its threshold."""
+    return name in ('ttc', 'ttc_2d') and value < limits.ttc_s \
+        or name == 'drac' and value > limits.drac \
+        or name in ('min_distance', 'gap') and value <= 0.0
+
+
+def marked(text: str, critical: bool) -> str:
+    """Mark what is critical: not by its colour alone."""
+    return f'<strong class="critical">{text}<span class="sign"> ‼</span></strong>' \
+        if critical else text
+
+
+def _worst(run: ReportRun, vehicle: VehicleCriticality,
+           limits: Thresholds) -> Iterator[Sequence[str]]:
+    for name, measure in MEASURES.items():
+        worst = vehicle.worst.get(name)
+        if worst is None or name == TWICE or not is_told(measure, worst):
+            continue
+        word = f'<span title="{plain(measure.definition)}">{WORDS.get(name, name)}</span>'
+        yield (word, marked(number(worst.value), is_critical(name, worst.value, limits)),
+               measure.unit.replace('^2', '²'), named(run, worst.other),
+               moment(run, worst.time_s))
+
+
+def _crossings(run: ReportRun, vehicle: VehicleCriticality,
+               limits: Thresholds) -> Iterator[Sequence[str]]:
+    ids = run.criticality.ids
+    for each in vehicle.crossings:
+        yield (named(run, vehicle.vehicle_id), named(run, ids[each.first]),
+               named(run, ids[each.second]), moment(run, each.entered_s),
+               marked(number(each.pet_s), each.pet_s < limits.pet_s))
+
+
+def _plots(run: ReportRun, limits: Thresholds) -> Iterator[Plot]:
+    lines_at = {'ttc': (PlotLimit(limits.ttc_s, 'critical below'),),
+                'drac': (PlotLimit(limits.drac, 'critical above'),),
+                'min_distance': (PlotLimit(0.0, 'contact'),), 'gap': (PlotLimit(0.0, 'contact'),)}
+    for place, name in enumerate(PLOTTED):
+        values = run.course[:, place]
+        if not np.isfinite(values).any():
+            continue
+        unit = MEASURES[name].unit.replace('^2', '²')
+        yield Plot(name.replace('_', '-'), WORDS[name], unit, tuple(
+            PlotLine(item.id, run.times_s, values[i], run.colours[item.id], dash_of(item.role))
+            for i, item in enumerate(run.log.vehicles)), lines_at.get(name, ()),
+            bounds=_bounds(name, unit, values, limits))
+
+
+def _bounds(name: str, unit: str, values: NDArray[np.float64],
+            limits: Thresholds) -> tuple[float, float] | None:
+    """Choose what a plot shows at first, where its extremes would hide the rest."""
+    finite = values[np.isfinite(values)]
+    most = float(finite.max())
+    if unit == 's':
+        least = min(0.0, float(finite.min()))
+        return (1.05 * least, _SHOWN_S) if most > _SHOWN_S else None
+    if name == 'drac':
+        return -0.2, 1.1 * max(limits.drac, min(most, _SHOWN_DRAC))
+    return None

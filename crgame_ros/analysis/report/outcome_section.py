@@ -1,0 +1,85 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What happened in a run: events, contacts, violations."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from crgame_ros.analysis.report.report_run import ReportRun
+from crgame_ros.analysis.report.report_section import Section
+from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, table
+from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.story_section import moment
+
+
+def outcome_section(run: ReportRun) -> Section:
+    """Say who touched whom, who broke what, and which events took effect."""
+    html = _contacts(run) + _violations(run) + _events(run)
+    return Section('outcome', 'Contacts, violations, events', html)
+
+
+def contacts_of_report(run: ReportRun) -> Sequence[Mapping[str, Any]] | None:
+    """Give the contacts as `timing.json` has them; None where nobody knows."""
+    return None if run.timing is None else run.timing['contacts']
+
+
+def _contacts(run: ReportRun) -> str:
+    contacts = contacts_of_report(run)
+    if contacts is None:
+        return note('Contacts: the recording does not tell.')
+    if not contacts:
+        return note('No driven vehicle touched anything.')
+    return table('Contacts, the first of each pair', (
+        'vehicle', 'touched', 'at [s]', 'kind', 'speed [m/s]', "other's [m/s]",
+        'avoidable by'), [
+            (named(run, item['vehicle']), named(run, item['with']),
+             moment(run, _time_s(run, item)), free(item['kind']),
+             number(item['speed']), number(item['other_speed']), free(item['avoidable_by']))
+            for item in contacts], 'numbers')
+
+
+def _time_s(run: ReportRun, item: Mapping[str, Any]) -> float | None:
+    n = item['n']
+    return None if n is None else n * run.log.game.scheduler.dt_s
+
+
+def _violations(run: ReportRun) -> str:
+    if run.timing is None:
+        return note('Violations: the recording does not tell.')
+    found = run.timing['drivability']['list']
+    if not found:
+        return note('Nobody left the road or broke a rule that was checked.')
+    return table('Violations, when each began', ('vehicle', 'what', 'at [s]'), [
+        (named(run, item['vehicle']), free(item['what']),
+         NOTHING if item['n'] is None else moment(run, _time_s(run, item)))
+        for item in found], 'numbers')
+
+
+def _events(run: ReportRun) -> str:
+    known = run.log.game.events
+    if not known and not run.record.fired:
+        return note('The game has no events.')
+    return table('Events of the game', ('event', 'took effect at [s]', 'by'),
+                 _event_rows(run), 'numbers')
+
+
+def _event_rows(run: ReportRun) -> Iterator[Sequence[str]]:
+    dt_s = run.log.game.scheduler.dt_s
+    fired = run.record.fired
+    for event in fired:
+        yield free(event.name), moment(run, event.n * dt_s), event.by
+    for spec in run.log.game.events:
+        if all(event.name != spec.name for event in fired):
+            yield free(spec.name), 'never', NOTHING

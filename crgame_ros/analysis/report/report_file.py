@@ -1,0 +1,66 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The file of a report: written whole or not at all, and what wrote it."""
+
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+import os
+from pathlib import Path
+import platform
+
+from crgame_ros import __version__
+from crgame_ros.analysis.report.report_page import report_html
+from crgame_ros.analysis.report.report_run import ReportRun
+from crgame_ros.analysis.report.run_section import software_note
+from crgame_ros.recording.export import write_text
+
+# Of those that compute what a report tells.
+_PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker',
+             'plotly')
+
+
+def write_report(runs: Sequence[ReportRun], path: Path, driven_here: bool = False) -> None:
+    """
+    Write the report of one or more runs.
+
+    :param runs: each with a key of its own.
+    :param path: of the file.
+    :param driven_here: whether this software has just driven them, too, on this machine.
+    :raises InputError: if the file cannot be written.
+    :raises CrgameError: if Plotly is not installed.
+    """
+    write_text(report_html(runs, software_note(_software(), driven_here)), path)
+
+
+def _software() -> tuple[tuple[str, str], ...]:
+    """Name the software and the machine: nothing that changes from one minute to the next."""
+    found = [('crgame_ros', __version__), ('Python', platform.python_version())]
+    for name in _PACKAGES:
+        try:
+            found.append((name, version(name)))
+        except PackageNotFoundError:
+            continue
+    machine = f'{platform.system()} {platform.release()}, {platform.machine()}'
+    return (*found, ('on', f'{machine}, {_processor()}'))
+
+
+def _processor() -> str:
+    count = f'{os.cpu_count()} cores'
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8', errors='replace').splitlines()
+    except OSError:
+        return count
+    names = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
+    return f'{names[0]}, {count}' if names else count

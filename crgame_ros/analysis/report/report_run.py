@@ -1,0 +1,159 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A run, and everything that its report tells of it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, MEASURES
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.pictures.critical_moments import Moment
+from crgame_ros.analysis.report.story_moments import story_moments
+from crgame_ros.errors import CrgameError
+from crgame_ros.game.objects import Role
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_record import read_run_record, RunRecord
+from crgame_ros.recording.timing_report import timing_report
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Of the vehicles with their roles in this order, as the page's style has them.
+COLOURS = {Role.HUMAN: ('human-0', 'human-1', 'human-2'),
+           Role.AUTONOMOUS: ('av-0', 'av-1', 'av-2')}
+# What is plotted over time.
+PLOTTED = ('gap', 'ttc', 'thw', 'drac', 'min_distance')
+# Reading takes about so much of the time that a report takes.
+_READ_SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class ReportRun:
+    """
+    A run to report.
+
+    :param key: tells it from others of a report, as part of an address in the page.
+    :param name: of its folder, as somebody wrote it.
+    :param record: what happened.
+    :param criticality: of it.
+    :param course: (V, len(PLOTTED), K) the most critical value of each plotted measure at each
+        scenario step; NaN where there was nothing to measure.
+    :param moments: of which there are pictures, in the order of time.
+    :param timing: the content of `timing.json`; None where the recording does not tell.
+    :param began_ns: log time of its first message, since 1970 [ns]; None of an offline run.
+    :param notices: what is wrong with the recording.
+    """
+
+    key: str
+    name: str
+    record: RunRecord
+    criticality: Criticality
+    course: FloatArray
+    moments: tuple[Moment, ...]
+    timing: Mapping[str, Any] | None
+    began_ns: int | None
+    notices: tuple[str, ...]
+
+    @property
+    def log(self) -> RunLog:
+        """The run on its scenario's grid."""
+        return self.record.log
+
+    @property
+    def times_s(self) -> FloatArray:
+        """Simulated times of the scenario steps since the run's start (K) [s]."""
+        scheduler = self.log.game.scheduler
+        return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
+
+    @property
+    def colours(self) -> dict[str, str]:
+        """The name of each driven vehicle's colour."""
+        found: dict[str, str] = {}
+        for role, names in COLOURS.items():
+            of_role = [item.id for item in self.log.vehicles if item.role is role]
+            found |= {vehicle: names[i % len(names)] for i, vehicle in enumerate(of_role)}
+        return found
+
+
+def read_report_run(path: Path, epoch: int | None = None,
+                    progress: Callable[[float], object] = lambda _: None) -> ReportRun:
+    """
+    Read and measure a run.
+
+    :param path: folder of a run, or its recording.
+    :param epoch: which run, where a recording holds several; None for the last.
+    :param progress: is told how much is done, from 0 to 1.
+    :raises InputError: if it cannot be read.
+    """
+    bag = recording_in(path)
+    record = read_run_record(bag, epoch, lambda part: progress(_READ_SHARE * part))
+    try:
+        timing = timing_report(bag, log=record.log)
+    except CrgameError as error:
+        return measured_run(_name(path), bag, record, None, progress, (str(error),))
+    return measured_run(_name(path), bag, record, timing, progress)
+
+
+def measured_run(name: str, bag: Path | None, record: RunRecord,
+                 timing: Mapping[str, Any] | None,
+                 progress: Callable[[float], object] = lambda _: None,
+                 notices: tuple[str, ...] = ()) -> ReportRun:
+    """
+    Measure a run that has been read.
+
+    :param bag: its recording, if there is one.
+    :param timing: as `timing_report` gives it.
+    """
+    log = record.log
+    course = np.full((len(log.vehicles), len(PLOTTED), len(log.ks)), np.nan)
+    row = 0
+
+    def take(criticality: Criticality) -> None:
+        nonlocal row
+        for subject, _, values in criticality.latest:
+            course[subject, :, row] = _most_critical(values)
+        row += 1
+    found = measure_log(log, progress=lambda part: progress(
+        _READ_SHARE + (1.0 - _READ_SHARE) * part), on_tick=take)
+    began_ns = None
+    if bag is not None:
+        with BagReader(bag, parts=True) as reader:
+            began_ns = reader.start_ns or None
+    told = () if timing is None else timing['notices']
+    moments = story_moments(record, found, () if timing is None else timing['contacts'] or ())
+    return ReportRun('run1', name, record, found, course, moments, timing, began_ns,
+                     tuple(dict.fromkeys((*told, *log.notices, *notices))))
+
+
+def _most_critical(values: FloatArray) -> FloatArray:
+    """Of the measures of a vehicle against all near it (P, measures), give the worst of each."""
+    worst = np.full(len(PLOTTED), np.nan)
+    for place, name in enumerate(PLOTTED):
+        measure, column = MEASURES[name], values[:, COLUMN[name]]
+        column = column[~np.isnan(column) & (column != measure.undefined)]
+        if len(column):
+            worst[place] = column.min() if measure.worst < 0 else column.max()
+    return worst
+
+
+def _name(path: Path) -> str:
+    """Name a run by its folder; a recording in one is named by that."""
+    whole = path.resolve()
+    return whole.parent.name if whole.name.startswith('bag') and whole.parent.name else whole.name

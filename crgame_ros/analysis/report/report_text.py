@@ -1,0 +1,89 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Text and numbers as HTML: whatever a recording says comes out as text."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+import math
+import re
+
+NOTHING = '–'
+# What hides or reorders the text around it: control characters, half a pair of UTF-16, and the
+# marks of direction. Joiners stay, for they hold emoji together.
+_UNSEEN = re.compile('[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff'
+                     '\ufdd0-\ufdef\ufffe\uffff]')
+_TAGS = re.compile('<[^>]*>')
+_SPACES = '\t\n\r'
+# Of one text in a table: a scenario may say megabytes.
+_LONGEST = 2000
+
+
+def plain(value: object) -> str:
+    """Escape text for a place where no markup may stand, such as `<title>`."""
+    text = str(value)
+    if len(text) > _LONGEST:
+        text = f'{text[:_LONGEST]} … ({len(text)} characters)'
+    return escape(_UNSEEN.sub(_named, text))
+
+
+def free(value: object) -> str:
+    """Escape text that somebody wrote, in whatever direction it runs."""
+    return f'<bdi>{plain(value)}</bdi>'
+
+
+def _named(found: re.Match[str]) -> str:
+    return ' ' if found[0] in _SPACES else f'⟨U+{ord(found[0]):04X}⟩'
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """Write a number with a true minus; a dash for what is not known."""
+    if value is None or math.isnan(value):
+        return NOTHING
+    if math.isinf(value):
+        return '∞' if value > 0.0 else '−∞'
+    text = f'{value:.{digits}f}'
+    return text.replace('-', '−') if float(text) else text.removeprefix('-')
+
+
+def share(part: float | None, whole: float | None) -> str:
+    """Write how much of a whole something is."""
+    if not whole or part is None:
+        return NOTHING
+    return f'{100.0 * part / whole:.1f} %'
+
+
+def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]],
+          kind: str = '') -> str:
+    """
+    Make a table whose rows are named by their first cells.
+
+    :param caption: HTML, as all cells are.
+    :param head: names of the columns; empty for none.
+    :param kind: its class.
+    """
+    columns = ''.join(f'<th scope="col">{cell}</th>' for cell in head)
+    body = ''.join(
+        f'<tr><th scope="row">{row[0]}</th>'
+        + ''.join(f'<td>{cell}</td>' for cell in row[1:]) + '</tr>' for row in rows)
+    name = _TAGS.sub('', caption)
+    return (f'<div class="wide" tabindex="0" role="region" aria-label="{name}">'
+            f'<table class="{kind}"><caption>{caption}</caption>'
+            + (f'<thead><tr>{columns}</tr></thead>' if head else '')
+            + f'<tbody>{body}</tbody></table></div>')
+
+
+def note(html: str) -> str:
+    """Make a remark of less weight."""
+    return f'<p class="note">{html}</p>'

@@ -1,0 +1,126 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What was run: game, scenario, who took part, and the settings."""
+
+from collections.abc import Iterator
+from datetime import datetime, UTC
+
+from crgame_ros.analysis.report.report_run import ReportRun
+from crgame_ros.analysis.report.report_section import Section
+from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain, table
+from crgame_ros.game.documents import GameDocument
+from crgame_ros.game.objects import Role
+
+# Of the text of a game file that is shown.
+_LONGEST_FILE = 20_000
+
+
+def run_section(run: ReportRun) -> Section:
+    """Say what was run."""
+    game = run.log.game
+    html = table('The run', (), [(label, value) for label, value in _facts(run)], 'facts')
+    html += table('Who was driven', ('vehicle', 'driven by', 'type', 'length × width [m]',
+                                     'planning problem', 'sees'), _vehicles(run), 'vehicles')
+    if run.notices:
+        items = ''.join(f'<li>{free(text)}</li>' for text in run.notices)
+        html += f'<div class="notices"><p>Of the recording:</p><ul>{items}</ul></div>'
+    if game.file:
+        text = game.file if len(game.file) <= _LONGEST_FILE else game.file[:_LONGEST_FILE] + ' …'
+        # Line by line: what cannot be seen is named, line ends stay.
+        lines = '\n'.join(map(plain, text.splitlines()))
+        html += f'<details class="file"><summary>Game file</summary><pre>{lines}</pre></details>'
+    return Section('run', 'What was run', html)
+
+
+def title_of(run: ReportRun) -> str:
+    """Give a run's title for people, as it was written: not escaped."""
+    return run.log.game.title or run.log.game.benchmark_id or run.name
+
+
+def began(run: ReportRun) -> str:
+    """Say when a run was recorded."""
+    if run.began_ns is None:
+        return NOTHING
+    when = datetime.fromtimestamp(run.began_ns // 1_000_000_000, UTC)
+    return when.strftime('%Y-%m-%d %H:%M:%S UTC')
+
+
+def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
+    game = run.log.game
+    scheduler = game.scheduler
+    yield 'game', free(game.title or NOTHING)
+    yield 'scenario', free(game.benchmark_id or NOTHING)
+    yield 'scenario file', f'<code>SHA-256 {plain(game.scenario_sha256[:16])}…</code>'
+    yield 'folder', free(run.name)
+    yield 'recorded', began(run)
+    yield 'length', (f'{number(float(run.times_s[-1]), 1)} s, scenario steps {run.log.ks[0]} to '
+                     f'{run.log.ks[-1]} of {scheduler.time_step_s:g} s')
+    yield 'simulation', (f'{1.0 / scheduler.dt_s:g} Hz, real-time factor '
+                         f'{game.real_time_factor:g}')
+    yield 'seed', str(game.seed)
+    yield 'traffic', _traffic(game)
+    yield 'others', _others(run)
+    yield 'run', f'{game.epoch + 1} of its session'
+
+
+def _traffic(game: GameDocument) -> str:
+    spec = game.traffic
+    if spec is None or not (spec.agents or spec.flow or spec.recorded == 'reactive'):
+        return 'none that reacts'
+    seed = game.seed if spec.seed is None else spec.seed
+    return (f'{spec.agents} agents at the start, {spec.flow:g} vehicles/h, recorded vehicles '
+            f'{plain(spec.recorded)}, car following {plain(spec.model)}, seed {seed}')
+
+
+def _others(run: ReportRun) -> str:
+    words = {Role.RECORDED: 'recorded', Role.STATIC: 'static', Role.TRAFFIC: 'of traffic',
+             Role.SCRIPTED: 'scripted'}
+    counts = {word: sum(item.role is role for item in run.log.objects)
+              for role, word in words.items()}
+    return ', '.join(f'{count} {word}' for word, count in counts.items() if count) or 'nobody'
+
+
+def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
+    game = run.log.game
+    for item in run.log.vehicles:
+        size = f'{item.shape.length:.2f} × {item.shape.width:.2f}'
+        human, av = game.human(item.id), game.av(item.id)
+        if human is not None:
+            yield (named(run, item.id), f'driver {free(human.driver)}', free(item.type), size,
+                   NOTHING, 'everything')
+        elif av is not None:
+            options = f' {free(dict(av.options))}' if av.options else ''
+            yield (named(run, item.id), f'planner {free(av.planner)}{options}', free(item.type),
+                   size, str(av.planning_problem),
+                   'everything' if av.perception is None else 'what its sensors do')
+
+
+def named(run: ReportRun, vehicle: str) -> str:
+    """Write the id of somebody, with the colour of its lines if it is driven."""
+    colour = run.colours.get(vehicle)
+    mark = '' if colour is None else f'<span class="mark {colour}" aria-hidden="true"></span>'
+    return mark + free(vehicle)
+
+
+def software_note(lines: tuple[tuple[str, str], ...], here: bool) -> str:
+    """
+    Say which software on which machine wrote the report.
+
+    :param lines: what, and which.
+    :param here: whether the run was driven there and then, too.
+    """
+    of = 'Run and report are of' if here else 'The report is of'
+    return note(f'{of} ' + ', '.join(f'{plain(what)} {plain(which)}' for what, which in lines)
+                + '.' + ('' if here else ' The recording does not say what drove the run.'))

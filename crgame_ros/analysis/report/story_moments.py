@@ -1,0 +1,87 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Which moments of a run its report shows, and how other parts of it lead there."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from crgame_ros.analysis.criticality.criticality import (
+    Criticality,
+    Measure,
+    MEASURES,
+    Worst,
+)
+from crgame_ros.analysis.pictures.critical_moments import (
+    critical_moments,
+    Moment,
+    TOGETHER_S,
+    Touch,
+)
+from crgame_ros.recording.run_record import RunRecord
+
+# Pictures of a run at most, its start and its end among them.
+MOST_FRAMES = 14
+# Longer times come of speeds that are almost equal [s].
+TOLD_S = 100.0
+WORDS = {
+    'gap': 'Gap to the leader', 'thw': 'Time headway (THW)', 'ttc': 'Time to collision (TTC)',
+    'ttc_a': 'TTC with accelerations', 'drac': 'Deceleration to avoid a crash (DRAC)',
+    'a_req': 'Required acceleration', 'ttc_2d': 'TTC in the plane', 'min_distance': 'Distance'}
+# The same number as the time headway.
+TWICE = 'time_gap'
+
+
+def story_moments(record: RunRecord, criticality: Criticality,
+                  contacts: Sequence[Mapping[str, Any]]) -> tuple[Moment, ...]:
+    """
+    Choose the moments that tell a run, in the order of time.
+
+    Start and end, the most critical ones, and those to which worst values lead.
+
+    :param contacts: as `timing.json` has them.
+    """
+    log = record.log
+    scheduler = log.game.scheduler
+    first_s, last_s = ((int(k) - scheduler.k0) * scheduler.time_step_s
+                       for k in (log.ks[0], log.ks[-1]))
+    ends = [Moment(first_s, 'start', ()), Moment(last_s, 'end', ())]
+    found = list(critical_moments(record, criticality, [Touch.of(item) for item in contacts]))
+    found += [Moment(worst.time_s, f'{WORDS.get(name, name)} of {vehicle.vehicle_id} to '
+                     f'{worst.other} is {worst.value:.2f} '
+                     + MEASURES[name].unit.replace('^2', '²'),
+                     (vehicle.vehicle_id, worst.other))
+              for vehicle in criticality.report() for name, worst in vehicle.worst.items()
+              if name != TWICE and is_told(MEASURES[name], worst)]
+    chosen: list[Moment] = []
+    for each in found:
+        if all(abs(each.time_s - other.time_s) > TOGETHER_S for other in chosen) \
+                and len(chosen) + len(ends) < MOST_FRAMES:
+            chosen.append(each)
+    chosen += [end for end in ends
+               if all(abs(end.time_s - other.time_s) > TOGETHER_S for other in chosen)]
+    return tuple(sorted(chosen))
+
+
+def is_told(measure: Measure, worst: Worst) -> bool:
+    """Tell whether a worst value says anything."""
+    return measure.unit != 's' or worst.value < TOLD_S
+
+
+def nearest_moment(moments: Sequence[Moment], time_s: float) -> int | None:
+    """Give the number of the moment that shows a time; None if there is none near it."""
+    near = min(range(len(moments)), key=lambda i: abs(moments[i].time_s - time_s), default=None)
+    if near is None or abs(moments[near].time_s - time_s) > TOGETHER_S + 1e-6:
+        return None
+    return near

@@ -1,0 +1,74 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The story of a run in frames: the scene at the moments that count."""
+
+from urllib.parse import quote
+
+from crgame_ros.analysis.pictures.frame_svg import frame_svg
+from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.report.report_run import ReportRun
+from crgame_ros.analysis.report.report_section import Section
+from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain
+from crgame_ros.analysis.report.story_moments import nearest_moment
+
+# Of a picture [px].
+_WIDTH = 560
+
+
+def story_section(run: ReportRun) -> Section | None:
+    """Show the scene at each moment of the story; None where nobody drives."""
+    if not run.log.vehicles:
+        return None
+    scene = FrameScene(run.log)
+    ks = [scene.k_at(moment.time_s) for moment in run.moments]
+    figures = []
+    for place, (k, moment) in enumerate(zip(ks, run.moments, strict=True)):
+        driven = [item.id for item in run.log.vehicles]
+        # Each for itself: what it is about is in the middle.
+        window = scene.windows([scene.row(k)], moment.vehicles)[0]
+        labelled = {*driven, *moment.vehicles}
+        svg = frame_svg(scene.at(k, window, labelled), _WIDTH)
+        words = f'{moment.time_s:.1f} s: {moment.why}'
+        figures.append(
+            f'<figure class="frame" id="{frame_address(run, place)}" tabindex="-1" '
+            f'data-time="{moment.time_s:.6f}"><img alt="The scene from above at {plain(words)}" '
+            f'src="data:image/svg+xml,{quote(svg, safe=_SAFE)}">'
+            f'<figcaption><b>{number(moment.time_s, 1)} s</b> {free(moment.why)}</figcaption>'
+            '</figure>')
+    return Section('story', 'The story', note(
+        'The scene from above at the moments that count, each turned so that the vehicle in focus '
+        'drives to the right. Humans are warm, AVs cold colours, all others grey; behind each '
+        'driven vehicle is its way of the last two seconds.')
+        + f'<div class="frames">{"".join(figures)}</div>')
+
+
+# What may stand in an address of data in quotes, beside letters and digits.
+_SAFE = " =:;/,.-+()!*?@$'"
+
+
+def frame_address(run: ReportRun, place: int) -> str:
+    """Give the address within the page of the frame of a moment."""
+    return f'{run.key}-frame-{place + 1}'
+
+
+def moment(run: ReportRun, time_s: float | None) -> str:
+    """Write a time that leads to the frame that shows it."""
+    if time_s is None:
+        return NOTHING
+    place = nearest_moment(run.moments, time_s)
+    text = number(time_s, 1)
+    if place is None:
+        return text
+    return f'<a href="#{frame_address(run, place)}" data-time="{time_s:.6f}">{text}</a>'

@@ -1,0 +1,112 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How true to the clock a run was, and what its planners answered."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from crgame_ros.analysis.report.report_run import ReportRun
+from crgame_ros.analysis.report.report_section import Plot, PlotLimit, PlotLine, Section
+from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, share, table
+from crgame_ros.analysis.report.run_section import named
+
+# Of table I: key of `timing.json`, words, unit, factor, digits.
+_TABLE_I = (
+    ('final_error_ms', 'Final error', 'ms', 1.0, 3),
+    ('mean_step_error_ms', 'Mean step error', 'ms', 1.0, 3),
+    ('max_cumulative_error_ms', 'Greatest cumulative error', 'ms', 1.0, 3),
+    ('timeout_ratio', 'Cycles that took longer than a step', '%', 100.0, 3),
+    ('time_efficiency', 'Time efficiency', '%', 100.0, 3),
+    ('precision_ratio', 'Precision ratio', '%', 100.0, 5),
+    ('step_error_p99_ms', 'Step error, 99th percentile', 'ms', 1.0, 3),
+    ('busy_p50_ms', 'Busy time, median', 'ms', 1.0, 3),
+    ('busy_p99_ms', 'Busy time, 99th percentile', 'ms', 1.0, 3),
+    ('rate_hz', 'Rate', 'Hz', 1.0, 2),
+    ('cycles', 'Cycles', '', 1.0, 0),
+    ('gaps', 'Cycles that were not recorded', '', 1.0, 0),
+    ('resets', 'Drift resets', '', 1.0, 0),
+    ('catch_up_steps', 'Steps that were caught up', '', 1.0, 0))
+_RATIO = ('final', 'mean', 'min')
+
+
+def timing_section(run: ReportRun) -> Section:
+    """Show table I, and the errors over time."""
+    if run.timing is None:
+        return Section('timing', 'Timing', note('The recording does not tell of its cycles.'))
+    html = table('Timing (table I of the CommonRoad-Game paper)', ('', 'value', 'unit'),
+                 _rows(run.timing), 'numbers')
+    return Section('timing', 'Timing', html, tuple(_plots(run)))
+
+
+def _rows(timing: Mapping[str, Any]) -> Iterator[Sequence[str]]:
+    for key, words, unit, factor, digits in _TABLE_I:
+        yield words, number(factor * timing[key], digits), unit
+    for key in _RATIO:
+        yield f'Real-time ratio, {key}', number(timing['real_time_ratio'][key], 4), ''
+
+
+def _plots(run: ReportRun) -> Iterator[Plot]:
+    cycles = run.log.cycles
+    if cycles is None:
+        return
+    dt_s = run.log.game.scheduler.dt_s
+    times_s = cycles.column('n') * dt_s
+    for key, words, column in (('step-error', 'Step error', 'step_error_s'),
+                               ('busy', 'Busy time of each cycle', 'busy_s'),
+                               ('cumulative', 'Cumulative error', 'cumulative_error_s')):
+        line = PlotLine('sim', times_s, 1e3 * cycles.column(column), 'sim')
+        limits = (PlotLimit(1e3 * dt_s, 'a step'),) if key == 'busy' else ()
+        yield Plot(key, words, 'ms', (line,), limits)
+
+
+def plan_section(run: ReportRun) -> Section | None:
+    """Show what became of the planners' answers; None without planners."""
+    if not run.log.game.avs:
+        return None
+    if run.timing is None:
+        return Section('plans', 'Plans', note('The recording does not tell.'))
+    planners = run.timing['planners']
+    rows = [(named(run, av.id), free(av.planner), *_counts(planners.get(av.id, {})))
+            for av in run.log.game.avs]
+    html = table('What became of plan requests', (
+        'AV', 'planner', 'requests', 'accepted', 'of requests', 'refused', 'timed out', 'skipped',
+        'braking plans', 'steps without plan'), rows, 'numbers')
+    html += table('How long planners took [ms]', (
+        'AV', 'latency p50', 'p99', 'max', 'first', 'planning p50', 'p99', 'max'), [
+            (named(run, av.id), *_times(planners.get(av.id, {}))) for av in run.log.game.avs],
+        'numbers')
+    for av in run.log.game.avs:
+        refusal = planners.get(av.id, {}).get('last_refusal')
+        if refusal:
+            html += note(f'Last refusal of {named(run, av.id)}: {free(refusal)}')
+    return Section('plans', 'Plans', html)
+
+
+def _counts(entry: Mapping[str, Any]) -> Sequence[str]:
+    keys = ('refused', 'timed_out', 'skipped', 'fallback', 'steps_without_plan')
+    return (_count(entry.get('requests')), _count(entry.get('accepted')),
+            share(entry.get('accepted'), entry.get('requests')),
+            *(_count(entry.get(key)) for key in keys))
+
+
+def _count(value: int | None) -> str:
+    return NOTHING if value is None else str(value)
+
+
+def _times(entry: Mapping[str, Any]) -> Sequence[str]:
+    latency, planning = (entry.get(key) or {} for key in ('latency_ms', 'plan_time_ms'))
+    return (*(number(latency.get(key), 1) for key in ('p50', 'p99', 'max')),
+            number(entry.get('first_latency_ms'), 1),
+            *(number(planning.get(key), 1) for key in ('p50', 'p99', 'max')))

@@ -1,0 +1,50 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Finishing a run beside a graph that goes on.
+
+`python -m crgame_ros.launcher.finish_process FOLDER [--no-report]`
+"""
+
+import os
+from pathlib import Path
+import sys
+
+from crgame_ros.launcher.run_report import write_run_report
+from crgame_ros.recording.finish import finish_run, FinishedRecording
+
+# The run that goes on comes first.
+_NICE = 10
+NO_REPORT = '--no-report'
+
+
+def main() -> int:
+    """Finish the run in the folder that the command line names."""
+    os.nice(_NICE)
+    finished: list[FinishedRecording] = []
+    # What it says is read when it has ended.
+    code = finish_run(Path(sys.argv[1]), _say, progress=False, finished=finished.append)
+    if NO_REPORT not in sys.argv[2:]:
+        for each in finished:
+            write_run_report(each, _say, progress=False)
+    return code
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,57 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The report of a run that has just ended."""
+
+from collections.abc import Callable
+import time
+from typing import TYPE_CHECKING
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.recording.progress import Progress
+
+if TYPE_CHECKING:  # It takes a second to import.
+    from crgame_ros.recording.finish import FinishedRecording
+
+
+def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object],
+                     progress: bool = True) -> None:
+    """
+    Write the report of a run beside its recording.
+
+    Nothing that goes wrong here is worth the run: it is said, and that is all.
+
+    :param say: takes one line for people.
+    :param progress: whether to say how far it is, where it takes long.
+    """
+    folder = finished.bag.parent
+    path = folder / f'report{finished.suffix}.html'
+    say(f'writing {path} …')
+    began_s = time.monotonic()
+    # They take some time to import.
+    from crgame_ros.analysis.report.report_file import write_report
+    from crgame_ros.analysis.report.report_run import measured_run
+    from crgame_ros.recording.run_record import record_of_log
+    watch = Progress(say, f'measuring {finished.bag}') if progress else lambda _: None
+    try:
+        run = measured_run(folder.resolve().name, finished.bag,
+                           record_of_log(finished.bag, finished.log), finished.timing, watch)
+        write_report([run], path, driven_here=True)
+    except (CrgameError, OSError) as error:
+        say(f'error: no report: {error}')
+        return
+    except Exception as error:
+        say(f'error: no report: {type(error).__name__}: {error}')
+        return
+    say(f'  {path} ({time.monotonic() - began_s:.1f} s)')

@@ -1,0 +1,72 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Make the pictures of a report for the documentation: of the cut-in, driven offline.
+
+Needs what the tests of the page need: chromium, chromedriver and selenium.
+"""
+
+from pathlib import Path
+import tempfile
+
+from cockpit_person import Browser, open_browser
+from crgame_ros.analysis.report.report_page import report_html
+from crgame_ros.analysis.report.report_run import measured_run
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory, share_directory
+from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.run_record import run_record_of
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+from PIL import Image
+
+FOLDER = share_directory() / 'docs' / 'images'
+# Of the page [px].
+WIDTH, HEIGHT = 1280, 1170
+COLOURS = 64
+DRAWN = ('[...document.querySelectorAll(".criticality .plot")].every('
+         '(plot) => plot.querySelector(".main-svg"))')
+
+
+def main() -> None:
+    """Drive, write and photograph."""
+    setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
+    drivers, _ = recorded_inputs(setup)
+    run = measured_run('cut_in', None, run_record_of(run_offline(setup, drivers=drivers)), None)
+    with tempfile.TemporaryDirectory() as folder:
+        page, profile = Path(folder) / 'report.html', Path(folder) / 'profile'
+        page.write_text(report_html([run]), encoding='utf-8')
+        profile.mkdir()
+        with open_browser(profile, WIDTH, HEIGHT) as browser:
+            browser.prefer('light')
+            browser.open(page.as_uri())
+            photograph(browser, 'report')
+            browser.prefer('dark')
+            browser.run('document.querySelector(".criticality .plots").scrollIntoView('
+                        '{ behavior: "instant" })')
+            browser.wait(DRAWN, 'the plots')
+            photograph(browser, 'report_plots')
+
+
+def photograph(browser: Browser, name: str) -> None:
+    """Save what the browser shows, in few colours."""
+    path = browser.screenshot(FOLDER / f'{name}.png')
+    with Image.open(path) as image:
+        image.convert('RGB').quantize(COLOURS).save(path, optimize=True)
+    print(path)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,61 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A run to report: offline, with a title that somebody wrote in bad faith."""
+
+from dataclasses import replace
+import json
+from typing import Any
+
+from crgame_ros.analysis.report.report_run import measured_run, ReportRun
+from crgame_ros.game.game import Game
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.run_record import run_record_of
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+import pytest
+
+HOSTILE = '</title><script>alert(1)</script> "quoted" \'too\' 🚗 \u202eesrever & <b>bold</b>'
+# What `timing_report` could say: of strings that came from a recording, nothing is trusted.
+TIMING: dict[str, Any] = {
+    **dict.fromkeys(('final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms',
+                     'timeout_ratio', 'time_efficiency', 'precision_ratio', 'step_error_p99_ms',
+                     'busy_p50_ms', 'busy_p99_ms', 'rate_hz', 'cycles', 'gaps', 'resets',
+                     'catch_up_steps'), 0.5),
+    'real_time_ratio': {'final': 1.0, 'mean': 1.0, 'min': 0.25},
+    'planners': {'av0': {
+        'requests': 20, 'accepted': 17, 'refused': 2, 'timed_out': 1, 'skipped': 0, 'fallback': 3,
+        'steps_without_plan': 0, 'last_refusal': '<img src=x onerror=alert(2)>',
+        'latency_ms': {'p50': 4.5, 'p99': 9.25, 'max': 11.0}, 'plan_time_ms': None,
+        'first_latency_ms': 100.0}},
+    'drivability': {'violations': 1, 'list': [
+        {'n': 510, 'vehicle': 'hv0', 'what': 'off the <i>road</i>'}]},
+    'contacts': [], 'notices': ['<script>alert(3)</script>']}
+
+
+@pytest.fixture(scope='session')
+def game() -> Game:
+    """Give the cut-in."""
+    return load_game(scenarios_directory() / 'cut_in.yaml')
+
+
+@pytest.fixture(scope='session')
+def run(game: Game) -> ReportRun:
+    """Drive it for 10 s: the human cuts in after 5, and brakes."""
+    setup = build_setup(replace(game, title=HOSTILE))
+    drivers, _ = recorded_inputs(setup)
+    record = run_record_of(run_offline(setup, drivers=drivers, duration_s=10.0))
+    return measured_run('a <b>run</b>', None, record, json.loads(json.dumps(TIMING)))

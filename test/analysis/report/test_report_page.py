@@ -1,0 +1,218 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The page: what it says, and that nothing in it can do anything."""
+
+import base64
+from dataclasses import replace
+import hashlib
+from html.parser import HTMLParser
+import json
+import re
+
+from crgame_ros.analysis.report.report_page import report_html
+from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
+import numpy as np
+import pytest
+
+VOID = {'meta', 'link', 'img', 'br'}
+
+
+class Page(HTMLParser):
+    """A page, read."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[tuple[tuple[str, ...], str]] = []
+        self._open: list[str] = []
+        self.feed(html)
+        self.close()
+        assert not self._open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append((tuple(self._open), data))
+
+    def text_of(self, tag: str) -> list[str]:
+        """Give the texts that stand in elements of a kind."""
+        return [text for path, text in self.texts if tag in path]
+
+    def attributes(self, tag: str) -> list[dict[str, str | None]]:
+        """Give the attributes of all elements of a kind."""
+        return [found for name, found in self.elements if name == tag]
+
+
+@pytest.fixture(scope='module')
+def html(run: ReportRun) -> str:
+    """Write the page of the run."""
+    return report_html([run])
+
+
+@pytest.fixture(scope='module')
+def page(html: str) -> Page:
+    """Read it."""
+    return Page(html)
+
+
+def test_what_somebody_wrote_is_text(page: Page) -> None:
+    """Title, folder, refusal, violation and notice, as they were written."""
+    title = '</title><script>alert(1)</script> "quoted" \'too\' 🚗 ⟨U+202E⟩esrever & <b>bold</b>'
+    assert page.text_of('h1') == [title] and page.text_of('title') == [f'{title} – report']
+    texts = [text for _, text in page.texts]
+    for text in ('a <b>run</b>', '<img src=x onerror=alert(2)>', 'off the <i>road</i>',
+                 '<script>alert(3)</script>'):
+        assert text in texts
+    assert len(page.attributes('script')) == 3 and page.attributes('i') == []
+    assert not any(name.startswith('on') or name in ('style', 'srcdoc', 'action')
+                   for _, found in page.elements for name in found)
+
+
+def test_only_its_own_scripts_and_styles_may_run(page: Page) -> None:
+    """The hashes in the policy are those of what is there; nothing comes from elsewhere."""
+    policy = next(found['content'] for found in page.attributes('meta')
+                  if found.get('http-equiv') == 'Content-Security-Policy') or ''
+    rules = dict(rule.split(' ', 1) for rule in policy.split('; '))
+    assert rules['default-src'] == rules['base-uri'] == rules['form-action'] == "'none'"
+    assert rules['img-src'] == 'data:'
+    scripts, styles = page.text_of('script'), page.text_of('style')
+    hashes = {kind: [_hash(text) for text in texts] for kind, texts in (
+        ('script-src', scripts[1:]), ('style-src', [*styles, '']))}
+    assert {kind: rules[kind].split() for kind in hashes} == hashes
+    assert sum('plotly.js v' in text for text in scripts) == 1
+    for tag in ('img', 'link', 'script', 'iframe', 'object'):
+        for found in page.attributes(tag):
+            address = found.get('src') or found.get('href') or 'data:'
+            assert address.startswith('data:')
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def test_every_time_leads_to_its_frame(page: Page, run: ReportRun) -> None:
+    """Links of the page have targets; each worst value's frame is within a second."""
+    ids = [found['id'] for _, found in page.elements if 'id' in found]
+    assert len(ids) == len(set(ids))
+    links = page.attributes('a')
+    assert all((link['href'] or '').removeprefix('#') in ids for link in links)
+    times = {found['id']: float(found['data-time'] or '') for found in page.attributes('figure')
+             if found['class'] == 'frame'}
+    led = [link for link in links if 'data-time' in link]
+    for link in led:
+        shown = times[(link['href'] or '')[1:]]
+        assert abs(shown - float(link['data-time'] or '')) <= 1.0 + 1e-6
+    worst = [each for vehicle in run.criticality.report() for each in vehicle.worst.values()
+             if each.value < 100.0]
+    assert len(led) >= len(worst)
+    for each in worst:
+        assert any(abs(time - each.time_s) <= 1.0 + 1e-6 for time in times.values())
+
+
+def test_tables_say_what_was_measured(page: Page, run: ReportRun) -> None:
+    """Worst values to two digits, counts of plans, table I."""
+    cells = [text.strip() for path, text in page.texts if 'td' in path]
+    for vehicle in run.criticality.report():
+        for name in ('gap', 'thw', 'min_distance'):
+            if name in vehicle.worst:
+                assert f'{vehicle.worst[name].value:.2f}' in cells
+    assert {'20', '17', '85.0 %', '9.2', '0.2500'} <= set(cells)
+    captions = page.text_of('caption')
+    assert 'Timing (table I of the CommonRoad-Game paper)' in captions
+    assert all(found.get('scope') in ('col', 'row') for found in page.attributes('th'))
+    assert all(found['alt'] for found in page.attributes('img'))
+
+
+def test_plots_hold_the_series(page: Page, run: ReportRun) -> None:
+    """Each plot of the page has its data, which are those of the run, with thresholds."""
+    data = json.loads(page.text_of('script')[0])
+    places = [found['id'] for found in page.attributes('div') if found.get('class') == 'plot']
+    assert sorted(data) == sorted(map(str, places)) and len(places) > 10
+    speed = data['run1-motion-speed']['lines'][0]
+    np.testing.assert_array_equal(_numbers(speed['y']), run.log.vehicle_states[:, 0, 3])
+    gap = data['run1-criticality-gap']['lines'][1]
+    worst = run.criticality.report()[1].worst['gap'].value
+    assert np.nanmin(_numbers(gap['y'])) == worst
+    assert [limit['value'] for limit in data['run1-criticality-drac']['limits']] == [3.0]
+    throttle = data['run1-inputs-throttle']['lines'][0]
+    assert throttle['name'] == 'hv0' and len(_numbers(throttle['y'])) == 1000
+
+
+def _numbers(text: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), '<f8')
+
+
+def test_the_course_agrees_with_the_worst(run: ReportRun) -> None:
+    """What is plotted of a measure has its worst value at its time."""
+    for i, vehicle in enumerate(run.criticality.report()):
+        for place, name in enumerate(PLOTTED):
+            known = vehicle.worst.get(name)
+            values = run.course[i, place]
+            assert np.isfinite(values).any() == (known is not None)
+            if known is not None:
+                extreme = np.nanmax(values) if name == 'drac' else np.nanmin(values)
+                assert extreme == known.value
+                row = np.flatnonzero(values == extreme)[0]
+                assert run.times_s[row] == pytest.approx(known.time_s)
+
+
+def test_the_same_run_gives_the_same_bytes(run: ReportRun, html: str) -> None:
+    """Nothing in it tells when it was written."""
+    assert report_html([run]) == html
+
+
+def test_reverse_and_take_overs_stand_out(run: ReportRun) -> None:
+    """From when to when, by hand: the human in reverse, somebody in the AV's seat."""
+    commands = run.record.commands.copy()
+    commands[100:200, 0, 3] = 1.0
+    commands[300:450, 1] = 0.25
+    driven = replace(run, record=replace(run.record, commands=commands))
+    page = Page(report_html([driven]))
+    spans = json.loads(page.text_of('script')[0])['run1-inputs-brake']['spans']
+    found = [(span['label'], span['from'], span['to']) for span in spans]
+    assert found == [('hv0 in reverse', pytest.approx(1.01), pytest.approx(2.0)),
+                     ('av0 taken over', pytest.approx(3.01), pytest.approx(4.5))]
+    assert 'av0 taken over' in [text for path, text in page.texts if 'th' in path]
+
+
+def test_what_a_recording_does_not_tell_is_left_out(run: ReportRun) -> None:
+    """Without cycles there are neither inputs nor timing, and the page says so."""
+    bare = replace(run, timing=None, record=replace(
+        run.record, ns=run.record.ns[:0], commands=run.record.commands[:0]))
+    page = Page(report_html([bare]))
+    assert 'The recording does not tell of its cycles.' in [text for _, text in page.texts]
+    assert 'Driver inputs' not in page.text_of('h2')
+
+
+def test_several_runs_stand_side_by_side(run: ReportRun) -> None:
+    """A column each, plots with a letter for each, and no address twice."""
+    other = replace(run, key='run2', name='another')
+    page = Page(report_html([run, other]))
+    ids = [found['id'] for _, found in page.elements if 'id' in found]
+    assert len(ids) == len(set(ids))
+    heads = [text for path, text in page.texts if path[-2:] == ('tr', 'th') or 'thead' in path]
+    assert any(text.startswith('A: ') for text in heads)
+    assert any(text.startswith('B: ') for text in heads)
+    data = json.loads(page.text_of('script')[0])
+    assert [line['name'] for line in data['all-comparison-speed']['lines']] == [
+        'A hv0', 'A av0', 'B hv0', 'B av0']
+    assert re.findall(r'run2-story', ' '.join(map(str, ids)))
+    assert sum('plotly.js v' in text for text in page.text_of('script')) == 1

@@ -1,0 +1,173 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A report in a browser: from its file, without network."""
+
+import base64
+from collections.abc import Iterator
+from dataclasses import replace
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from browser_support import Browser
+from crgame_ros.analysis.report.report_page import report_html
+from crgame_ros.analysis.report.report_run import measured_run
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.run_record import run_record_of
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+import pytest
+
+TITLE = '<script>window.harmed = 1</script><img src=x onerror="window.harmed = 2"> & more'
+DRAWN = 'document.querySelectorAll(".plot .main-svg .scatterlayer .trace path.js-line")'
+
+
+@pytest.fixture(scope='module')
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write the report of the cut-in, driven offline."""
+    game = replace(load_game(scenarios_directory() / 'cut_in.yaml'), title=TITLE)
+    setup = build_setup(game)
+    drivers, _ = recorded_inputs(setup)
+    record = run_record_of(run_offline(setup, drivers=drivers, duration_s=13.0))
+    path = tmp_path_factory.mktemp('report') / 'report.html'
+    path.write_text(report_html([measured_run('run', None, record, None)]), encoding='utf-8')
+    return path
+
+
+@pytest.fixture
+def shown(browser: Browser, file: Path) -> Iterator[Browser]:
+    """Open it where there is no network, and see that nothing went wrong."""
+    # The log of requests tells of all that the page asks for.
+    browser.driver.execute_cdp_cmd('Network.enable', {})
+    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
+        'offline': True, 'latency': 0, 'downloadThroughput': 0, 'uploadThroughput': 0})
+    browser.open(file.as_uri())
+    yield browser
+    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
+        'offline': False, 'latency': 0, 'downloadThroughput': -1, 'uploadThroughput': -1})
+    assert browser.console_errors() == []
+
+
+def _look_at_all(browser: Browser) -> None:
+    """Scroll through the page: plots are drawn when they are seen."""
+    browser.run_async("""
+        for (const plot of document.querySelectorAll('.plot')) {
+          plot.scrollIntoView({ behavior: 'instant' });
+          await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+        }""")
+    browser.wait('[...document.querySelectorAll(".plot")].every('
+                 '(plot) => plot.querySelector(".main-svg"))', 'all plots')
+
+
+def test_plots_are_drawn_and_nothing_is_asked_for(shown: Browser) -> None:
+    """Every plot has its lines; nothing but data of the file itself is loaded; a title is text."""
+    _look_at_all(shown)
+    lines, plots = shown.run(
+        f'return [{DRAWN}.length, document.querySelectorAll(".plot").length]')
+    assert plots >= 12 and lines > plots
+    loaded = shown.run('return performance.getEntriesByType("resource").map((e) => e.name)')
+    assert all(name.startswith('data:') for name in loaded)
+    assert shown.run('return document.querySelector("h1").textContent') == TITLE
+    assert shown.run('return window.harmed ?? null') is None
+    broken = shown.run('return [...document.images].filter((one) => !one.naturalWidth).length')
+    assert broken == 0 and shown.run('return document.images.length') >= 4
+
+
+def test_a_worst_moment_leads_to_its_frame(shown: Browser) -> None:
+    """A click shows the picture, marks it, and marks the time in the plots of the run."""
+    _look_at_all(shown)
+    shown.run('window.scrollTo({ top: 0, behavior: "instant" })')
+    link = shown.driver.find_element('css selector', '.worst a[data-time]')
+    address = str(link.get_attribute('href')).partition('#')[2]
+    time_s = float(str(link.get_attribute('data-time')))
+    shown.run('arguments[0].scrollIntoView({ behavior: "instant" })', link)
+    link.click()
+    shown.wait('(() => { const box = document.getElementById(arguments[0])'
+               '.getBoundingClientRect(); return box.top >= 0 && box.top < innerHeight; })()',
+               'the frame', arguments=(address,))
+    frame = shown.driver.find_element('id', address)
+    assert 'shown' in str(frame.get_attribute('class'))
+    assert abs(float(str(frame.get_attribute('data-time'))) - time_s) <= 1.0
+    marks = shown.run('return document.getElementById("run1-criticality-ttc").layout.shapes'
+                      '.map((shape) => [shape.x0, shape.x1])')
+    assert [time_s, time_s] in marks
+
+
+def test_all_plots_of_a_run_show_the_same_time(shown: Browser) -> None:
+    """Zooming into one zooms the others."""
+    _look_at_all(shown)
+    shown.run_async('await Plotly.relayout("run1-motion-speed", '
+                    '{ "xaxis.range[0]": 2, "xaxis.range[1]": 6 });')
+    shown.wait('JSON.stringify(document.getElementById("run1-inputs-brake")'
+               '.layout.xaxis.range) === "[2,6]"', 'the same time')
+
+
+@pytest.mark.parametrize(('width', 'height'), [(1280, 800), (390, 844)])
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+def test_it_fits_and_can_be_read(shown: Browser, file: Path, width: int, height: int,
+                                 scheme: str) -> None:
+    """Nothing is wider than the window, and text stands out (WCAG AA: 4.5 to 1)."""
+    shown.resize(width, height)
+    shown.prefer(scheme)
+    shown.open(file.as_uri())
+    _look_at_all(shown)
+    assert shown.run('return document.documentElement.scrollWidth') <= width
+    for selector in ('body', '.lead', '.note', 'a', 'thead th', '.critical'):
+        text, ground = shown.run("""
+            const node = document.querySelector(arguments[0]);
+            let ground = node;
+            while (getComputedStyle(ground).backgroundColor === 'rgba(0, 0, 0, 0)') {
+              ground = ground.parentElement;
+            }
+            return [getComputedStyle(node).color, getComputedStyle(ground).backgroundColor];
+            """, selector)
+        assert _contrast(text, ground) >= 4.5, (selector, text, ground)
+
+
+def _contrast(first: str, second: str) -> float:
+    """Give the ratio of two colours as WCAG 2 defines it."""
+    def luminance(colour: str) -> float:
+        parts = [int(part) / 255.0 for part in re.findall(r'\d+', colour)[:3]]
+        red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
+                            for part in parts)
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_it_prints(shown: Browser) -> None:
+    """Every plot is on paper, though nobody has scrolled to it; as light as paper."""
+    shown.prefer('dark')
+    shown.run("""
+        window.printed = null;
+        window.addEventListener('beforeprint', () => {
+          window.printed = {
+            plots: document.querySelectorAll('.plot .main-svg .scatterlayer').length,
+            all: document.querySelectorAll('.plot').length,
+            ground: getComputedStyle(document.body).backgroundColor,
+          };
+        });""")
+    found: dict[str, Any] = shown.driver.execute_cdp_cmd('Page.printToPDF', {
+        'printBackground': True, 'preferCSSPageSize': True})
+    document = base64.b64decode(found['data'])
+    assert document.startswith(b'%PDF-') and len(document) > 20_000
+    pages = len(re.findall(rb'/Type\s*/Page\b', document))
+    assert 3 <= pages <= 20
+    printed = shown.run('return window.printed')
+    assert printed['plots'] == printed['all'] >= 12, json.dumps(printed)
+    assert printed['ground'] == 'rgb(255, 255, 255)'

@@ -1,0 +1,144 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The report of a recording: by its command, and at the end of a run."""
+
+from collections.abc import Callable
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+from typing import Any
+
+from crgame_ros.cli import main
+from crgame_ros.launcher.finisher import Finisher
+from crgame_ros.simulation.offline import OfflineResult
+import pytest
+
+TRAFFIC = 'ZAM_Traffic-1_1_T-1.xml'
+
+
+@pytest.fixture(scope='module')
+def recorded(tmp_path_factory: pytest.TempPathFactory, recorder: Any,
+             drive: Callable[..., OfflineResult]) -> Path:
+    """Record a run of 3 s."""
+    folder = tmp_path_factory.mktemp('reported') / 'my run'
+    recorder.ours(folder / 'bag', recorder.messages(drive(TRAFFIC, duration_s=3.0)))
+    return folder
+
+
+@pytest.fixture
+def session(recorded: Path, tmp_path: Path) -> Path:
+    """Copy the recording into a session of its own."""
+    folder = tmp_path / 'session'
+    (folder / 'bag').mkdir(parents=True)
+    for path in (recorded / 'bag').iterdir():
+        (folder / 'bag' / path.name).write_bytes(path.read_bytes())
+    return folder
+
+
+def test_the_command_writes_one_file(recorded: Path, tmp_path: Path,
+                                     capsys: pytest.CaptureFixture[str]) -> None:
+    """Beside the recording or where it is told; the same bytes each time."""
+    assert main(['report', str(recorded)]) == 0
+    report = recorded / 'report.html'
+    assert capsys.readouterr().out == f'{report}\n'
+    out = tmp_path / 'again.html'
+    assert main(['report', str(recorded / 'bag'), '--out', str(out)]) == 0
+    assert out.read_bytes() == report.read_bytes()
+    text = out.read_text(encoding='utf-8')
+    assert '<bdi>my run</bdi>' in text and 'recorded 2023-11-14 22:13:20 UTC' in text
+    assert len(text) < 6_000_000
+    report.unlink()
+    assert not list(tmp_path.glob('.*'))
+
+
+def test_several_runs_in_one_file(recorded: Path, tmp_path: Path) -> None:
+    """They are compared."""
+    out = tmp_path / 'both.html'
+    assert main(['report', str(recorded), str(recorded), '--out', str(out)]) == 0
+    text = out.read_text(encoding='utf-8')
+    assert text.count('<article') == 2 and 'id="all-comparison"' in text
+
+
+@pytest.mark.parametrize(('words', 'said'), [
+    (['missing'], 'no such file'), (['.', '--out', 'report.pdf'], 'no name of an HTML file'),
+    (['.', '--out', 'nowhere/report.html'], 'no such folder'), ([], 'RUN'),
+    (['.'] * 13, 'give 12 at most')])
+def test_bad_input_is_one_line(words: list[str], said: str, tmp_path: Path,
+                               monkeypatch: pytest.MonkeyPatch,
+                               capsys: pytest.CaptureFixture[str]) -> None:
+    """It exits with 2, and no file is made."""
+    monkeypatch.chdir(tmp_path)
+    assert main(['report', *words]) == 2
+    line = capsys.readouterr().err
+    assert said in line and len(line.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_ends_writes_its_report_last(session: Path) -> None:
+    """Scenario and timing are there before it is begun; it says how long it took."""
+    there: list[list[str]] = []
+    said: list[str] = []
+
+    def say(line: str) -> None:
+        said.append(line)
+        if line.startswith('writing '):
+            there.append(sorted(path.name for path in session.iterdir()))
+    finisher = Finisher(session, say)
+    assert finisher.finish_all() == 0
+    assert not (session / 'report.html').exists()
+    finisher.write_reports()
+    assert there == [[TRAFFIC, 'bag', 'timing.json']]
+    assert said[-1].startswith(f'  {session / "report.html"} (') and said[-1].endswith(' s)')
+    text = (session / 'report.html').read_text(encoding='utf-8')
+    assert 'Run and report are of crgame_ros' in text
+
+
+def test_without_report_there_is_none(session: Path) -> None:
+    """What `--no-report` asks for."""
+    finisher = Finisher(session, lambda _: None, reports=False)
+    assert finisher.finish_all() == 0
+    finisher.write_reports()
+    assert sorted(path.name for path in session.iterdir()) == [TRAFFIC, 'bag', 'timing.json']
+
+
+def test_two_signals_leave_the_report_out_and_all_else_whole(session: Path) -> None:
+    """The first is answered, the second ends the report alone."""
+    said: list[str] = []
+
+    def say(line: str) -> None:
+        said.append(line)
+        if line.startswith(('writing ', 'still writing the report')):
+            os.kill(os.getpid(), signal.SIGINT)
+    finisher = Finisher(session, say)
+    assert finisher.finish_all() == 0
+    before = signal.getsignal(signal.SIGINT)
+    finisher.write_reports()
+    assert signal.getsignal(signal.SIGINT) is before
+    assert said[-1] == f'no report; `crgame report {session}` writes it'
+    assert 'still writing the report; once more leaves it out' in said
+    assert sorted(path.name for path in session.iterdir()) == [TRAFFIC, 'bag', 'timing.json']
+    assert main(['report', str(session)]) == 0
+
+
+@pytest.mark.parametrize('words', [[], ['--no-report']])
+def test_beside_a_graph_that_goes_on(session: Path, words: list[str]) -> None:
+    """The process that finishes a run while the program stays for another."""
+    done = subprocess.run(
+        [sys.executable, '-m', 'crgame_ros.launcher.finish_process', str(session), *words],
+        capture_output=True, text=True, check=True)
+    assert (session / '.finished').exists() and (session / 'timing.json').exists()
+    assert (session / 'report.html').exists() == ('writing ' in done.stdout) == (not words)
