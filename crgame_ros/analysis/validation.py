@@ -18,8 +18,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import json
 from pathlib import Path
+import re
 from typing import Any
 
+from crgame_ros.analysis.tables.data_package import PACKAGE_FILE
 from crgame_ros.errors import CrgameError, InputError, one_line
 from crgame_ros.game.game import Game
 from crgame_ros.recording.epochs import epoch_numbers
@@ -31,7 +33,7 @@ from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_log import read_run_log
 from crgame_ros.recording.timing_report import REPORT_KEYS
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.export_network import schema_errors
+from crgame_ros.scenario.export_network import schema_errors, solution_schema_errors
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.schema.file_kinds import FILE_KINDS, FileKind
 from crgame_ros.schema.reading import faults_of
@@ -39,8 +41,13 @@ from crgame_ros.simulation.setup import build_setup
 from crgame_ros.yaml_text import read_text, read_yaml
 
 Progress = Callable[[float], object]
+# Folder of a run in which its tables are.
+TABLES = 'tables'
 _RECORDINGS = ('.mcap', '.db3')
 _SHOWN = 20
+# Where the root element of an XML file is looked for [characters].
+_HEAD = 10_000
+_SOLUTION = re.compile('<CommonRoadSolution[ >]')
 
 
 @dataclass(frozen=True)
@@ -78,12 +85,15 @@ def parts_of(path: Path) -> list[Path]:
     """Give what is to be checked of a path: of the folder of a run all its files."""
     if not path.is_dir() or recording_in(path) == path:
         return [path]
-    return [recording_in(path), *sorted(file for file in path.iterdir()
+    tables = [path / TABLES] if (path / TABLES / PACKAGE_FILE).exists() else []
+    return [recording_in(path), *tables, *sorted(file for file in path.iterdir()
                                         if file.suffix in ('.xml', '.yaml', '.json'))]
 
 
 def _check_of(path: Path) -> Callable[[Path, Progress | None], FileVerdict]:
     if path.is_dir():
+        if (path / PACKAGE_FILE).exists():
+            return _tables
         bag = recording_in(path)
         if (bag / METADATA_FILE).exists() or any(
                 file.suffix in _RECORDINGS for file in bag.iterdir()):
@@ -106,7 +116,10 @@ def _name_of(path: Path) -> str:
 def _scenario(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check a scenario by the schema of its version, where that is known, and by reading it."""
     source = str(path)
-    root = guard.parse_hardened(guard.read_text(path), source)
+    text = guard.read_text(path)
+    if _SOLUTION.search(text[:_HEAD]) is not None:
+        return _solution(path, _progress)
+    root = guard.parse_hardened(text, source)
     version = root.get('commonRoadVersion') or 'unknown'
     kind = f'CommonRoad scenario of version {version}'
     errors = schema_errors(root) if version == '2020a' else []
@@ -116,10 +129,31 @@ def _scenario(path: Path, _progress: Progress | None) -> FileVerdict:
     remarks = [] if version == '2020a' else [
         f'only the schema of 2020a is at hand: read, and not checked by that of {version}']
     try:
-        remarks += parse_scenario(guard.read_text(path), source).notices
+        remarks += parse_scenario(text, source).notices
     except InputError as error:
         faults.append(str(error))
     return FileVerdict(kind, tuple(faults), tuple(remarks))
+
+
+def _solution(path: Path, _progress: Progress | None) -> FileVerdict:
+    """Check a solution by its schema, and by reading it."""
+    # It loads the drivability checker.
+    from crgame_ros.analysis.scores.solution_file import read_solution, ROOT
+    source = str(path)
+    root = guard.parse_hardened(guard.read_text(path), source, ROOT)
+    faults = [f'{source}: {one_line(each)}' for each in solution_schema_errors(root)[:_SHOWN]]
+    try:
+        solved = len(read_solution(path).planning_problem_solutions)
+    except InputError as error:
+        return FileVerdict('CommonRoad solution', (*faults, str(error)))
+    return FileVerdict(f'CommonRoad solution of {solved} planning problems', tuple(faults))
+
+
+def _tables(path: Path, _progress: Progress | None) -> FileVerdict:
+    """Check exported tables by their dictionary."""
+    from crgame_ros.analysis.tables.table_check import table_faults
+    count, faults = table_faults(path)
+    return FileVerdict(f'{count} tables', tuple(faults[:_SHOWN]))
 
 
 def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:

@@ -50,14 +50,24 @@ _PROBLEM = (
     '</intervalStart><intervalEnd>1</intervalEnd></time></goalState></planningProblem>')
 
 
+def _definition(name: str) -> bytes:
+    return resources.files('commonroad').joinpath(
+        'scenario_definition', 'xml_definition_files', name).read_bytes()
+
+
 @functools.cache
 def _schema() -> tuple[etree.XMLSchema, frozenset[str]]:
     """Load the CommonRoad 2020a schema that commonroad-io brings, and the signs that it knows."""
-    file = resources.files('commonroad').joinpath(
-        'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')
-    root = etree.fromstring(file.read_bytes())
+    root = etree.fromstring(_definition('XML_commonRoad_XSD.xsd'))
     signs = root.iterfind('{*}simpleType[@name="trafficSignID"]/{*}restriction/{*}enumeration')
     return etree.XMLSchema(root), frozenset(sign.get('value') for sign in signs)
+
+
+def solution_schema_errors(root: etree._Element) -> list[str]:
+    """List what the schema of solutions finds wrong, empty for a valid one."""
+    schema = etree.XMLSchema(etree.fromstring(_definition('CommonRoadSolution_schema.xsd')))
+    return [] if schema.validate(root) else [
+        entry.message[:_MESSAGE_LENGTH] for entry in schema.error_log]
 
 
 def schema_errors(root: etree._Element) -> list[str]:
