@@ -45,7 +45,7 @@ def comparison_section(runs: Sequence[ReportRun]) -> Section:
 
 
 def letter(place: int) -> str:
-    """Give the letter of a run; after Z come AA, AB, …"""
+    """Give the letter of a run; after Z comes AA."""
     first, last = divmod(place, 26)
     return (letter(first - 1) if first else '') + chr(ord('A') + last)
 
@@ -126,6 +126,6 @@ def _plots(runs: Sequence[ReportRun]) -> Iterator[Plot]:
 def _plot(runs: Sequence[ReportRun], key: str, words: str, unit: str,
           values: Callable[[ReportRun, int], Any], bounds: tuple[float, float] | None) -> Plot:
     lines = [PlotLine(f'{letter(place)} {item.id}', run.times_s, values(run, i),
-                  _COLOURS[place % len(_COLOURS)], _DASHES[i % len(_DASHES)])
+                      _COLOURS[place % len(_COLOURS)], _DASHES[i % len(_DASHES)])
              for place, run in enumerate(runs) for i, item in enumerate(run.log.vehicles)]
     return Plot(key, words, unit, tuple(lines[:_MOST_LINES]), bounds=bounds)

@@ -58,13 +58,13 @@ def motion_section(run: ReportRun) -> Section:
         'hardest braking [m/s²]', 'hardest acceleration [m/s²]'), rows, 'numbers')
     colours = run.colours
     profiles = [Plot(key, title, unit, tuple(
-        PlotLine(item.id, run.times_s, _unwrapped(states[:, i, column], column), colours[item.id],
-             dash_of(item.role)) for i, item in enumerate(run.log.vehicles)))
+        PlotLine(item.id, run.times_s, _unwrapped(states[:, i, column], column),
+                 colours[item.id], dash_of(item.role)) for i, item in enumerate(run.log.vehicles)))
         for key, title, unit, column in _PROFILES]
     ways = Plot('ways', 'Ways of the rear axles in the map, and of others', 'm', (
         *_others_ways(run),
         *(PlotLine(item.id, states[:, i, StateColumn.X], states[:, i, StateColumn.Y],
-               colours[item.id], dash_of(item.role))
+                   colours[item.id], dash_of(item.role))
           for i, item in enumerate(run.log.vehicles))), plane=True)
     return Section('motion', 'Speeds, headings, positions', html, (*profiles, ways))
 
@@ -110,7 +110,7 @@ def input_section(run: ReportRun) -> Section | None:
             'numbers')
     plots = tuple(Plot(key, title, unit, tuple(
         PlotLine(item.id, record.times_s, record.commands[:, i, COMMAND_COLUMNS.index(key)],
-             run.colours[item.id], dash_of(item.role)) for i, item in vehicles), spans=spans,
+                 run.colours[item.id], dash_of(item.role)) for i, item in vehicles), spans=spans,
         bounds=bounds) for key, title, unit, bounds in _INPUTS) if rows else ()
     return Section('inputs', 'Driver inputs', html, plots)
 

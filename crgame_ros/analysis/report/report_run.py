@@ -73,18 +73,18 @@ class ReportRun:
 
     @property
     def log(self) -> RunLog:
-        """The run on its scenario's grid."""
+        """Give the run on its scenario's grid."""
         return self.record.log
 
     @property
     def times_s(self) -> FloatArray:
-        """Simulated times of the scenario steps since the run's start (K) [s]."""
+        """Give the simulated times of the scenario steps since the run's start (K) [s]."""
         scheduler = self.log.game.scheduler
         return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
 
     @property
     def colours(self) -> dict[str, str]:
-        """The name of each driven vehicle's colour."""
+        """Name each driven vehicle's colour."""
         found: dict[str, str] = {}
         for role, names in COLOURS.items():
             of_role = [item.id for item in self.log.vehicles if item.role is role]
