@@ -104,6 +104,44 @@ def test_a_recording_that_was_cut_off_is_none(run: Path, tmp_path: Path,
     assert code == 2 and 'crgame recover' in err
 
 
+def test_tables_are_checked_by_their_dictionary(run: Path, tmp_path: Path,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    """Both formats; a file that was changed, one that is missing, a column of another type."""
+    for kind in ('parquet', 'csv'):
+        out = tmp_path / kind
+        assert main(['export', str(run), '--to', kind, '--out', str(out)]) == 0
+        capsys.readouterr()
+        code, said, err = _told(out, capsys)
+        assert (code, err) == (0, '') and said.endswith(' tables, valid\n')
+    states = tmp_path / 'csv' / 'states.csv'
+    states.write_text(states.read_text().replace('hv0', 'hv9', 1))
+    (tmp_path / 'csv' / 'events.csv').unlink()
+    code, _, err = _told(tmp_path / 'csv', capsys)
+    assert code == 2 and len(err.splitlines()) == 2
+    assert 'states.csv: was changed' in err and 'events.csv: cannot be read' in err
+    package = tmp_path / 'parquet' / 'datapackage.json'
+    package.write_text(package.read_text().replace('"name": "time_s",\n      "type": "number"',
+                                                   '"name": "time_s",\n      "type": "integer"'))
+    assert 'other columns or types than the dictionary: time_s' in _told(
+        tmp_path / 'parquet', capsys)[2]
+    package.write_text('{"resources": [{"path": "../a"}]}')
+    assert 'no data dictionary of ours' in _told(tmp_path / 'parquet', capsys)[2]
+
+
+def test_solutions_are_checked_by_their_schema(run: Path, tmp_path: Path,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    """One that we write, and one with a number that is none."""
+    assert main(['score', str(run), '--out', str(tmp_path / 'scores')]) == 0
+    capsys.readouterr()
+    file = next(iter(sorted((tmp_path / 'scores').glob('solution_*.xml'))))
+    assert _told(file, capsys)[1] == f'{file}: CommonRoad solution of 1 planning problems, valid\n'
+    text = file.read_text()
+    start, end = text.index('<x>') + 3, text.index('</x>')
+    file.write_text(f'{text[:start]}far{text[end:]}')
+    code, _, err = _told(file, capsys)
+    assert code == 2 and 'far' in err
+
+
 @pytest.mark.parametrize(('name', 'content', 'words'), [
     ('missing.xml', None, 'no such file'), ('a.txt', 'hello', 'no kind of file'),
     ('a.yaml', 'weather: fine\n', 'no keys of a game'), ('a.json', '{"gaps": 0}', 'lacks'),

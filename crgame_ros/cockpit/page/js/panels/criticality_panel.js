@@ -128,7 +128,7 @@ class VehicleTable {
       setAttribute(worst, 'data-late', isCritical(limits, name, past?.value));
     }
     setText(this.#sum, told && told.tet_s !== null
-      ? `Below a TTC of ${fixed(limits.ttc, 1)} s for ${fixed(told.tet_s, 1)} s so far (TET)` : '');
+      ? `Below a TTC of ${fixed(limits.ttc, 1)} s for ${fixed(told.tet_s, 1)} s (TET)` : '');
   }
 }
 

@@ -30,7 +30,8 @@ const AHEAD = 0.35;
 const COLOURS = {
   human: ['human', 'series-1', 'series-2'], autonomous: ['av', 'series-3', 'series-4'],
 };
-const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'text-dim', 'surface', 'alarm'];
+const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'text-dim', 'surface',
+  'alarm'];
 
 /** The panel's parts and what is chosen in it. */
 export class HistoryPanel {

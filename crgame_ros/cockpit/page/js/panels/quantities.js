@@ -15,8 +15,8 @@ const DEGREES = 180 / Math.PI;
 const DASHES = ['solid', 'dot'];
 
 /**
- * A line: a column of vehicles' states, a figure of the run's health, the latency of planners, what
- * is left to vehicles, or a limit.
+ * A line: a column of vehicles' states, a figure of the run's health, the latency of planners,
+ * what is left to vehicles, or a limit.
  *
  * @typedef {object} ColumnLine
  * @property {keyof typeof VEHICLE} column
