@@ -16,9 +16,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, MEASURES
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.analysis.pictures.critical_moments import Moment
@@ -70,6 +73,11 @@ class ReportRun:
     timing: Mapping[str, Any] | None
     began_ns: int | None
     notices: tuple[str, ...]
+
+    @cached_property
+    def behaviour(self) -> tuple[DriverBehaviour, ...]:
+        """Measure how each vehicle was driven, in the order of the log's."""
+        return measure_behaviour(self.record)
 
     @property
     def log(self) -> RunLog:

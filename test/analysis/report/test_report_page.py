@@ -21,6 +21,8 @@ from html.parser import HTMLParser
 import json
 import re
 
+from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
+from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.report_page import report_html
 from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
 import numpy as np
@@ -216,3 +218,18 @@ def test_several_runs_stand_side_by_side(run: ReportRun) -> None:
         'A hv0', 'A av0', 'B hv0', 'B av0']
     assert re.findall(r'run2-story', ' '.join(map(str, ids)))
     assert sum('plotly.js v' in text for text in page.text_of('script')) == 1
+
+
+def test_how_people_drove_is_told_with_its_variants(page: Page, run: ReportRun) -> None:
+    """The human's values, and what each measure is; the AV, whom nobody drove, has none."""
+    human, av = run.behaviour
+    texts = [text for _, text in page.texts]
+    assert 'How people drove' in page.text_of('h2')
+    place = texts.index('Deviation of lateral position (SDLP)')
+    assert texts[place + 1:place + 3] == ['m', f'{human.values["sdlp"]:.2f}']
+    titles = [each.get('title') or '' for each in page.attributes('span')]
+    assert any(title.startswith(MEASURES['sdlp'].definition) and 'N - 1' in title
+               for title in titles)
+    section = driving_section(run)
+    assert section is not None and [line.name for line in section.plots[0].lines] == ['hv0']
+    assert not av.human

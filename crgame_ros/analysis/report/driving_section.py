@@ -1,0 +1,105 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How people drove: lane keeping, reversals, reactions, gaps accepted and take-overs."""
+
+from collections.abc import Iterator, Sequence
+import math
+
+from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
+from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+from crgame_ros.analysis.report.motion_section import dash_of
+from crgame_ros.analysis.report.report_run import ReportRun
+from crgame_ros.analysis.report.report_section import Plot, PlotLine, Section
+from crgame_ros.analysis.report.report_text import free, note, number, plain, table
+from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.story_section import moment
+
+# Longer times to the edge of a lane say nothing [s].
+_SHOWN_S = 10.0
+_WORDS = {
+    'speed_mean': 'Speed, mean', 'speed_sd': 'Speed, standard deviation',
+    'jerk_sd': 'Jerk, standard deviation', 'time_above_limit': 'Time above the speed limit',
+    'sdlp': 'Deviation of lateral position (SDLP)', 'lane_offset_mean': 'Offset in the lane, mean',
+    'lane_changes': 'Lane changes', 'srr_visual': 'Steering reversals, 3°',
+    'srr_cognitive': 'Steering reversals, 0.1°', 'tlc_min': 'Time to lane crossing, least',
+    'throttle_applications': 'Applications of the throttle',
+    'brake_applications': 'Applications of the brake'}
+
+
+def driving_section(run: ReportRun) -> Section | None:
+    """Show how those were driven whom somebody drove; None where nobody drove."""
+    found = [each for each in run.behaviour if each.human or each.take_overs]
+    if not found:
+        return None
+    html = note('Each measure names its variant where the pointer rests on it. Lane changes are '
+                'cut out of the deviation in the lane.')
+    html += table('How people drove', (
+        'measure', 'unit', *(named(run, each.vehicle_id) for each in found)),
+        list(_measures(found)), 'numbers')
+    for rows, caption, head in (
+            (_reactions(run, found), 'Reactions to events', (
+                'driver', 'event', 'at [s]', 'throttle released after [s]', 'braked after [s]',
+                'steered after [s]')),
+            (_lane_changes(run, found), 'Gaps accepted', (
+                'driver', 'side', 'first wheel across at [s]', 'leader', 'time gap to it [s]',
+                'follower', 'time gap to it [s]')),
+            (_take_overs(run, found), 'Take-overs', (
+                'vehicle', 'asked for by', 'from [s]', 'to [s]', 'hands on after [s]',
+                'first stable second after [s]'))):
+        told = list(rows)
+        if told:
+            html += table(caption, head, told, 'numbers')
+    lines = tuple(PlotLine(
+        each.vehicle_id, each.times_s, each.tlc_s, run.colours[each.vehicle_id],
+        dash_of(item.role)) for each, item in zip(run.behaviour, run.log.vehicles, strict=True)
+        if each in found)
+    return Section('driving', 'How people drove', html, (
+        Plot('tlc', 'Time to lane crossing (TLC)', 's', lines, bounds=(0.0, _SHOWN_S)),))
+
+
+def _measures(found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+    for name, word in _WORDS.items():
+        measure = MEASURES[name]
+        values = [each.values.get(name, math.nan) for each in found]
+        if any(map(math.isfinite, values)):
+            title = plain(f'{measure.definition}; {measure.variant}; at: {measure.reference}')
+            yield (f'<span title="{title}">{word}</span>', measure.unit.replace('^3', '³'),
+                   *map(number, values))
+
+
+def _reactions(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+    for driver in found:
+        for each in driver.reactions:
+            yield (named(run, driver.vehicle_id), free(each.event), moment(run, each.event_s),
+                   *map(number, each.reaction))
+
+
+def _lane_changes(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+    for driver in found:
+        for each in driver.lane_changes:
+            yield (named(run, driver.vehicle_id), each.side, number(each.time_s, 1),
+                   *(text for name, gap in ((each.leader, each.gap.leader),
+                                            (each.follower, each.gap.follower))
+                     for text in (named(run, name) if name else number(None),
+                                  number(None if gap is None else gap.time_gap_s))))
+
+
+def _take_overs(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+    for driver in found:
+        for each in driver.take_overs:
+            yield (named(run, driver.vehicle_id),
+                   free('' if each.request is None else each.request.by),
+                   number(each.seat_s, 1), number(each.end_s, 1), number(each.to_hands_on_s),
+                   number(each.to_stable_s))
