@@ -33,8 +33,6 @@ from crgame_ros.timing.time_controller import TimeController
 from crgame_ros.timing.timing_metrics import TimingMetrics, TimingSummary
 import numpy as np
 
-OFF = {'pacing': False, 'frame_skipping': False, 'drift_reset': False, 'measured_interval': False}
-
 
 class NaiveLoop:
     """
@@ -50,7 +48,9 @@ class NaiveLoop:
                        for index in range(len(setup.avs))]
         self._drivers = [offline_driver(human) for human in setup.humans]
         self._dt_s = setup.scheduler.dt_s
-        spec: TimingSpec = replace(setup.game.timing, **OFF)
+        spec: TimingSpec = replace(
+            setup.game.timing, pacing=False, frame_skipping=False, drift_reset=False,
+            measured_interval=False)
         self._controller = TimeController(spec, self._dt_s)
         self.metrics = TimingMetrics(self._dt_s)
         self._monitor = drivability_monitor(observed_run(setup))

@@ -21,7 +21,7 @@ import subprocess
 import sys
 import time
 
-from crgame_ros.analysis.counterfactual import Alternative, drive_against
+from crgame_ros.analysis.counterfactual import Alternative, drive_against, driven_live
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import RunRequest
@@ -42,12 +42,14 @@ class RecordedHuman:
     :param log: the run.
     :param setup_for: gives the same game with the recorded human and a planner of that name.
     :param inputs: of the human; None where the setup names the recording that has them.
+    :param live: the run itself, if it was a live one.
     """
 
     name: str
     log: RunLog
     setup_for: Callable[[str], Setup]
     inputs: RecordedInputs | None
+    live: Alternative | None = None
 
     @property
     def duration_s(self) -> float:
@@ -98,7 +100,8 @@ def record_live(game: Path, planner: str, folder: Path,
     def setup_for(name: str) -> Setup:
         return effective_setup(RunRequest(driver=f'replay:{bag}', planners=(name,)))
 
-    return RecordedHuman(game.stem, read_run_log(bag), setup_for, None)
+    log = read_run_log(bag)
+    return RecordedHuman(game.stem, log, setup_for, None, driven_live(planner, folder, log))
 
 
 def run_live(game: Path, planner: str, folder: Path, duration_s: float | None = None) -> None:

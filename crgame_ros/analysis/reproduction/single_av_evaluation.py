@@ -28,10 +28,10 @@ from crgame_ros.analysis.reproduction.expectation import (
 from crgame_ros.recording.run_log import RunLog
 import numpy as np
 
-# Who stays within this of the middle of a lane neither changes it nor swerves: vehicles are 1.7 m
-# narrower than lanes, and half of that is 0.85 m [m].
+# Who stays within this of the middle of a lane neither changes it nor swerves: a car of 2 m in a
+# lane of 3.75 m has 0.87 m on either side [m].
 IN_LANE = 0.5
-# Slower is standing: a tenth of a walking child [m/s].
+# Slower is standing: a metre in ten seconds [m/s].
 STANDING = 0.1
 
 
@@ -133,17 +133,20 @@ HUMAN_EXPECTATIONS: tuple[Expectation[SameHuman], ...] = (
                 'the HV applies a consistent set of challenging maneuvers (IV-A)', _same),)
 
 
-def judge_single_av(recorded: RunLog, idm: Alternative, reactive: Alternative
-                    ) -> tuple[Judgement, ...]:
+def judge_single_av(recorded: RunLog, idm: Alternative, reactive: Alternative,
+                    live: Alternative | None = None) -> tuple[Judgement, ...]:
     """
     Look for what must come out of the single-AV experiment.
 
     :param recorded: the run that was recorded.
     :param idm: the same human against the planner in the place of the IDM planner.
     :param reactive: and against that in the place of the reactive planner.
+    :param live: the recorded run itself, if it was live; it is one against the first planner.
     """
     av = recorded.game.avs[0].id
     return (
+        *(() if live is None else
+          judge('one AV, IDM, live', IDM_EXPECTATIONS, Encounter(live, av))),
         *judge('one AV, IDM', IDM_EXPECTATIONS, Encounter(idm, av)),
         *judge('one AV, reactive', REACTIVE_EXPECTATIONS, Encounter(reactive, av)),
         *judge('one AV, both', HUMAN_EXPECTATIONS, SameHuman(recorded, (idm, reactive))))
