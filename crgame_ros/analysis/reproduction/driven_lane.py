@@ -14,8 +14,8 @@
 # limitations under the License.
 """Where vehicles were along and across the lane in which one of them began."""
 
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.recording.run_log import RunLog
-from crgame_ros.roads.lane_line import LaneLine
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.vehicle.state import StateColumn
@@ -44,7 +44,7 @@ class DrivenLane:
         x, y, yaw = log.vehicle_states[0, vehicle, :StateColumn.YAW + 1].tolist()
         lanelet = roads.nearest_lanelet(x, y, yaw)
         self.width = roads.width_at(lanelet, roads.locate(lanelet, x, y)[0])
-        line = LaneLine(roads.lane_path(lanelet, _ALONG))
+        line = Curve.from_polyline(roads.lane_path(lanelet, _ALONG))
         places = log.vehicle_states[:, :, :StateColumn.YAW]
         along, across = line.project(places.reshape(-1, 2))
         self.along: NDArray[np.float64] = along.reshape(places.shape[:2])

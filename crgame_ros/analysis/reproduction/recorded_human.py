@@ -95,13 +95,25 @@ def record_live(game: Path, planner: str, folder: Path,
     :raises CrgameError: if the run failed.
     """
     run_live(game, planner, folder, duration_s)
+    return read_recorded(game.stem, planner, folder)
+
+
+def read_recorded(name: str, planner: str, folder: Path) -> RecordedHuman:
+    """
+    Read a live run.
+
+    :param name: of its game.
+    :param planner: that drove the AVs in it.
+    :param folder: of the run.
+    :raises InputError: if its recording cannot be used.
+    """
     bag = recording_in(folder)
 
-    def setup_for(name: str) -> Setup:
-        return effective_setup(RunRequest(driver=f'replay:{bag}', planners=(name,)))
+    def setup_for(other: str) -> Setup:
+        return effective_setup(RunRequest(driver=f'replay:{bag}', planners=(other,)))
 
     log = read_run_log(bag)
-    return RecordedHuman(game.stem, log, setup_for, None, driven_live(planner, folder, log))
+    return RecordedHuman(name, log, setup_for, None, driven_live(planner, folder, log))
 
 
 def run_live(game: Path, planner: str, folder: Path, duration_s: float | None = None) -> None:

@@ -26,6 +26,7 @@ from crgame_ros import __version__
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS
 from crgame_ros.analysis.reproduction.commonroad_game import EvaluationPart, EvaluationRequest
 from crgame_ros.analysis.reproduction.expectation import Judgement
+from crgame_ros.analysis.reproduction.synchronization import PAPER_TABLE
 from crgame_ros.recording.export import write_text
 
 # What each figure of ours stands beside, by how its file is named.
@@ -101,9 +102,10 @@ def _lines(request: EvaluationRequest, judgements: Sequence[Judgement],
         yield 'Not measured: it is about runs in real time; leave --offline out.'
     yield from ('', '## Figures', '')
     # Of a figure in several formats the first that a page shows.
-    for file in {each.stem: each for each in reversed(files) if each.suffix in _SHOWN}.values():
-        if file.stem in CAPTIONS:
-            yield from (f'{CAPTIONS[file.stem]}', '', f'![{file.stem}]({file.name})', '')
+    shown = {each.stem: each for each in reversed(files) if each.suffix in _SHOWN}
+    for name, caption in CAPTIONS.items():
+        if name in shown:
+            yield from (caption, '', f'![{name}]({shown[name].name})', '')
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -111,5 +113,6 @@ def _table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
     yield '|---|---:|---:|---:|---:|'
     for row, form in zip(rows, (each.form for each in TIMING_ROWS), strict=True):
         name = f'{row["metric"]} [{row["unit"]}]' if row['unit'] else row['metric']
-        yield f'| {name} | ' + ' | '.join(f'{row[key]:{form}}' for key in (
-            'proposed', 'paper_proposed', 'naive', 'paper_naive')) + ' |'
+        paper, paper_naive = PAPER_TABLE[row['metric']]
+        yield (f'| {name} | {row["proposed"]:{form}} | {paper} | {row["naive"]:{form}} '
+               f'| {paper_naive} |')

@@ -99,8 +99,8 @@ def _same(found: SameHuman) -> Finding:
     # A recording holds joints: positions and heading as they were, speeds in x and y.
     apart = np.abs(recorded[:common] - first[:common]).max(axis=(0, 1))
     exact = bool((apart[:3] == 0.0).all())
-    return Finding(exact, f'{first.shape[0]} states the same to the last bit, and at most '
-                   f'{apart[:3].max():.1e} from where the recording has it')
+    return Finding(exact, f'at {first.shape[0]} scenario steps the same to the last bit, and at '
+                   f'most {apart[:3].max():.1e} from where the recording has it')
 
 
 NO_CONTACT = Expectation(

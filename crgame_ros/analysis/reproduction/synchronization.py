@@ -37,15 +37,15 @@ PROPOSED, NAIVE = 'Proposed', 'Naive'
 # Table I as it is printed, by the name of the metric: proposed, naive, in the units of
 # `TIMING_ROWS`.
 PAPER_TABLE = {
-    'Final Error': (1.48, 402.38),
-    'Average Step Error': (4.10, 22.84),
-    'Maximum Cumulative Error': (90.67, 1998.47),
-    'Timeout Ratio': (37.7, 56.4),
-    'Final Real-Time Ratio': (1.00, 0.97),
-    'Average Real-Time Ratio': (0.99, 0.84),
-    'Minimum Real-Time Ratio': (0.10, 0.04),
-    'Time Efficiency': (99.99, 34.36),
-    'Precision Ratio': (1.00e-4, 2.85e-2)}
+    'Final Error': ('1.48', '402.38'),
+    'Average Step Error': ('4.10', '22.84'),
+    'Maximum Cumulative Error': ('90.67', '1998.47'),
+    'Timeout Ratio': ('37.7', '56.4'),
+    'Final Real-Time Ratio': ('1.00', '0.97'),
+    'Average Real-Time Ratio': ('0.99', '0.84'),
+    'Minimum Real-Time Ratio': ('0.10', '0.04'),
+    'Time Efficiency': ('99.99', '34.36'),
+    'Precision Ratio': ('1.00e-4', '2.85e-2')}
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class Synchronization:
         ours, naive = self.table.summaries
         return [{'metric': row.name, 'unit': row.unit,
                  'proposed': row.value(ours), 'naive': row.value(naive),
-                 'paper_proposed': PAPER_TABLE[row.name][0],
-                 'paper_naive': PAPER_TABLE[row.name][1]} for row in TIMING_ROWS]
+                 'paper_proposed': float(PAPER_TABLE[row.name][0]),
+                 'paper_naive': float(PAPER_TABLE[row.name][1])} for row in TIMING_ROWS]
 
 
 def measure_synchronization(game: Path, planner: str, duration_s: float,
@@ -105,7 +105,7 @@ def _smaller(name: str) -> Expectation[tuple[TimingSummary, TimingSummary]]:
     return Expectation(
         f'{name} is smaller', 'Our loop has the smaller one, on any machine: a loop with a '
         'schedule returns to it after whatever delayed it, one without keeps every delay.',
-        f'{paper[0]:g} {row.unit}, naive {paper[1]:g} {row.unit} (table I)', check)
+        f'{paper[0]} {row.unit}, naive {paper[1]} {row.unit} (table I)', check)
 
 
 # Of the other rows the machine decides: a fast one has no timeouts in either loop.
