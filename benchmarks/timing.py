@@ -28,12 +28,12 @@ import time
 from typing import Any
 
 from bare_loop import BareLoop
+from crgame_ros.analysis.reproduction.naive_loop import NaiveLoop
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
 from live_graph import LiveGraph, RemoteControl
-from naive_loop import NaiveLoop
 
 ROWS = (
     # name, key in timing.json, paper's proposed, paper's naive, wanted

@@ -24,7 +24,7 @@ from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_inputs import recorded_inputs, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
 from crgame_ros.recording.timing_report import timing_report
@@ -75,7 +75,8 @@ class Alternative:
 
 
 def drive_against(planner: str, setup: Setup, recorded: RunLog, latency_steps: int = 0,
-                  traces: Mapping[str, FloatArray] | None = None) -> Alternative:
+                  traces: Mapping[str, FloatArray] | None = None,
+                  inputs: RecordedInputs | None = None) -> Alternative:
     """
     Drive a recorded human against the planner of a setup, for as long as was recorded.
 
@@ -87,9 +88,10 @@ def drive_against(planner: str, setup: Setup, recorded: RunLog, latency_steps: i
     :param latency_steps: simulation steps between a request and its plan.
     :param traces: recorded states by vehicle (`recorded_states`), which the humans take instead of
         being driven; an AV that somebody had taken over follows its planner then.
+    :param inputs: of the humans; None for those of the recording that the setup names.
     :raises InputError: if the recording's inputs cannot be used in the setup.
     """
-    result = _drive_inputs(setup, latency_steps) if traces is None \
+    result = _drive_inputs(setup, latency_steps, inputs) if traces is None \
         else _drive_trajectory(setup, latency_steps, traces)
     return _compare(
         planner, run_log_of(result), recorded,
@@ -112,8 +114,9 @@ def driven_live(planner: str, folder: Path, recorded: RunLog) -> Alternative:
         for av, told in report['planners'].items()}, report['contacts'])
 
 
-def _drive_inputs(setup: Setup, latency_steps: int) -> OfflineResult:
-    drivers, intervals_s = recorded_inputs(setup)
+def _drive_inputs(setup: Setup, latency_steps: int,
+                  inputs: RecordedInputs | None) -> OfflineResult:
+    drivers, intervals_s = inputs or recorded_inputs(setup)
     if intervals_s is None:
         raise InputError('nobody in it is driven by a recording', 'driver', 'give replay:BAG')
     return run_offline(setup, duration_s=len(intervals_s) * setup.scheduler.dt_s,

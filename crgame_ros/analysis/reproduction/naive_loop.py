@@ -14,6 +14,7 @@
 # limitations under the License.
 """The naive baseline of CRG section IV-C: mechanisms off, planner, checks and recording inline."""
 
+from array import array
 from dataclasses import replace
 import json
 from pathlib import Path
@@ -27,11 +28,10 @@ from crgame_ros.simulation.observer import drivability_monitor
 from crgame_ros.simulation.offline import observed_run, PlannerSeat
 from crgame_ros.simulation.offline_driver import offline_driver
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.cycle_rows import CycleTable, TIMING_COLUMNS
 from crgame_ros.timing.time_controller import TimeController
 from crgame_ros.timing.timing_metrics import TimingMetrics, TimingSummary
 import numpy as np
-
-OFF = {'pacing': False, 'frame_skipping': False, 'drift_reset': False, 'measured_interval': False}
 
 
 class NaiveLoop:
@@ -48,7 +48,9 @@ class NaiveLoop:
                        for index in range(len(setup.avs))]
         self._drivers = [offline_driver(human) for human in setup.humans]
         self._dt_s = setup.scheduler.dt_s
-        spec: TimingSpec = replace(setup.game.timing, **OFF)
+        spec: TimingSpec = replace(
+            setup.game.timing, pacing=False, frame_skipping=False, drift_reset=False,
+            measured_interval=False)
         self._controller = TimeController(spec, self._dt_s)
         self.metrics = TimingMetrics(self._dt_s)
         self._monitor = drivability_monitor(observed_run(setup))
@@ -56,6 +58,13 @@ class NaiveLoop:
         self._channel = self._writer.add_topic('/state', 'std_msgs/msg/String', TopicQos())
         self._result = self._simulation.begin()
         self._started = False
+        self._rows = array('d')
+
+    @property
+    def cycles(self) -> CycleTable:
+        """Give the cycles so far, as the graph publishes its own."""
+        rows = np.array(self._rows).reshape(-1, len(TIMING_COLUMNS))
+        return CycleTable(TIMING_COLUMNS, rows)
 
     def run(self, duration_s: float) -> None:
         """Run for a stretch of wall time; the time between stretches doesn't count."""
@@ -70,9 +79,9 @@ class NaiveLoop:
             left_ns = self._controller.deadline_ns() - time.monotonic_ns()
             if left_ns > 0:
                 time.sleep(left_ns * 1e-9)
-            self._cycle()
+            self._cycle(max(0, left_ns) * 1e-9)
 
-    def _cycle(self) -> None:
+    def _cycle(self, sleep_s: float) -> None:
         start_ns = time.monotonic_ns()
         cycle = self._controller.begin_cycle(start_ns)
         simulation = self._simulation
@@ -90,6 +99,10 @@ class NaiveLoop:
         self._writer.write(self._channel, data, time.time_ns())
         busy_s = (time.monotonic_ns() - start_ns) * 1e-9
         self.metrics.add(cycle.ideal_s, cycle.actual_s, busy_s, cycle.dropped_s)
+        self._rows.extend((
+            0.0, cycle.n, simulation.scheduler.k(simulation.n), cycle.ideal_s, cycle.actual_s,
+            cycle.step_error_s, cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s,
+            cycle.resets, cycle.dropped_s))
 
     def close(self) -> TimingSummary:
         """Finish the recording and give the metrics."""

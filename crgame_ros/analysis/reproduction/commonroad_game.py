@@ -1,0 +1,165 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""CommonRoad-Game's evaluation (CRG section IV) from its first recording to its last figure."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.analysis.counterfactual import Alternative
+from crgame_ros.analysis.reproduction.encounter import Encounter
+from crgame_ros.analysis.reproduction.expectation import Judgement
+from crgame_ros.analysis.reproduction.multi_av_evaluation import (
+    judge_multi_av,
+    MultiAvRun,
+    run_alone,
+)
+from crgame_ros.analysis.reproduction.recorded_human import (
+    record_live,
+    record_offline,
+    RecordedHuman,
+)
+from crgame_ros.analysis.reproduction.reproduced_figures import (
+    write_run_figures,
+    write_timing_figure,
+)
+from crgame_ros.analysis.reproduction.single_av_evaluation import judge_single_av
+from crgame_ros.analysis.reproduction.synchronization import (
+    judge_synchronization,
+    measure_synchronization,
+    Synchronization,
+)
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.export import write_scenario
+
+
+@dataclass(frozen=True)
+class EvaluationRequest:
+    """
+    How to repeat the evaluation.
+
+    :param folder: of all files; exists.
+    :param idm: planner in the place of the IDM planner.
+    :param reactive: planner in the place of the reactive planner.
+    :param is_live: whether the games are recorded live and the timing is measured.
+    :param timed_s: wall time of each loop of the timing experiment [s]
+    :param formats: of figures.
+    :param say: takes a line for people, on what is going on.
+    """
+
+    folder: Path
+    idm: str
+    reactive: str
+    is_live: bool
+    timed_s: float
+    formats: Sequence[str]
+    say: Callable[[str], object]
+
+    @property
+    def runs(self) -> Path:
+        """Name the folder of the runs' own files."""
+        return self.folder / 'runs'
+
+    def record(self, game: Path) -> RecordedHuman:
+        """Drive a game once."""
+        if not self.is_live:
+            self.say(f'recording {game.stem} offline …')
+            return record_offline(game, self.idm)
+        self.say(f'recording {game.stem} live, which takes as long as the game …')
+        return record_live(game, self.idm, self.runs / game.stem)
+
+    def repeat(self, recorded: RecordedHuman, planner: str) -> Alternative:
+        """Drive the recorded human against a planner."""
+        self.say(f'the human of {recorded.name} against {planner} …')
+        return recorded.against(planner)
+
+
+@dataclass(frozen=True)
+class EvaluationPart:
+    """
+    One of the three experiments, over.
+
+    :param judgements: of what must come out.
+    :param numbers: for JSON.
+    :param files: figures and tables.
+    """
+
+    judgements: tuple[Judgement, ...]
+    numbers: dict[str, Any]
+    files: tuple[Path, ...]
+
+
+def evaluate_single_av(request: EvaluationRequest) -> EvaluationPart:
+    """
+    Repeat CRG section IV-A: figures 8 to 11.
+
+    :raises CrgameError: if a run failed.
+    """
+    recorded = request.record(scenarios_directory() / 'cut_in.yaml')
+    idm, reactive = (request.repeat(recorded, name) for name in (request.idm, request.reactive))
+    request.say('drawing figures 8 to 11 …')
+    av = recorded.log.game.avs[0].id
+    files = (*_pictured(request, idm, (8, 9), 'idm'),
+             *_pictured(request, reactive, (10, 11), 'reactive'))
+    return EvaluationPart(
+        judge_single_av(recorded.log, idm, reactive, recorded.live),
+        {name: {'encounter': Encounter(run, av).as_dict(), **run.as_dict()}
+         for name, run in (('idm', idm), ('reactive', reactive))}, files)
+
+
+def evaluate_multi_av(request: EvaluationRequest) -> EvaluationPart:
+    """
+    Repeat CRG section IV-B: figures 12 and 13.
+
+    :raises CrgameError: if a run failed.
+    """
+    game = scenarios_directory() / 'two_avs.yaml'
+    recorded = request.record(game)
+    runs: list[tuple[str, MultiAvRun]] = []
+    files: tuple[Path, ...] = ()
+    for name, planner in (('IDM', request.idm), ('reactive', request.reactive)):
+        run = request.repeat(recorded, planner)
+        request.say(f'{game.stem} against {planner} without the human …')
+        alone = run_alone(game, planner, recorded.duration_s)
+        if recorded.live is not None and not runs:
+            runs.append((f'{name}, live', MultiAvRun(recorded.live, alone)))
+        runs.append((name, MultiAvRun(run, alone)))
+        files += _pictured(request, run, (12, 13), f'two_avs_{name.lower()}')
+    return EvaluationPart(
+        judge_multi_av(runs),
+        {name: {'reactions': run.reactions(), **run.run.as_dict()} for name, run in runs}, files)
+
+
+def evaluate_timing(request: EvaluationRequest) -> tuple[EvaluationPart, Synchronization]:
+    """
+    Repeat CRG section IV-C: figure 14 and table I.
+
+    :raises CrgameError: if a run failed.
+    """
+    request.say(f'timing: the graph, then the naive loop, {request.timed_s:g} s each …')
+    found = measure_synchronization(scenarios_directory() / 'cut_in.yaml', request.idm,
+                                    request.timed_s, request.runs)
+    return EvaluationPart(judge_synchronization(found), {'table_1': found.rows()},
+                          write_timing_figure(found, request.folder, request.formats)), found
+
+
+def _pictured(request: EvaluationRequest, run: Alternative, numbers: tuple[int, int],
+              name: str) -> tuple[Path, ...]:
+    """Draw a run, and write it as a scenario."""
+    request.runs.mkdir(exist_ok=True)
+    scenario = request.runs / f'{name}.xml'
+    write_scenario(run.log, scenario)
+    return write_run_figures(run, numbers, name, request.folder, request.formats)

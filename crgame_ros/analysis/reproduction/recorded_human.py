@@ -1,0 +1,134 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One recorded human: a game driven once, live or offline, and what repeats its human."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+from crgame_ros.analysis.counterfactual import Alternative, drive_against, driven_live
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.errors import CrgameError
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_setup
+from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import Setup
+
+
+@dataclass(frozen=True)
+class RecordedHuman:
+    """
+    A game that was driven once.
+
+    :param name: of the game.
+    :param log: the run.
+    :param setup_for: gives the same game with the recorded human and a planner of that name.
+    :param inputs: of the human; None where the setup names the recording that has them.
+    :param live: the run itself, if it was a live one.
+    """
+
+    name: str
+    log: RunLog
+    setup_for: Callable[[str], Setup]
+    inputs: RecordedInputs | None
+    live: Alternative | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasted, on the scenario's time line [s]."""
+        return (len(self.log.ks) - 1) * self.log.game.scheduler.time_step_s
+
+    def against(self, planner: str) -> Alternative:
+        """
+        Drive the same human against a planner of all AVs.
+
+        :raises InputError: if there is no such planner.
+        """
+        return drive_against(planner, self.setup_for(planner), self.log, inputs=self.inputs)
+
+
+def record_offline(game: Path, planner: str, duration_s: float | None = None) -> RecordedHuman:
+    """
+    Drive a game by its scripted driver on a virtual clock.
+
+    :param duration_s: the game's own where None [s]
+    :raises InputError: if game or planner cannot be used.
+    """
+    def setup_for(name: str) -> Setup:
+        return effective_setup(RunRequest(game=game, planners=(name,)))
+
+    result = run_offline(setup_for(planner), duration_s=duration_s, clock_s=time.perf_counter)
+    humans = [human.id for human in result.setup.humans]
+    inputs = RecordedInputs(
+        # Row 0 was consumed by no step.
+        {human: ReplayDriver(result.commands[1:, place]) for place, human in enumerate(humans)},
+        result.intervals_s[1:, 0])
+    return RecordedHuman(game.stem, run_log_of(result), setup_for, inputs)
+
+
+def record_live(game: Path, planner: str, folder: Path,
+                duration_s: float | None = None) -> RecordedHuman:
+    """
+    Drive a game by its scripted driver in real time, without the page, and read its recording.
+
+    :param folder: of the run; must not exist.
+    :param duration_s: the game's own where None [s]
+    :raises InputError: if game, planner or folder cannot be used.
+    :raises CrgameError: if the run failed.
+    """
+    run_live(game, planner, folder, duration_s)
+    return read_recorded(game.stem, planner, folder)
+
+
+def read_recorded(name: str, planner: str, folder: Path) -> RecordedHuman:
+    """
+    Read a live run.
+
+    :param name: of its game.
+    :param planner: that drove the AVs in it.
+    :param folder: of the run.
+    :raises InputError: if its recording cannot be used.
+    """
+    bag = recording_in(folder)
+
+    def setup_for(other: str) -> Setup:
+        return effective_setup(RunRequest(driver=f'replay:{bag}', planners=(other,)))
+
+    log = read_run_log(bag)
+    return RecordedHuman(name, log, setup_for, None, driven_live(planner, folder, log))
+
+
+def run_live(game: Path, planner: str, folder: Path, duration_s: float | None = None) -> None:
+    """
+    Run a game live, without the page, as `record_live` does.
+
+    :raises CrgameError: if it failed; what it said is on the terminal.
+    """
+    # Before any process starts: what is wrong is told in one line.
+    effective_setup(RunRequest(game=game, planners=(planner,)))
+    done = subprocess.run([
+        sys.executable, '-m', 'crgame_ros.launcher.main', str(game), '--headless',
+        '--planner', planner, '--out', str(folder),
+        *([] if duration_s is None else ['--duration', repr(duration_s)])],
+        stdin=subprocess.DEVNULL)
+    if done.returncode:
+        raise CrgameError(f'the live run of {game.name} ended with {done.returncode}; what it '
+                          f'said is above, its files are in {folder}; --offline needs no ROS')

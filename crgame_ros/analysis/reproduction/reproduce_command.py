@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""`crgame reproduce`: a paper's evaluation again, and whether what must come out does."""
+
+import argparse
+from functools import partial
+import gc
+import math
+from pathlib import Path
+import sys
+
+from crgame_ros.errors import InputError
+
+DESCRIPTION = """\
+Repeat the evaluation of the CommonRoad-Game paper, and fail where what must come out does not.
+
+  one AV    a human is recorded once who cuts in and brakes to a stop, and meets the IDM planner
+            and the reactive one with the same inputs (figures 8 to 11)
+  two AVs   two at once against one human (figures 12 and 13)
+  timing    the graph beside a naive loop that does everything in turns (figure 14, table I)
+
+  crgame reproduce commonroad-game --out runs/reproduction
+  crgame reproduce commonroad-game --offline
+  crgame reproduce commonroad-game --idm idm-package --reactive my_planner.py:Mine
+
+It writes REPRODUCTION.md with our numbers beside the paper's, comparison.json, figures, table I,
+and each run as a CommonRoad scenario. The exit code is 1 if an expectation is not met.
+docs/reproduction.md tells more."""
+FOLDER = Path('runs') / 'reproduction'
+EVALUATIONS = ('commonroad-game',)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    add = parser.add_argument
+    add('evaluation', choices=EVALUATIONS, help='whose evaluation')
+    add('--out', type=Path, default=FOLDER, metavar='DIR',
+        help=f'new folder to write (default: {FOLDER}, or the next with a number)')
+    add('--offline', action='store_true',
+        help='without ROS and without waiting: all but the timing')
+    add('--idm', default='idm', metavar='NAME',
+        help='planner in the place of the IDM planner (default: idm)')
+    add('--reactive', default='reactive', metavar='NAME',
+        help='planner in the place of the reactive one (default: reactive)')
+    add('--duration', type=float, default=15.0, metavar='S',
+        help='wall time of each loop of the timing (default: 15)')
+    add('--format', default='svg', metavar='LIST', help='which of svg,pdf,png (default: svg)')
+    parser.set_defaults(command=reproduce)
+
+
+def reproduce(values: argparse.Namespace) -> int:
+    """Run the experiments, write the report and tell every expectation."""
+    from crgame_ros.analysis.reproduction.commonroad_game import (
+        evaluate_multi_av,
+        evaluate_single_av,
+        evaluate_timing,
+        EvaluationRequest,
+    )
+    from crgame_ros.analysis.reproduction.reproduction_report import write_report
+    from crgame_ros.planner.planner_registry import planner_class
+    formats = _formats(values.format)
+    if not 1.0 <= values.duration < math.inf:
+        raise InputError(f'is {values.duration:g} s', '--duration', 'give a second or more')
+    # Both are known before the first of them drives.
+    for name in (values.idm, values.reactive):
+        planner_class(name)
+    say = partial(print, file=sys.stderr, flush=True)
+    request = EvaluationRequest(_make_folder(values.out), values.idm, values.reactive,
+                                not values.offline, values.duration, formats, say)
+    single, multi = evaluate_single_av(request), evaluate_multi_av(request)
+    timing = None
+    if request.is_live:
+        timing, found = evaluate_timing(request)
+        print(found.table.text())
+    report, _ = write_report(request, single, multi, timing)
+    # What planners hold in circles compiled packages would complain of at the end.
+    gc.collect()
+    judgements = [*single.judgements, *multi.judgements,
+                  *(() if timing is None else timing.judgements)]
+    for each in judgements:
+        print(each.line, file=sys.stdout if each.is_met else sys.stderr, flush=True)
+    print(f'{report}: our numbers beside those of the paper')
+    return 0 if all(each.is_met for each in judgements) else 1
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    from crgame_ros.analysis.pictures.figure_style import FORMATS
+    chosen = tuple(text.replace(',', ' ').split())
+    if not chosen or any(each not in FORMATS for each in chosen):
+        raise InputError(f'is "{text[:60]}"', '--format', f'choose from {",".join(FORMATS)}')
+    return chosen
+
+
+def _make_folder(wanted: Path) -> Path:
+    """Make a new folder: what is there already stays as it is."""
+    from crgame_ros.paths import numbered
+    from crgame_ros.recording.export import prepare_folder
+    folder = next(name for name in numbered(wanted.absolute()) if not name.exists())
+    prepare_folder(folder)
+    return folder

@@ -1,0 +1,91 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What must come out of the multi-AV experiment does, and faults in a run are found."""
+
+from dataclasses import replace
+
+from crgame_ros.analysis.reproduction.multi_av_evaluation import (
+    judge_multi_av,
+    jumps,
+    MultiAvRun,
+    run_alone,
+)
+from crgame_ros.analysis.reproduction.recorded_human import record_offline
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.run_log import RunLog
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.xdist_group('reproduction')
+# The human brakes from the fifth second on.
+DURATION_S = 9.0
+
+
+def _run(planner: str) -> MultiAvRun:
+    game = scenarios_directory() / 'two_avs.yaml'
+    recorded = record_offline(game, planner, DURATION_S)
+    return MultiAvRun(recorded.against(planner), run_alone(game, planner, recorded.duration_s))
+
+
+@pytest.fixture(scope='module')
+def idm() -> MultiAvRun:
+    """Drive two AVs with the IDM planner."""
+    return _run('idm')
+
+
+def _unmet(run: MultiAvRun) -> list[str]:
+    return [each.name for each in judge_multi_av([('', run)]) if not each.is_met]
+
+
+def test_each_reacts(idm: MultiAvRun) -> None:
+    """Both are elsewhere than without the human, who is nowhere in that game."""
+    assert _unmet(idm) == []
+    assert [item.id for item in idm.alone.vehicles] == ['av0', 'av1']
+    assert len(idm.alone.ks) == round(10 * DURATION_S) + 1
+
+
+def test_nobody_reacts() -> None:
+    """At constant velocity nobody is anywhere else without the human."""
+    run = _run('constant-velocity')
+    assert run.reactions() == {'av0': 0.0, 'av1': 0.0}
+    assert 'each AV reacts' in _unmet(run)
+
+
+@pytest.mark.parametrize('moved', [0.06, np.nan])
+def test_jump_and_gap_are_found(idm: MultiAvRun, moved: float) -> None:
+    """A state 6 cm ahead of the others, or none, is no time line."""
+    states = idm.run.log.vehicle_states.copy()
+    states[40, 2, :2] += moved
+    log: RunLog = replace(idm.run.log, vehicle_states=states)
+    run = replace(idm, run=replace(idm.run, log=log))
+    assert 'one time line without a jump' in _unmet(run)
+
+
+def test_step_and_speed(idm: MultiAvRun) -> None:
+    """Where the speed doubles without the way doing so, the step differs by its length."""
+    log = idm.run.log
+    states = log.vehicle_states.copy()
+    states[:, 1, 3] *= 2.0
+    lengths = np.hypot(*np.diff(states[:, 1, :2], axis=0).T)
+    np.testing.assert_allclose(jumps(replace(log, vehicle_states=states))[:, 1], lengths,
+                               atol=0.01)
+
+
+def test_contact_is_found(idm: MultiAvRun) -> None:
+    """Contacts are told with both names."""
+    touched = replace(idm, run=replace(idm.run, contacts=[{'vehicle': 'av1', 'with': 'av0'}]))
+    judged = judge_multi_av([('x', touched)])
+    assert [each.line for each in judged if not each.is_met] == [
+        'UNMET: two AVs, x: no contact: av1 with av0']

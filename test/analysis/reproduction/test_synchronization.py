@@ -1,0 +1,85 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Table I: the naive loop, the paper's numbers, and the order that must hold."""
+
+from pathlib import Path
+
+from crgame_ros.analysis.pictures.timing_figure import TimedRun
+from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
+from crgame_ros.analysis.reproduction.naive_loop import NaiveLoop
+from crgame_ros.analysis.reproduction.synchronization import (
+    judge_synchronization,
+    PAPER_TABLE,
+    Synchronization,
+)
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.timing.cycle_rows import CycleTable, TIMING_COLUMNS
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.xdist_group('reproduction')
+
+
+def _loop(lag_s: float) -> TimedRun:
+    """Make a loop of 100 cycles, each so much later than the one before."""
+    rows = np.zeros((100, len(TIMING_COLUMNS)))
+    n = np.arange(100)
+    rows[:, TIMING_COLUMNS.index('n')] = n
+    rows[:, TIMING_COLUMNS.index('ideal_s')] = 0.01 * n
+    rows[:, TIMING_COLUMNS.index('actual_s')] = (0.01 + lag_s) * n
+    return TimedRun('', CycleTable(TIMING_COLUMNS, rows), 0.01)
+
+
+def test_order() -> None:
+    """Each of the three errors is looked at, and a loop that is no better meets none."""
+    met = judge_synchronization(Synchronization(_loop(0.0), _loop(0.001)))
+    assert [each.is_met for each in met] == [True, True, True]
+    assert met[0].found == '0.00 ms, naive 99.00 ms'
+    for worse in (_loop(0.002), _loop(0.001)):
+        judged = judge_synchronization(Synchronization(worse, _loop(0.001)))
+        assert not any(each.is_met for each in judged)
+
+
+def test_paper_table() -> None:
+    """It has our rows, and contradicts itself no more than `docs/timing.md` says."""
+    assert list(PAPER_TABLE) == [row.name for row in TIMING_ROWS]
+    value = {name: tuple(map(float, pair)) for name, pair in PAPER_TABLE.items()}
+    for proposed, ratio in zip(value['Precision Ratio'], value['Final Real-Time Ratio'],
+                               strict=True):
+        # The final ratio is 1 - P_r in both columns.
+        assert ratio == pytest.approx(1.0 - proposed, abs=5e-3)
+    rows = Synchronization(_loop(0.0), _loop(0.001)).rows()
+    assert rows[0] == {'metric': 'Final Error', 'unit': 'ms', 'proposed': 0.0,
+                       'naive': pytest.approx(99.0), 'paper_proposed': 1.48,
+                       'paper_naive': 402.38}
+
+
+def test_naive_loop(tmp_path: Path) -> None:
+    """Its cycles tell what its metrics do; it never catches up, and only what it did counts."""
+    setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
+    loop = NaiveLoop(setup, tmp_path / 'naive')
+    loop.run(0.5)
+    loop.run(0.5)
+    summary = loop.close()
+    cycles = loop.cycles
+    table = TimingTable([TimedRun('Naive', cycles, setup.scheduler.dt_s)])
+    assert table.summaries[0] == summary
+    np.testing.assert_array_equal(cycles.column('n'), np.arange(1, len(cycles.rows) + 1))
+    # Without pacing no step is shorter than Delta t, so that no delay is made up for.
+    assert np.diff(cycles.column('actual_s')).min() > setup.scheduler.dt_s - 1e-6
+    assert len(cycles.rows) <= 101
+    assert (tmp_path / 'naive' / 'metadata.yaml').is_file()
