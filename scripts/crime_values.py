@@ -15,8 +15,8 @@
 """
 What commonroad-crime says of pairs of obstacles.
 
-compare_crime.py runs it in an environment of its own. It reads what is asked from stdin, and writes
-a line that begins with @: lists of values, None where it failed.
+compare_crime.py runs it in an environment of its own. It reads what is asked from stdin, and
+writes a line that begins with @: lists of values, None where it failed.
 """
 
 from collections.abc import Iterable

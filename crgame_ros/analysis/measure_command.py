@@ -21,11 +21,13 @@ import json
 import math
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.errors import InputError, short
-from crgame_ros.game.documents import GameDocument
+
+if TYPE_CHECKING:  # Other commands do not wait for it.
+    from crgame_ros.game.documents import GameDocument
 
 # Behind what is beyond its threshold.
 CRITICAL = '   <- critical'
@@ -92,7 +94,7 @@ def measure(values: argparse.Namespace) -> int:
     return 0
 
 
-def _check_requests(names: Sequence[str], game: GameDocument) -> None:
+def _check_requests(names: Sequence[str], game: 'GameDocument') -> None:
     known = [event.name for event in game.events]
     for name in names:
         if name not in known:
