@@ -43,7 +43,7 @@ class Encounter:
 
     @cached_property
     def lane(self) -> DrivenLane:
-        """The lane in which the AV began."""
+        """Find the lane in which the AV began."""
         return DrivenLane(self.alternative.log, self._place)
 
     @property
@@ -64,12 +64,12 @@ class Encounter:
 
     @property
     def least_gap(self) -> float | None:
-        """The smallest gap to the human ahead, bumper to bumper; None: never behind it [m]."""
+        """Give the smallest gap to the human ahead, bumper to bumper; None: never behind it [m]."""
         return self._worst('gap')
 
     @property
     def least_distance(self) -> float | None:
-        """The smallest distance of the outlines of AV and human; None: never near [m]."""
+        """Give the smallest distance of the outlines of AV and human; None: never near [m]."""
         return self._worst('min_distance')
 
     @property

@@ -33,7 +33,7 @@ Repeat the evaluation of the CommonRoad-Game paper, and fail where what must com
 
   crgame reproduce commonroad-game --out runs/reproduction
   crgame reproduce commonroad-game --offline
-  crgame reproduce commonroad-game --idm idm-package --reactive my_planner.py:Mine
+  crgame reproduce commonroad-game --idm idm-package --reactive FILE.py:Class
 
 It writes REPRODUCTION.md with our numbers beside the paper's, comparison.json, figures, table I,
 and each run as a CommonRoad scenario. The exit code is 1 if an expectation is not met.
