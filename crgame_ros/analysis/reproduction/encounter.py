@@ -64,7 +64,7 @@ class Encounter:
 
     @property
     def least_gap(self) -> float | None:
-        """Give the smallest gap to the human ahead, bumper to bumper; None: never behind it [m]."""
+        """Give the smallest gap to the human ahead, by bumpers; None: never behind it [m]."""
         return self._worst('gap')
 
     @property
