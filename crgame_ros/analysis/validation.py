@@ -86,8 +86,8 @@ def parts_of(path: Path) -> list[Path]:
     if not path.is_dir() or recording_in(path) == path:
         return [path]
     tables = [path / TABLES] if (path / TABLES / PACKAGE_FILE).exists() else []
-    return [recording_in(path), *tables, *sorted(file for file in path.iterdir()
-                                        if file.suffix in ('.xml', '.yaml', '.json'))]
+    files = [file for file in path.iterdir() if file.suffix in ('.xml', '.yaml', '.json')]
+    return [recording_in(path), *tables, *sorted(files)]
 
 
 def _check_of(path: Path) -> Callable[[Path, Progress | None], FileVerdict]:

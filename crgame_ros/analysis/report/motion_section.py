@@ -57,9 +57,11 @@ def motion_section(run: ReportRun) -> Section:
         'vehicle', 'way [m]', 'mean speed [m/s]', 'least [m/s]', 'greatest [m/s]',
         'hardest braking [m/s²]', 'hardest acceleration [m/s²]'), rows, 'numbers')
     colours = run.colours
-    profiles = [Plot(key, title, unit, tuple(
-        PlotLine(item.id, run.times_s, _unwrapped(states[:, i, column], column),
-                 colours[item.id], dash_of(item.role)) for i, item in enumerate(run.log.vehicles)))
+    profiles = [
+        Plot(key, title, unit, tuple(
+            PlotLine(item.id, run.times_s, _unwrapped(states[:, i, column], column),
+                     colours[item.id], dash_of(item.role))
+            for i, item in enumerate(run.log.vehicles)))
         for key, title, unit, column in _PROFILES]
     ways = Plot('ways', 'Ways of the rear axles in the map, and of others', 'm', (
         *_others_ways(run),
