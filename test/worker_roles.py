@@ -30,6 +30,8 @@ REAL_TIME_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
 # These in there do not: they compute, or start what nobody waits for.
 TIMELESS = {'cockpit/test_replay_backend', 'cockpit/test_scene', 'ros/test_markers',
             'ros/test_number_parameters', 'ros/test_ros_messages'}
+# These elsewhere need an ordinary priority: they ask the kernel about it.
+ORDINARY = {'timing/test_time_slice'}
 # The group of those that nothing may run beside: they assert what clocks show.
 ALONE = 'alone'
 GRAPH_WORKERS = 2
@@ -61,8 +63,8 @@ def group_of(item: pytest.Item, folder: Path) -> str:
 
 
 def keeps_to_the_clock(group: str) -> bool:
-    """Tell whether the tests of a group speak with running graphs or servers."""
-    return group == ALONE or (
+    """Tell whether the tests of a group may not be slowed: most speak with running graphs."""
+    return group == ALONE or group in ORDINARY or (
         group.partition('/')[0] in REAL_TIME_FOLDERS and group not in TIMELESS)
 
 
