@@ -116,7 +116,10 @@ setup(
         'shapely>=2.2,<3',
         'zstandard>=0.25,<1',
     ],
-    extras_require={'test': [
+    extras_require={
+        'evaluate': ['distributed>=2026.8,<2027'],
+        'gym': ['gymnasium>=1.4,<2', 'pettingzoo>=1.27,<2'],
+        'test': [
         'commonroad-vehicle-models==3.0.2',
         'flake8-blind-except', 'flake8-builtins', 'flake8-class-newline', 'flake8-comprehensions',
         'flake8-deprecated', 'flake8-docstrings', 'flake8-import-order', 'flake8-quotes',
