@@ -1,0 +1,164 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What is summed up of cells: one row of a table for each measure."""
+
+from collections.abc import Iterable, Sequence
+import math
+from typing import Literal, NamedTuple
+
+from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
+from crgame_ros.analysis.criticality.thresholds import USUAL
+from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
+from crgame_ros.analysis.tables.vehicles_table import VEHICLES
+from crgame_ros.errors import InputError, short
+import numpy as np
+from numpy.typing import NDArray
+
+Test = Literal['<', '<=', '>', 'known']
+_NUMERIC = {column.name: column for column in VEHICLES.columns
+            if column.type in (NUMBER, INTEGER, FLAG)}
+
+
+class SummaryMeasure(NamedTuple):
+    """
+    Something of which there is a mean.
+
+    :param name: by which it is asked for.
+    :param label: for people.
+    :param column: of the table `vehicles`; empty of what is told by the cell alone.
+    :param better: the greater (1) or the smaller (-1) values are; 0 for neither.
+    :param test: with `limit` makes a share of it: of the values that pass; empty for a mean.
+    :param limit: of the test.
+    :param empty: what an empty value counts as; NaN leaves its row out.
+    """
+
+    name: str
+    label: str
+    column: str
+    better: int
+    test: Test | Literal[''] = ''
+    limit: float = 0.0
+    empty: float = math.nan
+
+    @property
+    def is_share(self) -> bool:
+        """Tell whether it is a share, from 0 to 1."""
+        return bool(self.test) or not self.column
+
+    @property
+    def unit(self) -> str:
+        """Give the unit as tables write it; 1 of a share or a count."""
+        if self.is_share or self.column not in _NUMERIC:
+            return '1'
+        return _NUMERIC[self.column].unit or '1'
+
+    @property
+    def definition(self) -> str:
+        """Say in a sentence what it is."""
+        if not self.column:
+            return 'share of all finished cells that did not end well'
+        column = _NUMERIC.get(self.column)
+        what = self.column if column is None else column.definition
+        if not self.test:
+            return what
+        condition = 'is known' if self.test == 'known' else f'is {self.test} {self.limit:g}'
+        return f'share of AVs of which {self.column} {condition} ({what})'
+
+    def values(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Make values to average of a column; NaN where there is none.
+
+        :param numbers: (N) NaN where the column is empty.
+        """
+        missing = np.isnan(numbers)
+        if not self.test:
+            # The mean of something infinite says nothing.
+            return np.where(np.isfinite(numbers), numbers, self.empty)
+        with np.errstate(invalid='ignore'):
+            passed = {'<': numbers < self.limit, '<=': numbers <= self.limit,
+                      '>': numbers > self.limit, 'known': ~missing}[self.test]
+        return np.where(missing & (self.test != 'known'), self.empty, passed.astype(float))
+
+
+# Nobody was near where nothing is known of a gap: no collision, nothing critical.
+MEASURES = {measure.name: measure for measure in (
+    SummaryMeasure('failed', 'cells that failed', '', -1),
+    SummaryMeasure('collision', 'AVs with a collision', 'worst_min_distance', -1, '<=', 0.0, 0.0),
+    SummaryMeasure('off_road', 'AVs off the road', 'drivable_area', -1, '<', 1.0),
+    SummaryMeasure('critical_ttc', f'AVs with a TTC below {USUAL.ttc_s:g} s', 'worst_ttc', -1,
+                   '<', USUAL.ttc_s, 0.0),
+    SummaryMeasure('critical_drac', f'AVs with a DRAC above {USUAL.drac:g} m/s²', 'worst_drac',
+                   -1, '>', USUAL.drac, 0.0),
+    SummaryMeasure('goal_reached', 'AVs that reached their goal', 'reached_s', 1, 'known'),
+    SummaryMeasure('nuplan_score', 'nuPlan score', 'nuplan_score', 1),
+    SummaryMeasure('no_collision_at_fault', 'no collision at fault', 'no_collision_at_fault', 1),
+    SummaryMeasure('driving_direction', 'driving direction', 'driving_direction', 1),
+    SummaryMeasure('progress', 'progress', 'progress', 1),
+    SummaryMeasure('speed_limit', 'speed limit', 'speed_limit', 1),
+    SummaryMeasure('comfort', 'comfort', 'comfort', 1),
+    SummaryMeasure('worst_ttc', 'least TTC', 'worst_ttc', 1),
+    SummaryMeasure('worst_thw', 'least THW', 'worst_thw', 1),
+    SummaryMeasure('worst_min_distance', 'least distance', 'worst_min_distance', 1),
+    SummaryMeasure('worst_drac', 'greatest DRAC', 'worst_drac', -1),
+    SummaryMeasure('worst_pet_s', 'least PET', 'worst_pet_s', 1),
+    SummaryMeasure('tet_s', 'time with a critical TTC', 'tet_s', -1),
+    SummaryMeasure('tit', 'TTC below its threshold, over time', 'tit', -1),
+    SummaryMeasure('distance', 'way', 'distance', 0),
+    SummaryMeasure('mean_speed', 'mean speed', 'mean_speed', 0),
+    SummaryMeasure('min_acceleration', 'hardest braking', 'min_acceleration', 1),
+    SummaryMeasure('fallbacks', 'plans that braked instead', 'fallbacks', -1),
+    SummaryMeasure('plans_refused', 'plans refused', 'plans_refused', -1),
+    SummaryMeasure('timed_out', 'requests without an answer', 'timed_out', -1),
+    SummaryMeasure('latency_p50_s', 'median latency', 'latency_p50_s', -1),
+    SummaryMeasure('latency_max_s', 'greatest latency', 'latency_max_s', -1),
+)}
+# The worst cells: contacts first, then by what was left.
+WORST_FIRST = ('collision', 'worst_ttc')
+
+
+def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
+                    ) -> tuple[SummaryMeasure, ...]:
+    """
+    Choose what is summed up.
+
+    :param names: of measures, or of numeric columns of the table `vehicles`; None for all
+        measures.
+    :param known: columns that the evaluation has.
+    :raises InputError: if a name is neither, or its column is in no part.
+    """
+    known = set(known)
+    there = {name: measure for name, measure in MEASURES.items()
+             if not measure.column or measure.column in known}
+    if names is None:
+        return tuple(there.values())
+    found = []
+    for name in dict.fromkeys(names):
+        if name in there:
+            found.append(there[name])
+        elif name in _NUMERIC and name in known:
+            found.append(SummaryMeasure(name, name.replace('_', ' '), name, _better(name)))
+        else:
+            more = sorted(known & _NUMERIC.keys() - there.keys())
+            raise InputError(f'no measure {short(name)} here', '--measure',
+                             f'there are {", ".join([*there, *more])}')
+    if not found:
+        raise InputError('no measure is named', '--measure', 'name one, or leave it out for all')
+    return tuple(found)
+
+
+def _better(column: str) -> int:
+    """Tell which values of a column are better: those less critical, of criticality."""
+    measure = CRITICALITY.get(column.removeprefix('worst_'))
+    return -measure.worst if measure is not None and column.startswith('worst_') else 0
