@@ -14,24 +14,26 @@
 # limitations under the License.
 """The parts of an evaluation's folder, read batch by batch."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 import pyarrow as pa
-import pyarrow.dataset as ds
+import pyarrow.parquet as pq
 
 # What a cell is made of; cells that share all but the planner are a pair.
 TEXT_FACTORS = ('scenario', 'game', 'planner', 'human', 'perception', 'traffic')
 FACTORS = (*TEXT_FACTORS, 'seed')
+_REQUIRED = {'cells': ('cell', 'status'), 'vehicles': ('cell', 'vehicle', 'role')}
+
 
 class PartBatch(NamedTuple):
     """
-    Some rows of a part.
+    Some rows of parts with the same columns.
 
-    :param rows: with all columns that were asked for; those that the part lacks are empty.
-    :param columns: that the part has.
+    :param rows: with all columns that were asked for; those that the parts lack are empty.
+    :param columns: that the parts have.
     """
 
     rows: pa.RecordBatch
@@ -49,67 +51,70 @@ class EvaluatedParts:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
         if not folder.is_dir():
             raise InputError('no such folder', str(folder), 'give the folder of an evaluation')
         self._parts = {table: sorted((folder / table).glob('part-*.parquet'))
-                       for table in ('cells', 'vehicles')}
+                       for table in _REQUIRED}
         if not self._parts['cells']:
             raise InputError('no cell is finished', str(folder),
                              'give the folder of an evaluation, or wait until its first cells are')
-        self.rows = 0
-        for path in self._parts['cells']:
-            part = _fragment(path)
-            _require(part, ('cell', 'status'))
-            self.rows += part.count_rows()
-        self.columns: frozenset[str] = frozenset()
-        for path in self._parts['vehicles']:
-            part = _fragment(path)
-            _require(part, ('cell', 'vehicle', 'role'))
-            self.columns |= set(part.physical_schema.names)
+        self.rows = sum(_look_at(path, 'cells').num_rows for path in self._parts['cells'])
+        self.columns = frozenset(name for path in self._parts['vehicles']
+                                 for name in _look_at(path, 'vehicles').schema.names)
 
     def batches(self, table: str, columns: Mapping[str, pa.DataType],
-                where: ds.Expression | None = None,
                 batch_rows: int = 32_768) -> Iterator[PartBatch]:
         """
         Read some columns of all parts.
 
         :param table: `cells` or `vehicles`.
         :param columns: with the types that they are wanted in.
-        :param where: which rows; None for all.
         :param batch_rows: at most so many rows at a time.
         :raises InputError: if a part is broken, or a column is of another kind.
         """
-        schema = pa.schema(list(columns.items()))
+        kept: list[PartBatch] = []
         for path in self._parts[table]:
-            # Opened anew each time: what thousands of files say of themselves takes room.
-            part = _fragment(path)
-            there = frozenset(part.physical_schema.names)
             try:
-                for batch in part.to_batches(
-                        schema=schema, filter=where, batch_size=batch_rows,
-                        batch_readahead=1, use_threads=False):
-                    if batch.num_rows:
-                        yield PartBatch(batch, there)
+                with pq.ParquetFile(path) as part:
+                    there = frozenset(part.schema_arrow.names)
+                    for batch in part.iter_batches(
+                            batch_rows, columns=list(there & columns.keys()), use_threads=False):
+                        found = PartBatch(_wanted(batch, columns), there)
+                        # Small parts together: each batch costs its reader the same.
+                        if kept and (kept[0].columns != there or batch_rows < sum(
+                                each.rows.num_rows for each in (*kept, found))):
+                            yield _together(kept)
+                            kept = []
+                        kept.append(found)
             except (pa.ArrowException, OSError) as error:
                 raise _unreadable(path, error) from error
+        if kept:
+            yield _together(kept)
 
 
-def _fragment(path: Path) -> ds.ParquetFileFragment:
+def _together(batches: list[PartBatch]) -> PartBatch:
+    rows = pa.concat_batches([batch.rows for batch in batches])
+    return PartBatch(rows, batches[0].columns)
+
+
+def _wanted(batch: pa.RecordBatch, columns: Mapping[str, pa.DataType]) -> pa.RecordBatch:
+    """Give columns in the types in which they are wanted, empty where there are none."""
+    there = batch.schema.names
+    return pa.RecordBatch.from_arrays(
+        [batch[name].cast(kind) if name in there else pa.nulls(batch.num_rows, kind)
+         for name, kind in columns.items()], list(columns))
+
+
+def _look_at(path: Path, table: str) -> pq.FileMetaData:
     try:
-        part = next(iter(ds.dataset(path, format='parquet').get_fragments()))
-        # Reads the end of the file, which says what is in it.
-        part.ensure_complete_metadata()
+        found = pq.read_metadata(path)
     except (pa.ArrowException, OSError) as error:
         raise _unreadable(path, error) from error
-    return part
-
-
-def _require(part: ds.ParquetFileFragment, columns: Sequence[str]) -> None:
-    lacking = [name for name in columns if name not in part.physical_schema.names]
+    lacking = [name for name in _REQUIRED[table] if name not in found.schema.names]
     if lacking:
-        raise InputError(f'has no column {", ".join(lacking)}', part.path,
+        raise InputError(f'has no column {", ".join(lacking)}', str(path),
                          'give the folder of an evaluation')
+    return found
 
 
 def _unreadable(path: Path, error: Exception) -> InputError:

@@ -22,7 +22,7 @@ from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.summary import FailureReason
 import numpy as np
 import pyarrow as pa
-import pyarrow.dataset as ds
+import pyarrow.compute as pc
 
 # So many different reasons are counted one by one, and so many are told.
 _MOST_COUNTED, MOST_TOLD = 1000, 20
@@ -84,11 +84,11 @@ def _tracebacks(parts: EvaluatedParts, keys: set[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     if not keys:
         return found
-    where = ds.field('cell').isin(sorted(keys)) & (ds.field('status') != 'ok')
     columns = {name: pa.string() for name in ('cell', 'status', 'traceback')}
-    for batch in parts.batches('cells', columns, where, _BATCH_ROWS):
-        for key, text in zip(batch.rows['cell'].to_pylist(), batch.rows['traceback'].to_pylist(),
-                             strict=True):
-            if text:
+    examples = pa.array(sorted(keys))
+    for batch in parts.batches('cells', columns, _BATCH_ROWS):
+        rows = batch.rows.filter(pc.is_in(batch.rows['cell'], value_set=examples))
+        for key, status, text in zip(*(rows[name].to_pylist() for name in columns), strict=True):
+            if text and status != 'ok':
                 found[key] = max(text[-_LONGEST_TRACEBACK:], found.get(key, ''))
     return found

@@ -24,11 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.dataset as ds
 
 FloatArray = NDArray[np.float64]
-
-_AUTONOMOUS = ds.field('role') == 'autonomous'
 
 
 @dataclass(frozen=True)
@@ -74,21 +71,23 @@ def measured_vehicles(parts: EvaluatedParts, block: CellBlock,
     :raises InputError: if a part cannot be read.
     """
     columns = {'cell': pa.string(), 'vehicle': pa.string(), 'role': pa.string(),
-               **{measure.column: pa.float64() for measure in measures if measure.column}}
+               **{name: pa.float64() for measure in measures for name in measure.columns}}
     keys = block.keys.combine_chunks()
     cells, ids = [np.empty(0, np.int64)], [np.empty(0, object)]
     values = [np.empty((0, len(measures)))]
-    for batch in parts.batches('vehicles', columns, _AUTONOMOUS):
-        place = pc.fill_null(pc.index_in(batch.rows['cell'], value_set=keys), -1).to_numpy()
+    for batch in parts.batches('vehicles', columns):
+        rows = batch.rows.filter(pc.equal(batch.rows['role'], 'autonomous'))
+        place = pc.fill_null(pc.index_in(rows['cell'], value_set=keys), -1).to_numpy()
         mine = np.flatnonzero(place >= 0)
         mine = mine[block.ok[place[mine]]]
-        rows = batch.rows.take(pa.array(mine))
+        rows = rows.take(pa.array(mine))
         cells.append(place[mine].astype(np.int64))
         ids.append(_texts(rows['vehicle']))
         values.append(np.column_stack([
-            measure.values(rows[measure.column].to_numpy(zero_copy_only=False))
-            if measure.column in batch.columns else np.full(len(mine), np.nan)
-            for measure in measures]))
+            measure.values(*(rows[name].to_numpy(zero_copy_only=False)
+                             for name in measure.columns))
+            if measure.column and batch.columns.issuperset(measure.columns)
+            else np.full(len(mine), np.nan) for measure in measures]))
     return _each_once(MeasuredVehicles(
         np.concatenate(cells), np.concatenate(ids), np.concatenate(values)))
 
@@ -104,8 +103,11 @@ def _each_once(found: MeasuredVehicles) -> MeasuredVehicles:
     if not len(found.cells):
         return found
     _, ranks = np.unique(found.ids, return_inverse=True)
-    order = np.lexsort((*found.values.T[::-1], ranks, found.cells))
+    order = np.lexsort((ranks, found.cells))
     first = np.ones(len(order), bool)
     first[1:] = (np.diff(found.cells[order]) != 0) | (np.diff(ranks[order]) != 0)
+    if not first.all():
+        # Whichever came first, the same row is kept.
+        order = np.lexsort((*found.values.T[::-1], ranks, found.cells))
     order = order[first]
     return MeasuredVehicles(found.cells[order], found.ids[order], found.values[order])

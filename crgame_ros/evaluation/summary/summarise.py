@@ -19,7 +19,8 @@ The cells are looked at in blocks, twice: first they are counted, then their mea
 What is kept in between grows with planners, scenarios and measures, not with cells.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from crgame_ros.errors import InputError, short
@@ -32,12 +33,14 @@ from crgame_ros.evaluation.summary.paired_cells import paired_cells
 from crgame_ros.evaluation.summary.summary import GroupMeans, PairedDifferences, Summary
 from crgame_ros.evaluation.summary.summary_measures import (
     chosen_measures,
+    MEASURES,
     SummaryMeasure,
     WORST_FIRST,
 )
 from crgame_ros.evaluation.summary.worst_cells import WorstCells
 from crgame_ros.game.game import DEFAULT_PLANNER
 import numpy as np
+import pyarrow as pa
 
 RESAMPLES = 2000
 _FEWEST_RESAMPLES, _MOST_RESAMPLES = 100, 100_000
@@ -45,6 +48,18 @@ _FEWEST_RESAMPLES, _MOST_RESAMPLES = 100, 100_000
 _MOST_NUMBERS = 20_000_000
 
 
+@contextmanager
+def _frugal_memory() -> Iterator[None]:
+    """Let Arrow give memory back at once: its own pool keeps several times what is in use."""
+    before = pa.default_memory_pool()
+    pa.set_memory_pool(pa.system_memory_pool())
+    try:
+        yield
+    finally:
+        pa.set_memory_pool(before)
+
+
+@_frugal_memory()
 def summarise(folder: Path, *, measures: Sequence[str] | None = None,
               by: Sequence[str] = ('planner',), baseline: str | None = None,
               worst: Sequence[str] | None = None, resamples: int = RESAMPLES, seed: int = 0,
@@ -74,9 +89,8 @@ def summarise(folder: Path, *, measures: Sequence[str] | None = None,
         raise InputError(f'is {seed}', 'seed', 'give one from 0 to 2^63 - 1')
     parts = EvaluatedParts(folder)
     chosen = chosen_measures(measures, parts.columns)
-    worst_by = chosen_measures(
-        [name for name in WORST_FIRST if _is_there(name, parts)] if worst is None else worst,
-        parts.columns) if parts.columns else ()
+    worst_by = chosen_measures(worst, parts.columns) if worst else tuple(
+        MEASURES[name] for name in WORST_FIRST if MEASURES[name].column in parts.columns)
     blocks = CellBlocks(parts, block_cells)
     tally = tally_cells(blocks, by, _baseline(baseline, by, blocks))
     drawn = len(tally.units) + len(tally.pairs)
@@ -88,13 +102,6 @@ def summarise(folder: Path, *, measures: Sequence[str] | None = None,
         folder, tuple(by), tally.baseline, chosen, len(tally.scenarios),
         _groups(tally, means), _differences(tally, differences), worst_by, found.worst(),
         tally.failures.told(parts, tally.groups.labels), resamples, seed)
-
-
-def _is_there(name: str, parts: EvaluatedParts) -> bool:
-    try:
-        return bool(chosen_measures([name], parts.columns))
-    except InputError:
-        return False
 
 
 def _baseline(wanted: str | None, by: Sequence[str], blocks: CellBlocks) -> str:

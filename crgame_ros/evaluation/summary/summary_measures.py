@@ -26,7 +26,7 @@ from crgame_ros.errors import InputError, short
 import numpy as np
 from numpy.typing import NDArray
 
-Test = Literal['<', '<=', '>', 'known']
+Test = Literal['<', '<=', '>', 'known', 'true']
 _NUMERIC = {column.name: column for column in VEHICLES.columns
             if column.type in (NUMBER, INTEGER, FLAG)}
 
@@ -42,6 +42,7 @@ class SummaryMeasure(NamedTuple):
     :param test: with `limit` makes a share of it: of the values that pass; empty for a mean.
     :param limit: of the test.
     :param empty: what an empty value counts as; NaN leaves its row out.
+    :param where: another column that has to be known, or the row is left out; empty for none.
     """
 
     name: str
@@ -51,6 +52,12 @@ class SummaryMeasure(NamedTuple):
     test: Test | Literal[''] = ''
     limit: float = 0.0
     empty: float = math.nan
+    where: str = ''
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name the columns that it is made of."""
+        return tuple(filter(None, (self.column, self.where)))
 
     @property
     def is_share(self) -> bool:
@@ -73,22 +80,27 @@ class SummaryMeasure(NamedTuple):
         what = self.column if column is None else column.definition
         if not self.test:
             return what
-        condition = 'is known' if self.test == 'known' else f'is {self.test} {self.limit:g}'
+        condition = (f'is {self.test}' if self.test in ('known', 'true')
+                     else f'is {self.test} {self.limit:g}')
         return f'share of AVs of which {self.column} {condition} ({what})'
 
-    def values(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def values(self, *columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Make values to average of a column; NaN where there is none.
+        Make values to average of its columns; NaN where there is none.
 
-        :param numbers: (N) NaN where the column is empty.
+        :param columns: (N) as `columns` names them, NaN where one is empty.
         """
+        numbers = columns[0]
+        if self.where:
+            return np.where(np.isnan(columns[1]), np.nan, self._replace(where='').values(numbers))
         missing = np.isnan(numbers)
         if not self.test:
             # The mean of something infinite says nothing.
             return np.where(np.isfinite(numbers), numbers, self.empty)
         with np.errstate(invalid='ignore'):
             passed = {'<': numbers < self.limit, '<=': numbers <= self.limit,
-                      '>': numbers > self.limit, 'known': ~missing}[self.test]
+                      '>': numbers > self.limit, 'known': ~missing,
+                      'true': numbers > 0.0}[self.test]
         return np.where(missing & (self.test != 'known'), self.empty, passed.astype(float))
 
 
@@ -96,18 +108,24 @@ class SummaryMeasure(NamedTuple):
 MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('failed', 'cells that failed', '', -1),
     SummaryMeasure('collision', 'AVs with a collision', 'worst_min_distance', -1, '<=', 0.0, 0.0),
-    SummaryMeasure('off_road', 'AVs off the road', 'drivable_area', -1, '<', 1.0),
+    SummaryMeasure('off_road', 'AVs off the road', 'score_drivable_area', -1, '<', 1.0),
     SummaryMeasure('critical_ttc', f'AVs with a TTC below {USUAL.ttc_s:g} s', 'worst_ttc', -1,
                    '<', USUAL.ttc_s, 0.0),
     SummaryMeasure('critical_drac', f'AVs with a DRAC above {USUAL.drac:g} m/s²', 'worst_drac',
                    -1, '>', USUAL.drac, 0.0),
-    SummaryMeasure('goal_reached', 'AVs that reached their goal', 'reached_s', 1, 'known'),
-    SummaryMeasure('nuplan_score', 'nuPlan score', 'nuplan_score', 1),
-    SummaryMeasure('no_collision_at_fault', 'no collision at fault', 'no_collision_at_fault', 1),
-    SummaryMeasure('driving_direction', 'driving direction', 'driving_direction', 1),
-    SummaryMeasure('progress', 'progress', 'progress', 1),
-    SummaryMeasure('speed_limit', 'speed limit', 'speed_limit', 1),
-    SummaryMeasure('comfort', 'comfort', 'comfort', 1),
+    # Never reached, and not scored at all, leave it empty alike.
+    SummaryMeasure('goal_reached', 'AVs that reached their goal', 'score_reached_s', 1, 'known',
+                   where='score_valid'),
+    SummaryMeasure('valid', 'AVs with a valid solution', 'score_valid', 1, 'true'),
+    SummaryMeasure('feasible', 'AVs with a feasible drive', 'score_feasible', 1, 'true'),
+    SummaryMeasure('nuplan', 'nuPlan score', 'score_nuplan', 1),
+    SummaryMeasure('no_collision_at_fault', 'nuPlan: no collision at fault',
+                   'score_no_collision_at_fault', 1),
+    SummaryMeasure('driving_direction', 'nuPlan: driving direction', 'score_driving_direction', 1),
+    SummaryMeasure('progress', 'nuPlan: progress', 'score_progress', 1),
+    SummaryMeasure('time_to_collision', 'nuPlan: time to collision', 'score_time_to_collision', 1),
+    SummaryMeasure('speed_limit', 'nuPlan: speed limit', 'score_speed_limit', 1),
+    SummaryMeasure('comfort', 'nuPlan: comfort', 'score_comfort', 1),
     SummaryMeasure('worst_ttc', 'least TTC', 'worst_ttc', 1),
     SummaryMeasure('worst_thw', 'least THW', 'worst_thw', 1),
     SummaryMeasure('worst_min_distance', 'least distance', 'worst_min_distance', 1),
@@ -140,7 +158,7 @@ def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
     """
     known = set(known)
     there = {name: measure for name, measure in MEASURES.items()
-             if not measure.column or measure.column in known}
+             if known.issuperset(measure.columns)}
     if names is None:
         return tuple(there.values())
     found = []

@@ -32,8 +32,8 @@ from crgame_ros.evaluation.summary.summary_measures import SummaryMeasure
 NOTHING = '-'
 _SHARE_OF_NONE = ('an interval from 0 to 0 is that of the resamples: what never happened in n may '
                   'still happen as often as 3/n')
-_BY_CHANCE = ('better and worse: the whole interval is on that side of zero; where nothing differs '
-              'one interval in twenty is, by chance')
+_BY_CHANCE = ('better and worse: the whole interval is on that side of zero; where nothing '
+              'differs one interval in twenty is, by chance')
 
 
 class SummaryCell(NamedTuple):
