@@ -123,9 +123,9 @@ def quantity(value: float, measure: SummaryMeasure, signed: bool = False) -> str
         value *= 100.0
     if math.isinf(value):
         return 'inf' if value > 0.0 else '-inf'
-    digits = 3 if value == 0.0 else max(0, min(5, 2 - math.floor(math.log10(abs(value)))))
-    text = f'{value:{"+" if signed else ""}.{0 if value == 0.0 else digits}f}'
-    return text.lstrip('+-') if not float(text) else text
+    digits = max(0, min(5, 2 - math.floor(math.log10(abs(value) or 1.0))))
+    text = f'{value:{"+" if signed else ""}.{digits}f}'
+    return text if float(text) else '0'
 
 
 def _means(summary: Summary) -> SummaryTable:

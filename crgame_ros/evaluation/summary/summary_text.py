@@ -29,21 +29,25 @@ from crgame_ros.evaluation.summary.summary_tables import (
 
 WIDTH = 120
 _GAP, _INDENT = '  ', '  '
-_LONGEST = 60
+# Of what stands in a table [characters].
+_LONGEST = 40
 
 
 def summary_text(summary: Summary) -> str:
     """Write a summary for a terminal."""
-    lines = [one_line(f'{summary_title(summary)}: {summary_lead(summary)}')]
+    lines = _wrapped(f'{summary_title(summary)}: {summary_lead(summary)}', '')
     for table in summary_tables(summary):
-        lines += ['', one_line(table.title)]
+        lines += ['', _cut(table.title)]
         for note in table.notes:
-            lines += textwrap.wrap(one_line(note), WIDTH, initial_indent=_INDENT,
-                                   subsequent_indent=_INDENT)
+            lines += _wrapped(note, _INDENT)
         lines += _rows(table)
         if table.keys >= 0:
             lines += _reports(summary, table)
     return '\n'.join(lines) + '\n'
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(one_line(text), WIDTH, initial_indent=indent, subsequent_indent=indent)
 
 
 def _reports(summary: Summary, table: SummaryTable) -> Iterator[str]:
@@ -58,7 +62,7 @@ def _reports(summary: Summary, table: SummaryTable) -> Iterator[str]:
 
 def _rows(table: SummaryTable) -> Iterator[str]:
     """Give the lines of a table; columns that do not fit stand below."""
-    rows = [[one_line(text) for text in table.head],
+    rows = [[_cut(text) for text in table.head],
             *([_cell(cell) for cell in row] for row in table.rows)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(table.head))]
     for part in _parts(widths):
@@ -81,8 +85,10 @@ def _parts(widths: Sequence[int]) -> Iterator[list[int]]:
 
 
 def _cell(cell: SummaryCell) -> str:
-    text = one_line(cell.text)
-    if len(text) > _LONGEST:
-        text = f'{text[:_LONGEST - 1]}…'
-    detail = f' ({one_line(cell.detail)})' if cell.detail else ''
-    return f'{text}{detail}{f" {cell.mark}" if cell.mark else ""}'
+    detail = f' ({_cut(cell.detail)})' if cell.detail else ''
+    return f'{_cut(cell.text)}{detail}{f" {cell.mark}" if cell.mark else ""}'
+
+
+def _cut(text: str) -> str:
+    text = one_line(text)
+    return text if len(text) <= _LONGEST else f'{text[:_LONGEST - 1]}…'

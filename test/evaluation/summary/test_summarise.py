@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.summary.cell_block import CellBlocks
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Estimate, Summary
@@ -131,6 +132,17 @@ def test_blocks_change_nothing_but_draws_of_cells(tmp_path: Path) -> None:
         for left, right in zip(one.estimates, other.estimates, strict=True):
             assert vars(left) == pytest.approx(vars(right), rel=1e-12, nan_ok=True)
     assert whole.worst == parted.worst and whole.failures == parted.failures
+
+
+def test_every_cell_is_in_one_block_and_pairs_are_together(tmp_path: Path) -> None:
+    parts = EvaluatedParts(many(240, 12).write(tmp_path / 'rows', 5, seed=1))
+    blocks = list(CellBlocks(parts, 60))
+    keys = [key for block in blocks for key in block.keys.to_pylist()]
+    assert len(keys) == len(set(keys)) == 240
+    # Half of each block is idm's, for each of its cells there is one of the other planner.
+    assert len(blocks) == 4 and all(30 <= len(block.keys) <= 90 for block in blocks)
+    for block in blocks:
+        assert set(np.unique(block.pairs, return_counts=True)[1].tolist()) == {2}
 
 
 def test_another_planner_does_not_change_the_others(tmp_path: Path) -> None:
