@@ -30,6 +30,8 @@ from crgame_ros.evaluation.summary.summary import (
 from crgame_ros.evaluation.summary.summary_measures import SummaryMeasure
 
 NOTHING = '-'
+# As tried with made-up evaluations (docs/evaluation.md).
+_MANY_SCENARIOS = 20
 _SHARE_OF_NONE = ('an interval from 0 to 0 is that of the resamples: what never happened in n may '
                   'still happen as often as 3/n')
 _BY_CHANCE = ('better and worse: the whole interval is on that side of zero; where nothing '
@@ -168,6 +170,10 @@ def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterat
             yield (f'{whose}drawn are scenarios, each with all its {what}, for {what} of one '
                    'scenario are alike (cluster bootstrap): the intervals speak of scenarios '
                    'like these')
+            if min(group.scenarios for group in groups
+                   if group.resampled == kind) < _MANY_SCENARIOS:
+                yield (f'{whose}with fewer than {_MANY_SCENARIOS} scenarios they are too narrow: '
+                       'those of ten hold the truth in 90 %, those of five in 84 %')
         else:
             yield (f'{whose}drawn are {what}, because there are fewer than {FEWEST_SCENARIOS} '
                    'scenarios: the intervals speak of these scenarios alone')

@@ -91,6 +91,20 @@ def test_pairs_are_cells_alike_in_all_but_the_planner(two: Summary) -> None:
     assert (failed.value, failed.n) == (pytest.approx((2 - 1) / 7), 7)
 
 
+def test_only_cells_that_are_alike_are_pairs(tmp_path: Path) -> None:
+    """Each factor for itself keeps cells apart, whichever comes first."""
+    rows = Evaluation()
+    rows.add(planner='idm', avs=[{'distance': 1.0}])
+    rows.add(planner='mine', avs=[{'distance': 3.0}])
+    for number in range(5):
+        for factor in ('scenario', 'game', 'human', 'perception', 'traffic'):
+            rows.add(planner='mine', avs=[{'distance': 99.0}], **{factor: f'other {number}'})
+        rows.add(planner='mine', avs=[{'distance': 99.0}], seed=1 + number)
+    found, = summarise(rows.write(tmp_path / 'rows'), resamples=100).differences
+    assert (found.pairs, found.unpaired) == (1, 30)
+    assert found.estimates[-1].value == 2.0
+
+
 def test_the_worst_cells_come_contacts_first(two: Summary) -> None:
     assert [(cell.values, cell.factors[2], cell.vehicle) for cell in two.worst[:3]] == [
         ((1.0, 1.5), 'mine', 'av0'), ((1.0, 5.0), 'mine', 'av0'), ((0.0, 2.0), 'idm', 'av0')]
@@ -156,12 +170,12 @@ def test_another_planner_does_not_change_the_others(tmp_path: Path) -> None:
 def test_a_cell_that_was_run_again_counts_once(tmp_path: Path) -> None:
     rows = Evaluation()
     for _ in range(2):
-        rows.add(avs=[{'worst_ttc': 2.0}], seed=1)
+        rows.add(avs=[{'worst_ttc': 1.0}, {'worst_ttc': 3.0}], seed=1)
     rows.add('timeout', 'too long', seed=2)
-    rows.add(avs=[{'worst_ttc': 4.0}], seed=2)
+    rows.add(avs=[{'worst_ttc': 5.0}], seed=2)
     found = summarise(rows.write(tmp_path / 'rows', 4), resamples=100)
     ttc = _of(found, 'worst_ttc', 'idm')
-    assert (found.cells, found.failed, ttc.n, ttc.value) == (2, 0, 2, 3.0)
+    assert (found.cells, found.failed, ttc.n, ttc.value) == (2, 0, 3, 3.0)
     assert not found.failures
 
 
