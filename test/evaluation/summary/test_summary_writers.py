@@ -91,8 +91,8 @@ def test_text_is_for_terminals(summary: Summary) -> None:
     text = summary_text(summary)
     assert all(line.isprintable() for line in text.splitlines())
     rows = {line[2:27].strip(): line for line in text.splitlines()}
-    assert re.search(r'least TTC \[s\] +3\.25 \(3.\d+ to 3.\d+, n 6\) +2\.00 \(2\.00 to 2\.00, n 6\)',
-                     text)
+    assert re.search(r'least TTC \[s\] +3\.25 \(3.\d+ to 3.\d+, n 6\) '
+                     r'+2\.00 \(2\.00 to 2\.00, n 6\)', text)
     assert 'cells that failed [%]' in rows and '14.3 (0 to 42.9, n 7)' in text
     assert '+1.25 (+1.' in text and 'n 6) better' in text
     assert 'cluster bootstrap' in text and '200 resamples' in text
