@@ -39,7 +39,7 @@ _ONE_THREAD = {name: '1' for name in (
     'ARROW_DEFAULT_MEMORY_POOL_THREADS')}
 # Of what a cell printed, so much is told when it died.
 _TOLD_BYTES = 2000
-_STARTS_S = 120.0
+_STARTS_S, _ENDS_S = 120.0, 5.0
 
 
 class CellProcess:
@@ -78,11 +78,11 @@ class CellProcess:
         try:
             _write(process.stdin, cell.encode())
             answer = _read(process.stdout, timeout_s)
-        except (OSError, EOFError):
-            rows = self._dead(process)
         except TimeoutError:
             self.close()
             rows = _failed('timeout', f'not done after {timeout_s:g} s of wall time')
+        except (OSError, EOFError):
+            rows = self._dead(process)
         else:
             rows = json.loads(answer)
             if rows['cell']['status'] == 'memory':
@@ -117,7 +117,12 @@ class CellProcess:
         return self._process
 
     def _dead(self, process: 'subprocess.Popen[bytes]') -> dict[str, Any]:
-        code = process.wait()
+        try:
+            code = process.wait(_ENDS_S)
+        except subprocess.TimeoutExpired:
+            # It has closed its pipes, and goes on without them.
+            process.kill()
+            code = process.wait()
         said = ''
         if self._errors is not None:
             with suppress(OSError):
