@@ -25,6 +25,7 @@ from crgame_ros.evaluation.evaluation_plan import EvaluationPlan, OWN
 from crgame_ros.evaluation.scene import (
     files_of,
     GAME_SUFFIXES,
+    runs_of,
     SCENARIO_SUFFIXES,
     Scene,
     scene_of_game,
@@ -128,8 +129,7 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
             plan.games, plan.base, GAME_SUFFIXES, 'game file')),
         *((scene_of_scenario, path) for path in files_of(
             plan.scenarios, plan.base, SCENARIO_SUFFIXES, 'CommonRoad file')),
-        *((scene_of_run, path) for name in plan.humans
-          for path in files_of((name,), plan.base, (), 'run'))]
+        *((scene_of_run, path) for path in runs_of(plan.humans, plan.base))]
     scenes: list[Scene] = []
     for number, (make, path) in enumerate(places):
         scene = make(path, store)

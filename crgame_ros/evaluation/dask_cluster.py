@@ -25,7 +25,7 @@ from crgame_ros.errors import CrgameError, InputError
 INSTALL = "pip install 'crgame_ros[evaluate]'"
 # A cell whose worker was killed this often has something to do with it.
 ALLOWED_FAILURES = 5
-_CONNECT_S = 15.0
+_CONNECT_S = 8.0
 
 
 def require_dask() -> None:
@@ -55,8 +55,9 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     import dask
     from distributed import Client, LocalCluster
     # Of workers that end while others work, each line of log would be one of many.
-    for name in ('distributed', 'tornado.application', 'asyncio'):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    for name in (*logging.root.manager.loggerDict, 'tornado.application', 'asyncio'):
+        if name.startswith(('distributed', 'tornado', 'asyncio')):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         try:
             client = Client(scheduler, timeout=_CONNECT_S, set_as_default=False)

@@ -202,3 +202,20 @@ def files_of(names: tuple[str, ...], base: Path, suffixes: tuple[str, ...],
         else:
             raise InputError('there is no such file or folder', str(path), 'check the path')
     return list(dict.fromkeys(found))
+
+
+def runs_of(names: tuple[str, ...], base: Path) -> list[Path]:
+    """
+    Find the recorded runs that a plan names.
+
+    :param names: of runs' folders or recordings, or of folders of runs.
+    :raises InputError: if there is none.
+    """
+    found: list[Path] = []
+    for name in names:
+        path = base / Path(name).expanduser()
+        inside = sorted(item.parent for item in path.glob('*/bag'))
+        if not path.exists():
+            raise InputError('there is no such file or folder', str(path), 'check the path')
+        found += inside if inside and not (path / 'bag').exists() else [path]
+    return list(dict.fromkeys(found))

@@ -119,15 +119,21 @@ def environment(begun: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope='module')
-def expected(tmp_path_factory: pytest.TempPathFactory) -> list[list[dict[str, Any]]]:
-    """Give the tables that two workers compute when nobody disturbs them."""
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Evaluation:
+    """Give the evaluation that two workers compute when nobody disturbs them."""
     evaluation = Evaluation(tmp_path_factory.mktemp('expected'))
     told = evaluation.run('--workers', '2')
     assert f'{CELLS} of {CELLS} cells' in told
     assert evaluation.begun == Counter({str(seed): 1 for seed in range(CELLS)})
     assert f'all {CELLS} cells were finished before' in evaluation.run()
     assert evaluation.begun.total() == CELLS
-    return evaluation.tables()
+    return evaluation
+
+
+@pytest.fixture(scope='module')
+def expected(undisturbed: Evaluation) -> list[list[dict[str, Any]]]:
+    """Give its tables."""
+    return undisturbed.tables()
 
 
 def test_tables_have_a_row_for_each_cell(expected: list[list[dict[str, Any]]]) -> None:
@@ -217,15 +223,13 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path) -> None:
     assert 'Traceback' not in told
 
 
-def test_a_cell_is_run_again_and_reported(tmp_path: Path,
-                                          expected: list[list[dict[str, Any]]]) -> None:
-    evaluation = Evaluation(tmp_path)
-    evaluation.run('--workers', '1')
-    shutil.move(evaluation.out, tmp_path / 'elsewhere')
-    cell = expected[0][3]
+def test_a_cell_is_run_again_and_reported(tmp_path: Path, undisturbed: Evaluation) -> None:
+    """From the files of the evaluation alone, wherever it lies now."""
+    shutil.copytree(undisturbed.out, tmp_path / 'elsewhere')
+    cell = undisturbed.tables()[0][3]
     done = subprocess.run(
         [sys.executable, '-m', 'crgame_ros.cli', 'evaluate', tmp_path / 'elsewhere', '--cell',
-         cell['cell'][:10]], cwd=ROOT, env=environment(evaluation.begun_file),
+         cell['cell'][:10]], cwd=ROOT, env=environment(undisturbed.begun_file),
         capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     report = Path(done.stdout.strip())
