@@ -12,4 +12,4 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Many runs: planners in scenarios, with humans and seeds, each a cell."""
+"""Runs by the thousand: planner, scenario, human and seed crossed, on Dask."""

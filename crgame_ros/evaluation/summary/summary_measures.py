@@ -26,7 +26,7 @@ from crgame_ros.errors import InputError, short
 import numpy as np
 from numpy.typing import NDArray
 
-Test = Literal['<', '<=', '>', 'known', 'true']
+Test = Literal['<', '>', 'known', 'true']
 _NUMERIC = {column.name: column for column in VEHICLES.columns
             if column.type in (NUMBER, INTEGER, FLAG)}
 
@@ -43,6 +43,7 @@ class SummaryMeasure(NamedTuple):
     :param limit: of the test.
     :param empty: what an empty value counts as; NaN leaves its row out.
     :param where: another column that has to be known, or the row is left out; empty for none.
+    :param what: its definition in a sentence; empty where that of the column says it.
     """
 
     name: str
@@ -53,6 +54,7 @@ class SummaryMeasure(NamedTuple):
     limit: float = 0.0
     empty: float = math.nan
     where: str = ''
+    what: str = ''
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -74,8 +76,8 @@ class SummaryMeasure(NamedTuple):
     @property
     def definition(self) -> str:
         """Say in a sentence what it is."""
-        if not self.column:
-            return 'share of all finished cells that did not end well'
+        if self.what:
+            return self.what
         column = _NUMERIC.get(self.column)
         what = self.column if column is None else column.definition
         if not self.test:
@@ -98,17 +100,19 @@ class SummaryMeasure(NamedTuple):
             # The mean of something infinite says nothing.
             return np.where(np.isfinite(numbers), numbers, self.empty)
         with np.errstate(invalid='ignore'):
-            passed = {'<': numbers < self.limit, '<=': numbers <= self.limit,
-                      '>': numbers > self.limit, 'known': ~missing,
+            passed = {'<': numbers < self.limit, '>': numbers > self.limit, 'known': ~missing,
                       'true': numbers > 0.0}[self.test]
         return np.where(missing & (self.test != 'known'), self.empty, passed.astype(float))
 
 
-# Nobody was near where nothing is known of a gap: no collision, nothing critical.
+# Nobody was near where nothing is known of a gap: nothing critical.
 MEASURES = {measure.name: measure for measure in (
-    SummaryMeasure('failed', 'cells that failed', '', -1),
-    SummaryMeasure('collision', 'AVs with a collision', 'worst_min_distance', -1, '<=', 0.0, 0.0),
-    SummaryMeasure('off_road', 'AVs off the road', 'score_drivable_area', -1, '<', 1.0),
+    SummaryMeasure('failed', 'cells that failed', '', -1,
+                   what='share of all finished cells that did not end well'),
+    SummaryMeasure('collision', 'AVs with a collision', 'collided', -1, 'true',
+                   what='share of AVs that touched anything'),
+    SummaryMeasure('off_road', 'AVs off the road', 'left_road', -1, 'true',
+                   what='share of AVs of which a part of the footprint was off the road'),
     SummaryMeasure('critical_ttc', f'AVs with a TTC below {USUAL.ttc_s:g} s', 'worst_ttc', -1,
                    '<', USUAL.ttc_s, 0.0),
     SummaryMeasure('critical_drac', f'AVs with a DRAC above {USUAL.drac:g} m/s²', 'worst_drac',
@@ -121,6 +125,7 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('nuplan', 'nuPlan score', 'score_nuplan', 1),
     SummaryMeasure('no_collision_at_fault', 'nuPlan: no collision at fault',
                    'score_no_collision_at_fault', 1),
+    SummaryMeasure('drivable_area', 'nuPlan: drivable area', 'score_drivable_area', 1),
     SummaryMeasure('driving_direction', 'nuPlan: driving direction', 'score_driving_direction', 1),
     SummaryMeasure('progress', 'nuPlan: progress', 'score_progress', 1),
     SummaryMeasure('time_to_collision', 'nuPlan: time to collision', 'score_time_to_collision', 1),
@@ -136,6 +141,8 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('distance', 'way', 'distance', 0),
     SummaryMeasure('mean_speed', 'mean speed', 'mean_speed', 0),
     SummaryMeasure('min_acceleration', 'hardest braking', 'min_acceleration', 1),
+    SummaryMeasure('accepted', 'answers accepted', 'accepted_ratio', 1,
+                   what="share of the planner's answers that were accepted and no fallback"),
     SummaryMeasure('fallbacks', 'plans that braked instead', 'fallbacks', -1),
     SummaryMeasure('plans_refused', 'plans refused', 'plans_refused', -1),
     SummaryMeasure('timed_out', 'requests without an answer', 'timed_out', -1),

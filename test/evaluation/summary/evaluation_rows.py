@@ -92,7 +92,7 @@ def many(cells: int, scenarios: int, planners: Sequence[str] = ('idm', 'mine')) 
             seed=pair // scenarios, human=('', 'timid')[pair % 2],
             avs=() if failed else [
                 {'worst_ttc': None if random.random() < 0.1 else ttc, 'distance': 100.0 * ttc,
-                 'worst_min_distance': float(random.random() < 0.9), 'fallbacks': number % 3}
+                 'collided': random.random() < 0.1, 'fallbacks': number % 3}
                 for _ in range(1 + number % 2)],
             hv=None if failed else {'worst_ttc': 0.01, 'distance': 1e6})
     return found

@@ -41,8 +41,8 @@ def two(tmp_path: Path) -> Summary:
     found = Evaluation()
     for number in range(8):
         factors = {'scenario': f'ZAM_S-{number % 4}_1_T-1', 'seed': number // 4}
-        found.add(planner='idm', avs=[{'worst_ttc': 2.0, 'worst_min_distance': 1.0}],
-                  hv={'worst_ttc': 0.1, 'worst_min_distance': 0.0},
+        found.add(planner='idm', avs=[{'worst_ttc': 2.0, 'collided': False}],
+                  hv={'worst_ttc': 0.1, 'collided': True},
                   status='died' if number == 7 else 'ok', reason='killed' if number == 7 else '',
                   **factors)
         if number == 6:
@@ -51,10 +51,10 @@ def two(tmp_path: Path) -> Summary:
         found.add(planner='mine', status=ended, reason='no path' if number == 0 else '',
                   traceback='Traceback: no path' if number == 0 else '',
                   avs=[{'worst_ttc': None if number == 2 else 2.0 + number,
-                        'worst_min_distance': 0.0 if number == 3 else 1.0},
-                       {'worst_ttc': 4.0 + number, 'worst_min_distance': None}], **factors)
+                        'collided': number == 3},
+                       {'worst_ttc': 4.0 + number, 'collided': False}], **factors)
     found.add(planner='mine', scenario='ZAM_Other-1_1_T-1',
-              avs=[{'worst_ttc': 1.5, 'worst_min_distance': 0.0}])
+              avs=[{'worst_ttc': 1.5, 'collided': True}])
     return summarise(found.write(tmp_path / 'two', 3, 1), resamples=200)
 
 
@@ -68,7 +68,7 @@ def test_means_are_those_of_avs_in_cells_that_ended_well(two: Summary) -> None:
     firsts, seconds = [5.0, 6.0, 7.0, 9.0], [6.0, 7.0, 8.0, 9.0, 11.0]
     mine = _of(two, 'worst_ttc', 'mine')
     assert mine.n == 10 and mine.value == pytest.approx(np.mean([*firsts, *seconds, 1.5]))
-    # Collisions: cell 3 and the other one, of 11 AVs; an unknown distance is none.
+    # Collisions: cell 3 and the other one, of 11 AVs.
     assert _of(two, 'collision', 'mine').value == pytest.approx(2.0 / 11.0)
     assert _of(two, 'critical_ttc', 'mine').value == pytest.approx(1.0 / 11.0)
     assert _of(two, 'critical_ttc', 'idm').value == 1.0
@@ -197,13 +197,13 @@ def test_games_stand_for_scenarios_that_are_not_named(tmp_path: Path) -> None:
 
 
 def test_parts_of_another_version_are_taken_for_what_they_have(tmp_path: Path) -> None:
-    """A column that a part lacks is unknown there: neither zero, nor no collision."""
+    """A column that a part lacks is unknown there: neither zero nor no collision."""
     rows = Evaluation()
     for seed in range(4):
-        rows.add(avs=[{'distance': 100.0, 'worst_min_distance': 0.0}], seed=seed)
+        rows.add(avs=[{'distance': 100.0, 'collided': True}], seed=seed)
     folder = rows.write(tmp_path / 'rows', 2)
     path = folder / 'vehicles' / 'part-000001.parquet'
-    part = pq.read_table(path).drop_columns(['worst_min_distance', 'game'])
+    part = pq.read_table(path).drop_columns(['collided', 'game'])
     part = part.append_column('from the future', pa.array([[1], [2]]))
     pq.write_table(part.set_column(part.schema.get_field_index('distance'), 'distance',
                                    pa.array([40, 60], pa.int32())), path)

@@ -79,7 +79,7 @@ def summary(tmp_path: Path) -> Summary:
     for seed in range(6):
         for planner, ttc in (('idm', 2.0), (HOSTILE, 3.0 + 0.1 * seed)):
             keys.append(rows.add(planner=planner, seed=seed, scenario=f'ZAM_S-{seed}_1_T-1', avs=[
-                {'worst_ttc': ttc, 'worst_min_distance': float(seed != 4)}]))
+                {'worst_ttc': ttc, 'collided': seed == 4}]))
     rows.add('error', f'no path {HOSTILE}', f'Traceback {HOSTILE}', seed=9)
     folder = rows.write(tmp_path / 'an evaluation')
     (folder / 'reports').mkdir()
