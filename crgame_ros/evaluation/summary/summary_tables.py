@@ -30,8 +30,9 @@ from crgame_ros.evaluation.summary.summary import (
 from crgame_ros.evaluation.summary.summary_measures import SummaryMeasure
 
 NOTHING = '-'
+_ALWAYS_TOLD = ('scenario', 'planner', 'seed')
 # As tried with made-up evaluations (docs/evaluation.md).
-_MANY_SCENARIOS = 20
+_MANY_UNITS = 20
 _SHARE_OF_NONE = ('an interval from 0 to 0 is that of the resamples: what never happened in n may '
                   'still happen as often as 3/n')
 _BY_CHANCE = ('better and worse: the whole interval is on that side of zero; where nothing '
@@ -170,13 +171,20 @@ def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterat
             yield (f'{whose}drawn are scenarios, each with all its {what}, for {what} of one '
                    'scenario are alike (cluster bootstrap): the intervals speak of scenarios '
                    'like these')
-            if min(group.scenarios for group in groups
-                   if group.resampled == kind) < _MANY_SCENARIOS:
-                yield (f'{whose}with fewer than {_MANY_SCENARIOS} scenarios they are too narrow: '
-                       'those of ten hold the truth in 90 %, those of five in 84 %')
         else:
             yield (f'{whose}drawn are {what}, because there are fewer than {FEWEST_SCENARIOS} '
                    'scenarios: the intervals speak of these scenarios alone')
+        if min(_units(group) for group in groups if group.resampled == kind) < _MANY_UNITS:
+            drawn = what if kind == 'cells' else kind
+            yield (f'{whose}of fewer than {_MANY_UNITS} {drawn} they are too narrow: of ten they '
+                   'hold the truth in 90 %, of five in 84 %')
+
+
+def _units(group: GroupMeans | PairedDifferences) -> int:
+    """Count what is drawn from."""
+    if group.resampled == 'scenarios':
+        return group.scenarios
+    return group.cells if isinstance(group, GroupMeans) else group.pairs
 
 
 def _estimate(found: Estimate, measure: SummaryMeasure, signed: bool = False) -> SummaryCell:
@@ -211,9 +219,11 @@ def _differences(summary: Summary) -> SummaryTable:
 
 
 def _worst(summary: Summary) -> SummaryTable:
-    # Factors that none of the cells has are left out.
-    told = [column for column, name in enumerate(FACTORS)
-            if any(cell.factors[column] for cell in summary.worst)]
+    # What all cells have alike is told once.
+    told = [column for column, name in enumerate(FACTORS) if name in _ALWAYS_TOLD
+            or len({cell.factors[column] for cell in summary.worst}) > 1]
+    alike = [f'{name} {label}' for column, (name, label) in enumerate(zip(
+        FACTORS, summary.worst[0].factors, strict=True)) if label and column not in told]
     head = ('cell', *(FACTORS[column] for column in told), 'vehicle',
             *map(_worst_label, summary.worst_by))
     rows = tuple((SummaryCell(cell.key), *(SummaryCell(cell.factors[column] or NOTHING)
@@ -222,8 +232,10 @@ def _worst(summary: Summary) -> SummaryTable:
         for value, measure in zip(cell.values, summary.worst_by, strict=True)))
         for cell in summary.worst)
     by = ', then '.join(measure.label for measure in summary.worst_by)
+    notes = (f'by the worst AV of each: {by}',
+             *((f'all of them with {", ".join(alike)}',) if alike else ()))
     return SummaryTable('worst', f'The {len(rows)} worst cells', 'The worst first', head, rows,
-                        (f'by the worst AV of each: {by}',), keys=0)
+                        notes, keys=0)
 
 
 def _worst_label(measure: SummaryMeasure) -> str:
