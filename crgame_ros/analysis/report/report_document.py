@@ -56,7 +56,7 @@ def plain_document(title: str, body: str, style: str) -> str:
     :param body: HTML.
     :param style: its own rules, beside those of all reports.
     """
-    return _document(title, (page_style() + style,), '', body, ())
+    return _document(title, (f'{page_style()}\n{style}',), '', body, ())
 
 
 def page_style() -> str:
