@@ -20,9 +20,7 @@ from typing import Any, Self
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
-from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.evaluation_plan import EvaluationPlan, OWN
-from crgame_ros.evaluation.scene import (
+from crgame_ros.evaluation.cell_scene import (
     files_of,
     GAME_SUFFIXES,
     runs_of,
@@ -33,6 +31,8 @@ from crgame_ros.evaluation.scene import (
     scene_of_scenario,
     with_contents,
 )
+from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.evaluation_plan import EvaluationPlan, OWN
 from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
 from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
@@ -152,4 +152,4 @@ def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore
                          'name another planner')
     create_planner(name, options)
     return GridPlanner(label, with_contents({'planner': name, 'options': options}, store),
-                    planner_digest(name))
+                       planner_digest(name))

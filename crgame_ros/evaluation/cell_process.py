@@ -34,9 +34,8 @@ from crgame_ros.errors import CrgameError
 
 _LENGTH = struct.Struct('<Q')
 # Results do not depend on how many threads a library takes, and workers share the processors.
-_ONE_THREAD = {name: '1' for name in (
-    'OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS',
-    'ARROW_DEFAULT_MEMORY_POOL_THREADS')}
+_ONE_THREAD = dict.fromkeys((
+    'OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS'), '1')
 # Of what a cell printed, so much is told when it died.
 _TOLD_BYTES = 2000
 _STARTS_S, _ENDS_S = 120.0, 5.0

@@ -27,9 +27,9 @@ from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_rows import outcome_of, planner_counts, vehicle_rows
+from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
 from crgame_ros.evaluation.evaluation_plan import OWN
-from crgame_ros.evaluation.scene import INPUTS
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import parse_game
 from crgame_ros.game.perception_spec import PerceptionSpec

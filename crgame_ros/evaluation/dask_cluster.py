@@ -26,6 +26,8 @@ INSTALL = "pip install 'crgame_ros[evaluate]'"
 # A cell whose worker was killed this often has something to do with it.
 ALLOWED_FAILURES = 5
 _CONNECT_S = 8.0
+# Our own workers load it as they start.
+PRELOAD = 'crgame_ros.evaluation.worker_task'
 
 
 def require_dask() -> None:
@@ -73,11 +75,14 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
         # Cells have processes and a limit of their own.
         'distributed.worker.memory.terminate': False, 'distributed.worker.memory.pause': False,
         'distributed.worker.memory.target': False, 'distributed.worker.memory.spill': False,
+        'distributed.worker.preload': [PRELOAD],
         'distributed.admin.large-graph-warning-threshold': '1 GB'}
     with dask.config.set(settings):
         cluster = LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, host='127.0.0.1',
-            dashboard_address=None if dashboard is None else f'127.0.0.1:{dashboard}',
+            # Without a page, too, the scheduler serves its health: here alone, at any port.
+            dashboard_address=f'127.0.0.1:{dashboard or 0}', worker_dashboard_address=None,
+            scheduler_kwargs={'dashboard': dashboard is not None},
             silence_logs=logging.CRITICAL, memory_limit=0)
         with cluster, Client(cluster, set_as_default=False) as client:
             yield client

@@ -93,8 +93,12 @@ def run_command(values: argparse.Namespace) -> int:
         return _look(values)
     require_dask()
     plan, folder = _plan(values)
-    tally = evaluate(plan, folder, _computing(values), EvaluationProgress(),
-                     Progress(say, 'loading what the plan names'))
+    try:
+        tally = evaluate(plan, folder, _computing(values), EvaluationProgress(),
+                         Progress(say, 'loading what the plan names'))
+    except KeyboardInterrupt:
+        say('\nstopped: what was finished is kept; the same command goes on')
+        raise
     if tally.put_away:
         say(f'note: {tally.put_away} cells that were there are not of this plan, or of other '
             f'code: they are in {folder / "earlier"}')

@@ -61,7 +61,7 @@ class Computing:
 
 
 @dataclass
-class Tally:
+class EvaluationTally:
     """
     How far an evaluation is.
 
@@ -81,10 +81,13 @@ class Tally:
     dashboard: str = ''
 
 
+# Is given how far it is; with a cell and its row when one has ended.
+Told = Callable[[EvaluationTally, Cell | None, dict[str, Any] | None], object]
+
+
 def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = None,
-             told: Callable[[Tally, Cell | None, dict[str, Any] | None], object] = (
-                 lambda _tally, _cell, _row: None),
-             loading: Callable[[float], object] = lambda _: None) -> Tally:
+             told: Told = lambda _tally, _cell, _row: None,
+             loading: Callable[[float], object] = lambda _: None) -> EvaluationTally:
     """
     Compute the cells of a plan that are not finished, into tables.
 
@@ -102,7 +105,7 @@ def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = N
     grid = make_grid(plan, place.store, loading)
     place.begin(plan, grid)
     with ResultParts(folder, computing.part_cells) as parts:
-        tally = Tally(len(grid))
+        tally = EvaluationTally(len(grid))
         tally.put_away = _sort(parts, grid, computing.retry)
         finished = {bytes.fromhex(key) for key in parts.keys()}
         tally.before = len(finished)
@@ -120,8 +123,8 @@ def _sort(parts: ResultParts, grid: CellGrid, retry: bool) -> int:
 
 
 def _compute(grid: CellGrid, finished: set[bytes], parts: ResultParts, store: ContentStore,
-             computing: Computing, tally: Tally,
-             told: Callable[[Tally, Cell | None, dict[str, Any] | None], object]) -> None:
+             computing: Computing, tally: EvaluationTally,
+             told: Told) -> None:
     cells = (cell for cell in grid if bytes.fromhex(cell.key) not in finished)
     with dask_client(computing.scheduler, computing.workers, computing.dashboard) as client:
         check_workers(client)

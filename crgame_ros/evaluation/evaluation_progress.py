@@ -20,7 +20,7 @@ import time
 from typing import Any, TextIO
 
 from crgame_ros.evaluation.cell import Cell
-from crgame_ros.evaluation.evaluation import Tally
+from crgame_ros.evaluation.evaluation import EvaluationTally
 
 BAR = 24
 # So often a line is written where there is no terminal, and the bar where there is one [s].
@@ -45,7 +45,8 @@ class EvaluationProgress:
         self._told_s = 0.0
         self._failures = 0
 
-    def __call__(self, tally: Tally, cell: Cell | None, row: dict[str, Any] | None) -> None:
+    def __call__(self, tally: EvaluationTally, cell: Cell | None,
+                 row: dict[str, Any] | None) -> None:
         """Take in how far it is; with a cell and its row when one has ended."""
         now_s = self._clock()
         if self._begin_s is None:
@@ -79,7 +80,7 @@ class EvaluationProgress:
             print(text, file=self._stream, flush=True)
 
 
-def _line(tally: Tally, passed_s: float, bar: bool) -> str:
+def _line(tally: EvaluationTally, passed_s: float, bar: bool) -> str:
     ended = tally.before + tally.done
     share = ended / max(1, tally.total)
     filled = round(share * BAR)

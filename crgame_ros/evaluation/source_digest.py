@@ -55,4 +55,3 @@ def planner_digest(name: str) -> str:
         return ''
     file = inspect.getsourcefile(planner_class(name))
     return '' if file is None else hashlib.sha256(Path(file).read_bytes()).hexdigest()
-

@@ -17,6 +17,7 @@
 from collections.abc import Mapping
 import json
 from pathlib import Path
+import signal
 import threading
 from typing import Any, NamedTuple
 
@@ -29,6 +30,11 @@ from distributed import get_worker
 
 # Of each thread of the worker its own: a worker of several computes several cells at once.
 _OF_THREAD = threading.local()
+
+
+def dask_setup(_worker: Any) -> None:
+    """Let Ctrl-C be for the command alone, which ends its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 class Limits(NamedTuple):

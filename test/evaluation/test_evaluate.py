@@ -77,7 +77,7 @@ class Evaluation:
             [sys.executable, '-m', 'crgame_ros.cli', 'evaluate', str(self._plan), '--out',
              str(self.out), '--part-cells', '4', *arguments],
             cwd=ROOT, env=environment(self.begun_file), stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE, text=True)
+            stderr=subprocess.PIPE, text=True, start_new_session=True)
 
     def run(self, *arguments: str) -> str:
         """Run the command to its end; give what it told."""
@@ -160,6 +160,20 @@ def test_a_killed_client_takes_its_workers_along_and_goes_on(
     assert evaluation.tables() == expected
     # Only the one that it was killed in was begun again.
     assert CELLS <= evaluation.begun.total() <= CELLS + 1
+
+
+def test_ctrl_c_ends_everybody_in_a_line(tmp_path: Path) -> None:
+    evaluation = Evaluation(tmp_path)
+    process = evaluation.start('--workers', '1')
+    evaluation.wait_for(2, process)
+    others = psutil.Process(process.pid).children(recursive=True)
+    # As a terminal does: to everybody in the foreground.
+    os.killpg(process.pid, signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    _, alive = psutil.wait_procs(others, timeout=60)
+    assert process.returncode == 130 and not alive
+    assert 'the same command goes on' in told and 'Traceback' not in told
+    assert evaluation.finished >= 2
 
 
 def test_killed_workers_are_replaced(tmp_path: Path,
