@@ -204,9 +204,9 @@ def _differences(summary: Summary) -> SummaryTable:
             for name, words in (
                 ('pairs', 'pairs of which both ended well'),
                 ('failed', 'pairs of which it alone failed'),
-                ('baseline_failed', f'pairs of which {summary.baseline} alone failed'),
+                ('baseline_failed', 'pairs of which the baseline alone failed'),
                 ('both_failed', 'pairs of which both failed'),
-                ('unpaired', f'cells that {summary.baseline} has not'))]
+                ('unpaired', 'cells that the baseline has not'))]
     rows += [(SummaryCell(measure_label(measure)), *(
         _estimate(group.estimates[place], measure, signed=True) for group in groups))
         for place, measure in known_measures(summary)]
