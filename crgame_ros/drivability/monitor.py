@@ -240,8 +240,9 @@ def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDri
     """
     known = {verdict.vehicle_id: verdict for verdict in previous}
     return tuple(verdict for verdict in current
-                 if _finding(known.get(verdict.vehicle_id)) != _finding(verdict))
+                 if _says_more(known.get(verdict.vehicle_id), verdict))
 
 
-def _finding(verdict: VehicleDrivability | None) -> tuple[bool, bool, tuple[str, ...]] | None:
-    return (verdict.collision, verdict.off_road, verdict.hit) if verdict else None
+def _says_more(known: VehicleDrivability | None, verdict: VehicleDrivability) -> bool:
+    return known is None or known.collision != verdict.collision \
+        or known.off_road != verdict.off_road or known.hit != verdict.hit

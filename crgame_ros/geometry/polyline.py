@@ -47,6 +47,8 @@ class ReferencePath(Curve):
         self._slopes: Array = np.diff(self._table, axis=0)
         # Scalar code reads lists fastest.
         self._rows: list[list[float]] = self._table.tolist()
+        self._changes: list[list[float]] = self._slopes.tolist()
+        self._end = self.length
 
     @classmethod
     def from_polyline(cls, points: Array, step: float = 0.5,
@@ -86,16 +88,39 @@ class ReferencePath(Curve):
         :param s: (...) arc lengths, clipped to the path; NaN counts as 0 [m]
         :return: (..., 4) x [m], y [m], heading [rad] and curvature [1/m]
         """
+        index, share = self._cells(s)
+        return self._table.take(index, 0) + self._slopes.take(index, 0) * share[..., None]
+
+    def bends_at(self, s: Array) -> Array:
+        """Interpolate the curvature alone, as `pose_at` does [1/m]."""
+        index, share = self._cells(s)
+        return self.curvature.take(index) + self._slopes[:, 3].take(index) * share
+
+    def _cells(self, s: Array) -> tuple[NDArray[np.intp], Array]:
+        """Give the samples before arc lengths, and the share of the way to the next ones."""
         # fmax and fmin prefer a number to NaN.
-        position = np.fmin(np.fmax(s / self.step, 0.0), len(self.heading) - 1.000001)
+        position = np.fmin(np.fmax(s / self.step, 0.0), len(self._rows) - 1.000001)
         index = position.astype(np.intp)
-        share = (position - index)[..., None]
-        return self._table.take(index, 0) + self._slopes.take(index, 0) * share
+        return index, position - index
+
+    def place(self, s: float) -> tuple[float, float, float, float, float]:
+        """Give what `pose_at` does at one arc length [m], and that arc length on the path."""
+        s = min(max(s, 0.0), self._end)
+        position = s / self.step
+        # NaN counts as 0.
+        position = min(position, len(self._rows) - 1.000001) if position >= 0.0 else 0.0
+        index = int(position)
+        share = position - index
+        x, y, heading, curvature = self._rows[index]
+        to_x, to_y, to_heading, to_curvature = self._changes[index]
+        return (s, x + to_x * share, y + to_y * share, heading + to_heading * share,
+                curvature + to_curvature * share)
 
     def rows(self, first: float, last: float, least: int = 1) -> slice:
         """Give the samples between two arc lengths [m], `least` segments or more."""
-        low = int(np.clip(first / self.step, 0, len(self.s) - 1 - least))
-        return slice(low, int(np.clip(last / self.step, low + least, len(self.s) - 1)) + 1)
+        end = len(self._rows) - 1
+        low = int(min(max(first / self.step, 0), end - least))
+        return slice(low, int(min(max(last / self.step, low + least), end)) + 1)
 
     def project(self, points: Array, first: float = -math.inf,
                 last: float = math.inf) -> tuple[Array, Array]:

@@ -202,7 +202,10 @@ def _is_off(tile: _Tile, footprint: Footprint, x: float, y: float, yaw: float) -
     # The centre beyond the road decides alone, so that no margin is too small.
     if not (x_min <= x <= x_max and y_min <= y <= y_max):
         return True
-    return any(tile.boundary.collide(part) for part in footprint.at(x, y, yaw))
+    for part in footprint.at(x, y, yaw):
+        if tile.boundary.collide(part):
+            return True
+    return False
 
 
 def _triangulated_outside(pieces: list[shapely.Polygon]) -> pycrcc.ShapeGroup:

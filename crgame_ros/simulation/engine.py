@@ -17,6 +17,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import hashlib
+from itertools import chain
+from struct import Struct
 
 from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
@@ -39,7 +41,7 @@ from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 from crgame_ros.vehicle.traced_vehicle import TracedVehicle
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +117,7 @@ class Simulation:
             setup, None if self._events is None else self._events.obstacles)
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
+        self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
 
     @property
     def objects(self) -> ObjectStates:
@@ -247,8 +250,9 @@ class Simulation:
 
     def _add_to_hash(self) -> None:
         # Of traffic alone there is nothing but where it is.
-        rows = self.states or self.objects.poses
-        self._hash.update(np.array(rows, dtype=np.float64).tobytes())
+        states = self.states
+        self._hash.update(self._packed(*chain.from_iterable(states)) if states else
+                          np.array(self.objects.poses, dtype=np.float64).tobytes())
 
     def state_hash(self) -> str:
         """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""

@@ -132,6 +132,22 @@ class TickMeasures(NamedTuple):
         return most_critical(self.values, self.others)
 
 
+class _Scene(NamedTuple):
+    """
+    Where everybody (N) is at a tick, driven vehicles first.
+
+    :param poses: (N, 3) of the centres.
+    :param moves: (N, 2) their velocities.
+    :param accelerations: (N, 2)
+    :param outlines: (N, C, 2) corners of the footprints; who has fewer repeats the last.
+    """
+
+    poses: FloatArray
+    moves: FloatArray
+    accelerations: FloatArray
+    outlines: FloatArray
+
+
 @dataclass
 class Worst:
     """The most critical value of a measure: of whom, and when [s]."""
@@ -211,12 +227,10 @@ class Criticality:
         poses = np.concatenate((centers, objects.poses))
         moves = np.concatenate((velocities, objects.velocities[:, :2]))
         accelerations = self._accelerations(time_s, vehicle_states, poses, moves)
-        placed_outlines = placed(self._outlines, poses)
-        self.latest = tuple(
-            self._measure(subject, poses, moves, accelerations, placed_outlines)
-            for subject in range(self.vehicles) if math.isfinite(poses[subject, 0]))
+        scene = _Scene(poses, moves, accelerations, placed(self._outlines, poses))
+        self.latest = self._measure(scene)
         self.new_crossings = tuple(self._crossings.observe(
-            time_s, placed_outlines, poses[:, :2]))
+            time_s, scene.outlines, poses[:, :2]))
         self._sum_up(time_s)
 
     def report(self) -> tuple[VehicleCriticality, ...]:
@@ -252,44 +266,79 @@ class Criticality:
         self._before = (time_s, moves)
         return result
 
-    def _measure(self, subject: int, poses: FloatArray, moves: FloatArray,
-                 accelerations: FloatArray, outlines: FloatArray) -> TickMeasures:
+    def _measure(self, scene: '_Scene') -> tuple[TickMeasures, ...]:
+        """Measure what each vehicle that is there has left to everybody near it."""
+        subjects, near, scenes = [], [], []
+        for subject in range(self.vehicles):
+            if math.isfinite(scene.poses[subject, 0]):
+                subjects.append(subject)
+                scenes.append(self._on_road(subject, scene))
+                near.append(self._near(subject, scenes[-1].poses))
+        if not subjects:
+            return ()
+        approach = self._approach(subjects, near, scenes)
+        found = []
+        for subject, others, place, pairs in zip(subjects, near, scenes, approach, strict=True):
+            values = np.empty((len(others), len(MEASURES)))
+            values[:, :_OF_LEADER], values[:, _OF_LEADER:] = WITHOUT_LEADER, pairs
+            self._follow(subject, others, place, values)
+            found.append(TickMeasures(subject, others, values))
+        return tuple(found)
+
+    def _on_road(self, subject: int, scene: '_Scene') -> '_Scene':
+        """Give the scene where the road of a vehicle is."""
         transform = self._transforms[subject]
-        if not transform.is_identity:
-            # Where the road is.
-            poses = transform.to_scenario(poses)
-            moves, accelerations = (transform.turn_to_scenario(vectors)
-                                    for vectors in (moves, accelerations))
-            outlines = placed(self._outlines, poses)
-        away = np.hypot(*(poses[:, :2] - poses[subject, :2]).T)
+        if transform.is_identity:
+            return scene
+        poses = transform.to_scenario(scene.poses)
+        return _Scene(poses, transform.turn_to_scenario(scene.moves),
+                      transform.turn_to_scenario(scene.accelerations),
+                      placed(self._outlines, poses))
+
+    def _near(self, subject: int, poses: FloatArray) -> NDArray[np.int64]:
+        """List who is near a vehicle."""
+        x, y = (poses[:, :2] - poses[subject, :2]).T
+        away = np.hypot(x, y)
         away[subject] = np.nan
-        others = np.flatnonzero(away - self._radii - self._radii[subject] < NEAR)
-        values = np.empty((len(others), len(MEASURES)))
-        values[:, :_OF_LEADER] = WITHOUT_LEADER
-        self._approach(subject, others, moves, outlines, values)
+        return np.flatnonzero(away - self._radii - self._radii[subject] < NEAR)
+
+    def _approach(self, subjects: list[int], near: list[NDArray[np.int64]],
+                  scenes: list['_Scene']) -> list[FloatArray]:
+        """Give ttc_2d and min_distance of each vehicle to those near it, (P, 2) each."""
+        counts = [len(others) for others in near]
+        rows, others = np.repeat(np.arange(len(subjects)), counts), np.concatenate(near)
+        own = np.repeat(subjects, counts)
+        outlines = np.stack([scene.outlines for scene in scenes])
+        moves = np.stack([scene.moves for scene in scenes])
+        corners = np.maximum(self._corners[own], self._corners[others])
+        result = np.empty((len(others), 2))
+        for count in set(corners.tolist()):
+            pairs = np.flatnonzero(corners == count)
+            row, first, second = rows[pairs], own[pairs], others[pairs]
+            footprints = outlines[row, first, :count], outlines[row, second, :count]
+            contact = time_to_contact(*footprints, moves[row, first], moves[row, second])
+            result[pairs, 0] = contact
+            result[pairs, 1] = distance(*footprints, contact == 0.0)
+        return np.split(result, np.cumsum(counts)[:-1])
+
+    def _follow(self, subject: int, others: NDArray[np.int64], scene: '_Scene',
+                values: FloatArray) -> None:
+        """Fill in the measures of car following, of the one that leads the vehicle."""
+        if not len(others):
+            return
+        poses, outlines = scene.poses, scene.outlines
         path = self._paths.at(subject, *poses[subject].tolist())
         leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
                              poses[others, :2], self._radii[others],
                              values[:, COLUMN['min_distance']] == 0.0)
-        if leader is not None:
-            other = int(others[leader.number])
-            here, there = (np.array((math.cos(yaw), math.sin(yaw)))
-                           for yaw in (leader.own_heading, leader.heading))
-            values[leader.number, :_OF_LEADER] = _of_leader(
-                leader.gap, float(moves[subject] @ here), float(moves[other] @ there),
-                float(accelerations[subject] @ here), float(accelerations[other] @ there))
-        return TickMeasures(subject, others, values)
-
-    def _approach(self, subject: int, others: NDArray[np.int64], moves: FloatArray,
-                  outlines: FloatArray, values: FloatArray) -> None:
-        own = outlines[subject, :self._corners[subject]]
-        corners = self._corners[others]
-        for count in np.unique(corners):
-            rows = np.flatnonzero(corners == count)
-            theirs = outlines[others[rows], :count]
-            contact = time_to_contact(own, theirs, moves[subject], moves[others[rows]])
-            values[rows, COLUMN['ttc_2d']] = contact
-            values[rows, COLUMN['min_distance']] = distance(own, theirs, contact == 0.0)
+        if leader is None:
+            return
+        other, moves, accelerations = int(others[leader.number]), scene.moves, scene.accelerations
+        here, there = (np.array((math.cos(yaw), math.sin(yaw)))
+                       for yaw in (leader.own_heading, leader.heading))
+        values[leader.number, :_OF_LEADER] = _of_leader(
+            leader.gap, float(moves[subject] @ here), float(moves[other] @ there),
+            float(accelerations[subject] @ here), float(accelerations[other] @ there))
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s

@@ -55,20 +55,23 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
     :param own: (C, 2) corners of its footprint [m]
     :param own_center: (2) [m]
     :param others: (N, D, 2) corners of the others [m]
-    :param centers: (N, 2) of the others; NaN where absent [m]
+    :param centers: (N, 2) of the others [m]
     :param radii: (N) of circles around their centres that hold their footprints [m]
     :param touching: (N) whether they touch it; of those beside it these alone lead
     """
-    s, d = path.project(np.concatenate((own_center[None], own)))
+    mine = 1 + len(own)
+    away, guess = path.near(np.concatenate((own_center[None], own, centers)))
+    s, d = path.refined(np.concatenate((own_center[None], own)), guess[:mine])
     low, high, front = d[1:].min() - MARGIN, d[1:].max() + MARGIN, s[1:].max()
-    away, guess = path.near(np.nan_to_num(centers, nan=np.inf, posinf=1e9))
+    away, guess = away[mine:], guess[mine:]
     reach = max(abs(low), abs(high)) + radii + SLACK
     candidates = np.flatnonzero((away < reach) & (guess > s[0] - radii - SLACK))
     if not len(candidates):
         return None
     places = np.concatenate((centers[candidates, None], others[candidates]), axis=1)
+    positions = places.reshape(-1, 2)
     along, aside = (each.reshape(places.shape[:2])
-                    for each in path.project(places.reshape(-1, 2)))
+                    for each in path.refined(positions, path.near(positions)[1]))
     rears, right, left = (along[:, 1:].min(axis=1), aside[:, 1:].min(axis=1),
                           aside[:, 1:].max(axis=1))
     # Who is passed closely is not in the way.
@@ -78,5 +81,6 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
         return None
     rear = np.where(ahead, rears, np.inf)
     nearest = int(np.argmin(rear))
-    headings = path.line.heading_at(np.array([s[0], along[nearest, 0]]))
-    return Ahead(int(candidates[nearest]), float(rear[nearest] - front), *headings.tolist())
+    own_heading, heading = (path.line.place(at)[3]
+                            for at in (float(s[0]), float(along[nearest, 0])))
+    return Ahead(int(candidates[nearest]), float(rear[nearest] - front), own_heading, heading)

@@ -60,13 +60,15 @@ class OwnPath(NamedTuple):
         dx, dy = (positions - self.samples[row]).T
         return np.asarray(np.sqrt(dx ** 2 + dy ** 2)), scale * row.astype(np.float64)
 
-    def project(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def refined(self, positions: FloatArray, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
         Find arc lengths and offsets to the left (N), (N) of positions (N, 2) [m].
 
-        By Newton's method from the nearest sample: in the same coordinates as those of the line.
+        By Newton's method from the nearest samples: in the same coordinates as those of the line.
+
+        :param guess: (N) their arc lengths, as `near` gives them [m]
         """
-        return self.line.refine(positions, self.near(positions)[1], ROUNDS, EXACT)
+        return self.line.refine(positions, guess, ROUNDS, EXACT)
 
 
 class OwnPaths:
@@ -93,8 +95,7 @@ class OwnPaths:
         lanelet = self._roads.lanelet_at(x, y, yaw) if self._roads.lanelet_ids else None
         if lanelet is not None:
             path = self._on_lane(self._goals[vehicle], lanelet)
-            s = path.near(np.array([[x, y]]))[1]
-            heading = float(path.line.heading_at(s)[0])
+            heading = path.line.place(float(path.near(np.array([[x, y]]))[1][0]))[3]
             if abs(wrap_pi(yaw - heading)) <= MAX_ANGLE:
                 return path
         ahead = (x + REACH * math.cos(yaw), y + REACH * math.sin(yaw))
