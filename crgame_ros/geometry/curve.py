@@ -99,16 +99,14 @@ class Curve:
         """
         at, spans, bends = self._spans
         after = bisect_right(at, s)
-        segment = min(max(after - 1, 0), len(spans) - 1)
+        segment = 0 if after == 0 else after - 1 if after < len(at) else after - 2
         x, y, along_x, along_y, heading, slope = spans[segment]
         beyond = s - at[segment]
-        if after == 0:
-            turned = heading
-        elif after == len(at):
-            turned = float(self.heading[-1])
-        else:
-            turned = slope * beyond + heading
-        return s, x + beyond * along_x, y + beyond * along_y, turned, bends[after]
+        if after == len(at):
+            heading = float(self.heading[-1])
+        elif after:
+            heading = slope * beyond + heading
+        return s, x + beyond * along_x, y + beyond * along_y, heading, bends[after]
 
     def heading_at(self, s: FloatArray) -> FloatArray:
         """Give the headings at arc lengths of any shape, not wrapped [rad]."""
@@ -195,17 +193,20 @@ class Curve:
     def _refine_few(self, points: list[list[float]], s: list[float], rounds: int,
                     exact: float) -> tuple[FloatArray, FloatArray]:
         """Do as `refine` does, to the last bit, with numbers."""
-        along, aside, stretch = [0.0] * len(s), [0.0] * len(s), [1.0] * len(s)
+        aside, steps, place = [0.0] * len(s), [0.0] * len(s), self.place
         for left in range(rounds, -1, -1):
+            near = exact > 0.0
             for i, (x, y) in enumerate(points):
-                s[i], here_x, here_y, heading, bend = self.place(s[i])
+                s[i], here_x, here_y, heading, bend = place(s[i])
                 dx, dy, cos, sin = x - here_x, y - here_y, math.cos(heading), math.sin(heading)
-                along[i], aside[i] = dx * cos + dy * sin, dy * cos - dx * sin
-                stretch[i] = max(1.0 - bend * aside[i], 0.3)
-            if exact and all([abs(value) < exact for value in along]):
+                along, d = dx * cos + dy * sin, dy * cos - dx * sin
+                near = near and abs(along) < exact
+                stretch = 1.0 - bend * d if left or exact else 1.0
+                aside[i], steps[i] = d, along / (stretch if not stretch < 0.3 else 0.3)
+            if near:
                 break
-            for i, value in enumerate(along):
-                s[i] += value / (stretch[i] if left or exact else 1.0)
+            for i, step in enumerate(steps):
+                s[i] += step
         return np.array(s), np.array(aside)
 
     def _within(self, s: FloatArray) -> FloatArray:
@@ -221,5 +222,6 @@ def arc_length(points: FloatArray) -> FloatArray:
 
 def nearest(points: FloatArray, samples: FloatArray) -> NDArray[np.intp]:
     """Give the row of the sample (M, 2) that is nearest to each of points (N, 2)."""
-    return np.argmin((points[:, :1] - samples[:, 0]) ** 2
-                     + (points[:, 1:] - samples[:, 1]) ** 2, axis=1)
+    rows: NDArray[np.intp] = ((points[:, :1] - samples[:, 0]) ** 2
+                              + (points[:, 1:] - samples[:, 1]) ** 2).argmin(axis=1)
+    return rows

@@ -60,9 +60,10 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
     :param touching: (N) whether they touch it; of those beside it these alone lead
     """
     mine = 1 + len(own)
-    away, guess = path.near(np.concatenate((own_center[None], own, centers)))
-    s, d = path.refined(np.concatenate((own_center[None], own)), guess[:mine])
-    low, high, front = d[1:].min() - MARGIN, d[1:].max() + MARGIN, s[1:].max()
+    positions = np.concatenate((own_center[None], own, centers))
+    away, guess = path.near(positions)
+    s, d = (each.tolist() for each in path.refined(positions[:mine], guess[:mine]))
+    low, high, front = min(d[1:]) - MARGIN, max(d[1:]) + MARGIN, max(s[1:])
     away, guess = away[mine:], guess[mine:]
     reach = max(abs(low), abs(high)) + radii + SLACK
     candidates = np.flatnonzero((away < reach) & (guess > s[0] - radii - SLACK))
@@ -82,5 +83,5 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
     rear = np.where(ahead, rears, np.inf)
     nearest = int(np.argmin(rear))
     own_heading, heading = (path.line.place(at)[3]
-                            for at in (float(s[0]), float(along[nearest, 0])))
+                            for at in (s[0], float(along[nearest, 0])))
     return Ahead(int(candidates[nearest]), float(rear[nearest] - front), own_heading, heading)
