@@ -34,7 +34,7 @@ from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
 from crgame_ros.occupancy.occupancy import OccupancyMap
 from crgame_ros.roads.road_boundary import RoadBoundary
-from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
+from crgame_ros.vehicle.state import STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
 
@@ -184,7 +184,7 @@ class DrivabilityMonitor:
                              f'give one row of {STATE_WIDTH} columns each')
         centers = []
         for row, offset in zip(vehicle_states.tolist(), self._rear_to_center, strict=True):
-            x, y, yaw = row[StateColumn.X], row[StateColumn.Y], row[StateColumn.YAW]
+            x, y, yaw = row[:3]
             centers.append((*ahead(x, y, yaw, offset), yaw) if math.isfinite(x + y + yaw)
                            else (math.nan,) * 3)
         return centers

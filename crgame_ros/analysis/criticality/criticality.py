@@ -31,7 +31,11 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     time_to_collision_accelerating,
 )
 from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
-from crgame_ros.analysis.criticality.footprint_approach import distance, time_to_contact
+from crgame_ros.analysis.criticality.footprint_approach import (
+    approach,
+    distance,
+    time_to_contact,
+)
 from crgame_ros.analysis.criticality.leader import find_leader
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
@@ -52,6 +56,8 @@ FloatArray = NDArray[np.float64]
 NEAR = 100.0
 # A circle's footprint is a polygon around it of so many corners.
 CIRCLE_CORNERS = 32
+# Pairs that have no more corners than this together are measured one by one.
+FEW_CORNERS = 16
 
 
 class Measure(NamedTuple):
@@ -306,6 +312,9 @@ class Criticality:
                   scenes: list['_Scene']) -> list[FloatArray]:
         """Give ttc_2d and min_distance of each vehicle to those near it, (P, 2) each."""
         counts = [len(others) for others in near]
+        if sum(counts) * self._outlines.shape[1] <= FEW_CORNERS:
+            return [self._approach_few(subject, others.tolist(), scene)
+                    for subject, others, scene in zip(subjects, near, scenes, strict=True)]
         rows, others = np.repeat(np.arange(len(subjects)), counts), np.concatenate(near)
         own = np.repeat(subjects, counts)
         outlines = np.stack([scene.outlines for scene in scenes])
@@ -320,6 +329,14 @@ class Criticality:
             result[pairs, 0] = contact
             result[pairs, 1] = distance(*footprints, contact == 0.0)
         return np.split(result, np.cumsum(counts)[:-1])
+
+    def _approach_few(self, subject: int, others: list[int], scene: '_Scene') -> FloatArray:
+        """Give ttc_2d and min_distance of a vehicle to others (P, 2)."""
+        own = scene.outlines[subject, :self._corners[subject]].tolist()
+        return np.array([approach(
+            own, scene.outlines[other, :self._corners[other]].tolist(),
+            (scene.moves[other] - scene.moves[subject]).tolist()) for other in others]
+        ).reshape(-1, 2)
 
     def _follow(self, subject: int, others: NDArray[np.int64], scene: '_Scene',
                 values: FloatArray) -> None:
