@@ -15,6 +15,7 @@
 """Whether a run in a scenario can be written, looked at before its first step."""
 
 from collections.abc import Sequence
+import pickle
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
@@ -41,14 +42,14 @@ def refuse_unwritable(loaded: LoadedScenario, objects: Sequence[ObjectDescriptio
     :raises InputError: if the run could not be exported.
     """
     shapes = tuple(dict.fromkeys(item.shape for item in objects))
-    decides = (loaded.sha256, shapes, tuple(problems))
+    known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    decides = (loaded.sha256, shapes, pickle.dumps([known[number] for number in problems]))
     if decides in _writable:
         return
     roads = write_roads(loaded, 0, [])
     frame = framed(roads.elements)
     ids = IdPool(used_ids([frame]), [])
     text = [static_obstacle(ids.fresh(), 'unknown', shape, _ORIGIN[:3]) for shape in shapes]
-    known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
     written = [planning_problem(ids.fresh(), _ORIGIN, goals_of(
         known[number], str(number), 0, 1, roads.lanelets, [])) for number in problems]
     last = frame[-1]

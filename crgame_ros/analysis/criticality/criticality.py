@@ -31,16 +31,11 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     time_to_collision_accelerating,
 )
 from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
-from crgame_ros.analysis.criticality.footprint_approach import (
-    approach,
-    distance,
-    time_to_contact,
-)
 from crgame_ros.analysis.criticality.leader import find_leader
+from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, Scene
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
@@ -48,16 +43,10 @@ from crgame_ros.simulation.observer import ObservedRun
 from crgame_ros.vehicle.state import pose_rates, StateColumn
 import numpy as np
 from numpy.typing import NDArray
-import shapely
 
 FloatArray = NDArray[np.float64]
 
 # Who is farther away is not near [m].
-NEAR = 100.0
-# A circle's footprint is a polygon around it of so many corners.
-CIRCLE_CORNERS = 32
-# Pairs that have no more corners than this together are measured one by one.
-FEW_CORNERS = 16
 
 
 class Measure(NamedTuple):
@@ -138,22 +127,6 @@ class TickMeasures(NamedTuple):
         return most_critical(self.values, self.others)
 
 
-class _Scene(NamedTuple):
-    """
-    Where everybody (N) is at a tick, driven vehicles first.
-
-    :param poses: (N, 3) of the centres.
-    :param moves: (N, 2) their velocities.
-    :param accelerations: (N, 2)
-    :param outlines: (N, C, 2) corners of the footprints; who has fewer repeats the last.
-    """
-
-    poses: FloatArray
-    moves: FloatArray
-    accelerations: FloatArray
-    outlines: FloatArray
-
-
 @dataclass
 class Worst:
     """The most critical value of a measure: of whom, and when [s]."""
@@ -202,19 +175,12 @@ class Criticality:
         self._scheduler = run.scheduler
         self._transforms = run.road_transforms
         self._rear_to_center = np.array([item.rear_to_center for item in run.vehicles])
-        outlines = [_convex(outline(item.shape, CIRCLE_CORNERS)) for item in everybody]
-        self._radii = np.array([np.hypot(*corners.T).max() for corners in outlines])
-        # In one array, shorter ones filled up; and who has as many corners, to compute no more.
-        most = max(map(len, outlines), default=1)
-        self._outlines = np.array([
-            np.concatenate((corners, np.repeat(corners[-1:], most - len(corners), axis=0)))
-            for corners in outlines]).reshape(-1, most, 2)
-        self._corners = np.array([len(corners) for corners in outlines], dtype=np.int64)
+        self._footprints = NearbyFootprints(everybody)
         roads = RoadNetwork(run.loaded.scenario.lanelet_network)
         self._paths = OwnPaths(roads, [
             frozenset() if problem is None else goal_lanelets(roads, problem)
             for problem in run.problems or (None,) * self.vehicles])
-        self._crossings = CrossedWays(self.vehicles, self._radii)
+        self._crossings = CrossedWays(self.vehicles, self._footprints.radii)
         self._before: tuple[float, FloatArray] | None = None
         self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, []) for item in run.vehicles]
         self.n = -1
@@ -233,7 +199,7 @@ class Criticality:
         poses = np.concatenate((centers, objects.poses))
         moves = np.concatenate((velocities, objects.velocities[:, :2]))
         accelerations = self._accelerations(time_s, vehicle_states, poses, moves)
-        scene = _Scene(poses, moves, accelerations, placed(self._outlines, poses))
+        scene = self._footprints.scene(poses, moves, accelerations)
         self.latest = self._measure(scene)
         self.new_crossings = tuple(self._crossings.observe(
             time_s, scene.outlines, poses[:, :2]))
@@ -272,73 +238,25 @@ class Criticality:
         self._before = (time_s, moves)
         return result
 
-    def _measure(self, scene: '_Scene') -> tuple[TickMeasures, ...]:
+    def _measure(self, scene: Scene) -> tuple[TickMeasures, ...]:
         """Measure what each vehicle that is there has left to everybody near it."""
-        subjects, near, scenes = [], [], []
-        for subject in range(self.vehicles):
-            if math.isfinite(scene.poses[subject, 0]):
-                subjects.append(subject)
-                scenes.append(self._on_road(subject, scene))
-                near.append(self._near(subject, scenes[-1].poses))
+        footprints = self._footprints
+        subjects = [subject for subject in range(self.vehicles)
+                    if math.isfinite(scene.poses[subject, 0])]
         if not subjects:
             return ()
-        approach = self._approach(subjects, near, scenes)
+        scenes = [footprints.on_road(scene, self._transforms[subject]) for subject in subjects]
+        near = [footprints.near(*place) for place in zip(subjects, scenes, strict=True)]
         found = []
-        for subject, others, place, pairs in zip(subjects, near, scenes, approach, strict=True):
+        for subject, others, place, pairs in zip(
+                subjects, near, scenes, footprints.approach(subjects, near, scenes), strict=True):
             values = np.empty((len(others), len(MEASURES)))
             values[:, :_OF_LEADER], values[:, _OF_LEADER:] = WITHOUT_LEADER, pairs
             self._follow(subject, others, place, values)
             found.append(TickMeasures(subject, others, values))
         return tuple(found)
 
-    def _on_road(self, subject: int, scene: '_Scene') -> '_Scene':
-        """Give the scene where the road of a vehicle is."""
-        transform = self._transforms[subject]
-        if transform.is_identity:
-            return scene
-        poses = transform.to_scenario(scene.poses)
-        return _Scene(poses, transform.turn_to_scenario(scene.moves),
-                      transform.turn_to_scenario(scene.accelerations),
-                      placed(self._outlines, poses))
-
-    def _near(self, subject: int, poses: FloatArray) -> NDArray[np.int64]:
-        """List who is near a vehicle."""
-        x, y = (poses[:, :2] - poses[subject, :2]).T
-        away = np.hypot(x, y)
-        away[subject] = np.nan
-        return np.flatnonzero(away - self._radii - self._radii[subject] < NEAR)
-
-    def _approach(self, subjects: list[int], near: list[NDArray[np.int64]],
-                  scenes: list['_Scene']) -> list[FloatArray]:
-        """Give ttc_2d and min_distance of each vehicle to those near it, (P, 2) each."""
-        counts = [len(others) for others in near]
-        if sum(counts) * self._outlines.shape[1] <= FEW_CORNERS:
-            return [self._approach_few(subject, others.tolist(), scene)
-                    for subject, others, scene in zip(subjects, near, scenes, strict=True)]
-        rows, others = np.repeat(np.arange(len(subjects)), counts), np.concatenate(near)
-        own = np.repeat(subjects, counts)
-        outlines = np.stack([scene.outlines for scene in scenes])
-        moves = np.stack([scene.moves for scene in scenes])
-        corners = np.maximum(self._corners[own], self._corners[others])
-        result = np.empty((len(others), 2))
-        for count in set(corners.tolist()):
-            pairs = np.flatnonzero(corners == count)
-            row, first, second = rows[pairs], own[pairs], others[pairs]
-            footprints = outlines[row, first, :count], outlines[row, second, :count]
-            contact = time_to_contact(*footprints, moves[row, first], moves[row, second])
-            result[pairs, 0] = contact
-            result[pairs, 1] = distance(*footprints, contact == 0.0)
-        return np.split(result, np.cumsum(counts)[:-1])
-
-    def _approach_few(self, subject: int, others: list[int], scene: '_Scene') -> FloatArray:
-        """Give ttc_2d and min_distance of a vehicle to others (P, 2)."""
-        own = scene.outlines[subject, :self._corners[subject]].tolist()
-        return np.array([approach(
-            own, scene.outlines[other, :self._corners[other]].tolist(),
-            (scene.moves[other] - scene.moves[subject]).tolist()) for other in others]
-        ).reshape(-1, 2)
-
-    def _follow(self, subject: int, others: NDArray[np.int64], scene: '_Scene',
+    def _follow(self, subject: int, others: NDArray[np.int64], scene: Scene,
                 values: FloatArray) -> None:
         """Fill in the measures of car following, of the one that leads the vehicle."""
         if not len(others):
@@ -346,7 +264,7 @@ class Criticality:
         poses, outlines = scene.poses, scene.outlines
         path = self._paths.at(subject, *poses[subject].tolist())
         leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
-                             poses[others, :2], self._radii[others],
+                             poses[others, :2], self._footprints.radii[others],
                              values[:, COLUMN['min_distance']] == 0.0)
         if leader is None:
             return
@@ -386,12 +304,6 @@ def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: floa
                                            leader_acceleration),
             deceleration_to_avoid_crash(gap, speed, leader_speed),
             required_acceleration(gap, speed, leader_speed, leader_acceleration))
-
-
-def _convex(corners: FloatArray) -> FloatArray:
-    """Give the corners of the smallest convex footprint around one."""
-    hull = shapely.convex_hull(shapely.multipoints(corners))
-    return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
 # Of who leads nobody.
