@@ -21,8 +21,8 @@ moves, is looked at through the vehicle's (CRG 28).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.drivability.collision import CollisionDetector
@@ -39,8 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleDrivability:
+class VehicleDrivability(NamedTuple):
     """
     The verdict on one driven vehicle.
 
@@ -239,8 +238,8 @@ def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDri
     :param current: verdicts of this step.
     """
     known = {verdict.vehicle_id: verdict for verdict in previous}
-    return tuple(verdict for verdict in current
-                 if _says_more(known.get(verdict.vehicle_id), verdict))
+    return tuple([verdict for verdict in current
+                  if _says_more(known.get(verdict.vehicle_id), verdict)])
 
 
 def _says_more(known: VehicleDrivability | None, verdict: VehicleDrivability) -> bool:

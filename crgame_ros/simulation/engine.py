@@ -15,10 +15,11 @@
 """The simulation engine that both runners drive (CRG algorithms 1 and 2)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import hashlib
 from itertools import chain
 from struct import Struct
+from typing import NamedTuple
 
 from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
@@ -47,8 +48,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclass(frozen=True)
-class StepResult:
+class StepResult(NamedTuple):
     """
     What one step brought about.
 
@@ -115,6 +115,7 @@ class Simulation:
         self._world = World(setup, self._events, feed)
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
+        self._driven = (*self.humans, *self.avs)
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
         self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
@@ -127,7 +128,7 @@ class Simulation:
     @property
     def states(self) -> list[VehicleState]:
         """States of the driven vehicles at n: humans, then AVs; simulation coordinates."""
-        return [*(human.state for human in self.humans), *(av.state for av in self.avs)]
+        return [driven.state for driven in self._driven]
 
     def begin(self) -> StepResult:
         """Give the requests and objects of step 0, before anything has moved."""
