@@ -262,9 +262,9 @@ class Criticality:
         if not len(others):
             return
         poses, outlines = scene.poses, scene.outlines
-        path = self._paths.at(subject, *poses[subject].tolist())
-        leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
-                             poses[others, :2], self._footprints.radii[others],
+        seen = self._paths.at(subject, float(poses[subject, 2]), np.concatenate((
+            poses[subject, None, :2], outlines[subject], poses[others, :2])))
+        leader = find_leader(seen, outlines[others], self._footprints.radii[others],
                              values[:, COLUMN['min_distance']] == 0.0)
         if leader is None:
             return

@@ -16,7 +16,7 @@
 
 from typing import NamedTuple
 
-from crgame_ros.analysis.criticality.own_path import OwnPath
+from crgame_ros.analysis.criticality.own_path import SeenPath
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,26 +45,21 @@ class Ahead(NamedTuple):
     heading: float
 
 
-def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: FloatArray,
-                centers: FloatArray, radii: FloatArray,
+def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
                 touching: NDArray[np.bool_]) -> Ahead | None:
     """
     Find the nearest one ahead whose footprint overlaps the corridor of a vehicle.
 
-    :param path: of the vehicle; the corridor keeps the offset that the vehicle has now.
-    :param own: (C, 2) corners of its footprint [m]
-    :param own_center: (2) [m]
+    :param seen: path of the vehicle, from its centre, its corners and the centres of the others;
+        the corridor keeps the offset that the vehicle has now.
     :param others: (N, D, 2) corners of the others [m]
-    :param centers: (N, 2) of the others [m]
     :param radii: (N) of circles around their centres that hold their footprints [m]
     :param touching: (N) whether they touch it; of those beside it these alone lead
     """
-    mine = 1 + len(own)
-    positions = np.concatenate((own_center[None], own, centers))
-    away, guess = path.near(positions)
-    s, d = (each.tolist() for each in path.refined(positions[:mine], guess[:mine]))
+    path, mine = seen.path, len(seen.positions) - len(others)
+    s, d = (each.tolist() for each in path.refined(seen.positions[:mine], seen.guess[:mine]))
     low, high, front = min(d[1:]) - MARGIN, max(d[1:]) + MARGIN, max(s[1:])
-    away, guess = away[mine:], guess[mine:]
+    centers, away, guess = seen.positions[mine:], seen.away[mine:], seen.guess[mine:]
     reach = max(abs(low), abs(high)) + radii + SLACK
     candidates = np.flatnonzero((away < reach) & (guess > s[0] - radii - SLACK))
     if not len(candidates):
