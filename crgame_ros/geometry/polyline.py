@@ -45,6 +45,7 @@ class ReferencePath(Curve):
         self.curvature = curvature
         self._table: Array = np.column_stack((points, heading, curvature))
         self._slopes: Array = np.diff(self._table, axis=0)
+        self._bend_slopes: Array = np.diff(curvature)
         # Scalar code reads lists fastest.
         self._rows: list[list[float]] = self._table.tolist()
         self._changes: list[list[float]] = self._slopes.tolist()
@@ -96,7 +97,7 @@ class ReferencePath(Curve):
     def bends_at(self, s: Array) -> Array:
         """Interpolate the curvature alone, as `pose_at` does [1/m]."""
         index, share = self._cells(s)
-        return self.curvature.take(index) + self._slopes[:, 3].take(index) * share
+        return self.curvature.take(index) + self._bend_slopes.take(index) * share
 
     def _cells(self, s: Array) -> tuple[NDArray[np.intp], Array]:
         """Give the samples before arc lengths, and the share of the way to the next ones."""
