@@ -19,6 +19,7 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.report.criticality_section import is_critical, marked
+from crgame_ros.analysis.report.planners_section import planners_compared
 from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
 from crgame_ros.analysis.report.report_section import Dash, Plot, PlotLine, Section
 from crgame_ros.analysis.report.report_text import free, NOTHING, number, share, table
@@ -41,7 +42,8 @@ def comparison_section(runs: Sequence[ReportRun]) -> Section:
     rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
     return Section('comparison', 'Comparison', table(
         'The runs side by side; of measures the worst of all driven vehicles', head, rows,
-        'numbers comparison'), tuple(_plots(runs)))
+        'numbers comparison') + planners_compared(runs, [letter(i) for i in range(len(runs))]),
+        tuple(_plots(runs)))
 
 
 def letter(place: int) -> str:

@@ -30,6 +30,7 @@ from crgame_ros.analysis.report.criticality_section import criticality_section
 from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.motion_section import input_section, motion_section
 from crgame_ros.analysis.report.outcome_section import contacts_of_report, outcome_section
+from crgame_ros.analysis.report.planners_section import planners_section
 from crgame_ros.analysis.report.plot_series import columns_for, encoded, script_json
 from crgame_ros.analysis.report.report_run import ReportRun
 from crgame_ros.analysis.report.report_section import Plot, Section
@@ -42,8 +43,8 @@ from crgame_ros.paths import plotly_script
 PAGE = Path(__file__).resolve().parent / 'page'
 # The parts of a run's report, in their order: whoever has more to tell adds one.
 SECTIONS: tuple[Callable[[ReportRun], Section | None], ...] = (
-    story_section, criticality_section, outcome_section, driving_section, input_section,
-    motion_section, plan_section, timing_section, run_section)
+    story_section, criticality_section, outcome_section, driving_section, planners_section,
+    input_section, motion_section, plan_section, timing_section, run_section)
 # Plotly makes an empty `<style>` whose rules it then adds by script.
 _EMPTY = ''
 # Of maps, which no report has, it adds a style as soon as it is loaded, unless somebody has.

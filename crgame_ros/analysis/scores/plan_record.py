@@ -90,13 +90,13 @@ class GoalRecord:
                 'least_distance_m': self.least_distance}
 
 
-def plans_of_report(report: Mapping[str, Any]) -> dict[str, PlanRecord]:
+def plans_of_report(report: Mapping[str, Any] | None) -> dict[str, PlanRecord]:
     """
     Take the plans of each AV out of a timing report.
 
-    :param report: of `recording.timing_report`.
+    :param report: of `recording.timing_report`; None where nobody knows of them.
     """
-    return {
+    return {} if report is None else {
         av: PlanRecord({name: entry[name] for name in _COUNTS}, entry['fallback'],
                        entry['fallback_reasons'] or {}, entry['last_refusal'],
                        {name: entry[name] for name in ('latency_ms', 'plan_time_ms', 'age_ms')},

@@ -46,12 +46,14 @@ def run_name(path: Path) -> str:
 
 
 def tabulated_runs(paths: Sequence[Path], epoch: int | None,
-                   progress: Callable[[str, float], object]) -> Iterator[TabulatedRun]:
+                   progress: Callable[[str, float], object],
+                   scored: bool = True) -> Iterator[TabulatedRun]:
     """
     Read runs one after the other.
 
     :param paths: folders of runs, or recordings.
     :param epoch: which run of each, where a recording holds several; None for the last.
+    :param scored: whether vehicles are scored, which takes most of the time.
     :raises InputError: if one cannot be read, or is given twice.
     """
     ids: dict[str, Path] = {}
@@ -63,7 +65,7 @@ def tabulated_runs(paths: Sequence[Path], epoch: int | None,
         if place in taken:
             raise InputError('this run is given twice', str(path), 'give each run once')
         taken.add(place)
-        run.id = _own(run.id, ids)
+        run.id, run.scored = _own(run.id, ids), scored
         ids[run.id] = path
         yield run
 

@@ -24,6 +24,7 @@ from crgame_ros.analysis.tables.events_table import EVENT_PARTS, EVENTS
 from crgame_ros.analysis.tables.pairs_table import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.plans_table import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs_table import RUN_PARTS, RUNS
+from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.states_table import state_rows, STATES
 from crgame_ros.analysis.tables.table_folder import TableFolder
 from crgame_ros.analysis.tables.table_part import part_rows
@@ -74,6 +75,8 @@ def _add_run(run: TabulatedRun, writers: Mapping[str, TableWriter],
         writers[PLANS.name].add(rows)
     progress(f'measuring how people drove in {run.id}', 0.0)
     write_behaviour(run, writers)
+    if run.scored and run.record.log.vehicles:
+        score_vehicles(run, partial(progress, f'scoring {run.id}'))
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         if (values := part_rows(parts, run))['run']:
             writers[table.name].add(values)

@@ -63,7 +63,8 @@ def _identity(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
         'avs': [len(game.avs)], 'objects': [len(log.objects)],
         'agents': [sum(item.role is Role.TRAFFIC for item in log.objects)],
         'planners': [json.dumps(planners)], 'events': [len(run.record.fired)],
-        'notices': ['\n'.join((run.timing or {}).get('notices', log.notices))]}
+        'notices': ['\n'.join((*(run.timing or {}).get('notices', log.notices),
+                               *run.remarks))]}
 
 
 def _timing(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:

@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The table of driven vehicles: who drove, how far, and the worst moments."""
+"""The table of driven vehicles: who drove, how far and how well, and the worst moments."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,6 +22,7 @@ from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.tables.behaviour_tables import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.pairs_table import FOOTPRINTS, measure_column
+from crgame_ros.analysis.tables.score_columns import VEHICLE_SCORES
 from crgame_ros.analysis.tables.table_part import declare, TablePart
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman
@@ -159,5 +160,5 @@ VEHICLE_PARTS = (
                variant='interpolated linearly', empty=UNRECORDED),
         Column('latency_max_s', NUMBER, 's', 'greatest latency, that of the first plan included',
                empty=UNRECORDED)), _planning),
-    VEHICLE_BEHAVIOUR)
+    VEHICLE_BEHAVIOUR, VEHICLE_SCORES)
 VEHICLES = declare('vehicles', 'a driven vehicle of a run', ('run', 'id'), VEHICLE_PARTS)
