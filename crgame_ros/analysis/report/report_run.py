@@ -26,7 +26,7 @@ from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, MEA
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.analysis.pictures.critical_moments import Moment
 from crgame_ros.analysis.report.story_moments import story_moments
-from crgame_ros.analysis.scores.plan_record import plans_of_report
+from crgame_ros.analysis.scores.plan_record import PlanRecord, plans_of_report
 from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.objects import Role
@@ -126,12 +126,14 @@ def read_report_run(path: Path, epoch: int | None = None,
 def measured_run(name: str, bag: Path | None, record: RunRecord,
                  timing: Mapping[str, Any] | None,
                  progress: Callable[[float], object] = lambda _: None,
-                 notices: tuple[str, ...] = (), *, drives_only: bool = False) -> ReportRun:
+                 notices: tuple[str, ...] = (), *, drives_only: bool = False,
+                 answers: Mapping[str, PlanRecord] | None = None) -> ReportRun:
     """
     Measure a run that has been read.
 
     :param bag: its recording, if there is one.
     :param timing: as `timing_report` gives it.
+    :param answers: what planners answered, by AV; None: what `timing` tells of it.
     :param drives_only: score without CommonRoad's tools, which take longest.
     """
     log = record.log
@@ -146,7 +148,8 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
     found = measure_log(log, progress=lambda part: progress(
         _READ_SHARE + _MEASURE_SHARE * part), on_tick=take)
     measured = _READ_SHARE + _MEASURE_SHARE
-    scores = scores_of(record, plans_of_report(timing), drives_only=drives_only,
+    plans = plans_of_report(timing) if answers is None else answers
+    scores = scores_of(record, plans, drives_only=drives_only,
                        progress=lambda part: progress(measured + (1.0 - measured) * part))
     began_ns = None
     if bag is not None:

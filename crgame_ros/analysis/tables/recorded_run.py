@@ -65,13 +65,17 @@ def tabulated_runs(paths: Sequence[Path], epoch: int | None,
         if place in taken:
             raise InputError('this run is given twice', str(path), 'give each run once')
         taken.add(place)
-        run.id, run.scored = _own(run.id, ids), scored
+        run.id, run.scored = own_id(run.id, ids), scored
         ids[run.id] = path
         yield run
 
 
-def _own(name: str, taken: Iterable[str]) -> str:
-    """Give an id that no other run has: folders in different places may be named alike."""
+def own_id(name: str, taken: Iterable[str]) -> str:
+    """
+    Give a run an id that no other has: folders in different places may be named alike.
+
+    :param taken: ids of the others.
+    """
     found, number = name, 1
     while found in taken:
         number += 1

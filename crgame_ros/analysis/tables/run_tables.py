@@ -28,7 +28,8 @@ from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.states_table import state_rows, STATES
 from crgame_ros.analysis.tables.table_folder import TableFolder
 from crgame_ros.analysis.tables.table_part import part_rows
-from crgame_ros.analysis.tables.table_writer import Format, TableWriter
+from crgame_ros.analysis.tables.table_rows import KeptTable, TableRows
+from crgame_ros.analysis.tables.table_writer import Format
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS, VEHICLES
 from crgame_ros.errors import InputError
@@ -55,18 +56,37 @@ def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
     """
     with TableFolder(out, TABLES, file_format, 'tables') as folder:
         for run in runs:
-            try:
-                _add_run(run, folder.writers, progress)
-            except (OverflowError, pa.ArrowInvalid) as error:
-                # Documents of a recording may hold any number.
-                raise InputError(f'a number in it is out of all bounds ({error})', run.id,
-                                 'the recording is damaged; record again') from error
+            _add_run(run, folder.writers, progress)
         return {name: writer.rows for name, writer in folder.writers.items()}
 
 
-def _add_run(run: TabulatedRun, writers: Mapping[str, TableWriter],
+def tables_of(runs: Iterable[TabulatedRun]) -> dict[str, pa.Table]:
+    """
+    Give the tables of runs, by name; memory is that of all of them.
+
+    :param runs: ids must differ.
+    :raises InputError: if a scenario cannot be used.
+    """
+    kept = {table.name: KeptTable(table) for table in TABLES}
+    for run in runs:
+        _add_run(run, kept, lambda _what, _share: None)
+    return {name: each.table for name, each in kept.items()}
+
+
+def _add_run(run: TabulatedRun, writers: Mapping[str, TableRows],
              progress: Callable[[str, float], object]) -> None:
-    """Add the rows of a run to all tables; vehicles and runs come last, for they sum it up."""
+    """Add the rows of a run to all tables."""
+    try:
+        _add_rows(run, writers, progress)
+    except (OverflowError, pa.ArrowInvalid) as error:
+        # Documents of a recording may hold any number.
+        raise InputError(f'a number in it is out of all bounds ({error})', run.id,
+                         'the recording is damaged; record again') from error
+
+
+def _add_rows(run: TabulatedRun, writers: Mapping[str, TableRows],
+              progress: Callable[[str, float], object]) -> None:
+    """Fill tables one after the other; vehicles and runs come last, for they sum it up."""
     for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):
         writers[STATES.name].add(rows)
     write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name],

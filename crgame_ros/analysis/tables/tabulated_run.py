@@ -22,6 +22,7 @@ from typing import Any
 from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
 from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import VehicleCriticality
+from crgame_ros.analysis.scores.plan_record import PlanRecord
 from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.recording.recorded_plans import RecordedPlan
@@ -49,6 +50,7 @@ class TabulatedRun:
     :param record: how everybody moved, what drivers did, and events.
     :param timing: as `recording.timing_report` gives it; None where nobody measured it.
     :param plans: gives the recorded plans, one by one; None where they were not recorded.
+    :param answers: what planners answered, by AV; None: what `timing` tells of it.
     :param scored: whether its vehicles are scored, which takes most of the time.
     :ivar criticality: by vehicle, once `pairs` has been written.
     :ivar tallies: by AV, once `plans` has been written.
@@ -60,6 +62,7 @@ class TabulatedRun:
     record: RunRecord
     timing: Mapping[str, Any] | None = None
     plans: Callable[[], Iterable[RecordedPlan]] | None = None
+    answers: Mapping[str, PlanRecord] | None = None
     scored: bool = True
     criticality: dict[str, VehicleCriticality] = field(default_factory=dict)
     tallies: dict[str, PlanTally] = field(default_factory=dict)
