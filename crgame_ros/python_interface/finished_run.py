@@ -57,61 +57,61 @@ class Run(ABC):
     @property
     @abstractmethod
     def log(self) -> RunLog:
-        """How everybody moved, at the scenario's time steps."""
+        """Tell how everybody moved, at the scenario's time steps."""
 
     @property
     @abstractmethod
     def record(self) -> RunRecord:
-        """The log, and what drivers did, and events."""
+        """Give the log, and what drivers did, and events."""
 
     @property
     @abstractmethod
     def answers(self) -> 'Mapping[str, PlanRecord]':
-        """What planners answered, by AV, as far as it is known."""
+        """Tell what planners answered, by AV, as far as it is known."""
 
     @property
     @abstractmethod
     def contacts(self) -> list[dict[str, Any]] | None:
-        """First contacts, as `timing.json` has them; None where nobody knows."""
+        """Give the first contacts, as `timing.json` has them; None where nobody knows."""
 
     @property
     @abstractmethod
     def notices(self) -> tuple[str, ...]:
-        """What is to be known of it, one line each."""
+        """Tell what is to be known of it, one line each."""
 
     @property
     def state_hash(self) -> str | None:
-        """SHA-256 over all states of an offline run; None of a recording."""
+        """Give the SHA-256 over all states of an offline run; None of a recording."""
         return None
 
     @property
     def timing(self) -> Mapping[str, Any] | None:
-        """What `timing.json` says; None of an offline run, and of a recording without cycles."""
+        """Tell what `timing.json` says; None of an offline run, or without recorded cycles."""
         return None
 
     @property
     def bag(self) -> Path | None:
-        """Its recording; None of an offline run."""
+        """Name its recording; None of an offline run."""
         return None
 
     @property
     def game(self) -> GameDocument:
-        """The game as it was run."""
+        """Give the game as it was run."""
         return self.log.game
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        """Ids of the driven vehicles: humans, then AVs."""
+        """Give the ids of the driven vehicles: humans, then AVs."""
         return tuple(item.id for item in self.log.vehicles)
 
     @property
     def duration_s(self) -> float:
-        """How long it lasted, on the scenario's time line [s]."""
+        """Tell how long it lasted, on the scenario's time line [s]."""
         return float((len(self.log.ks) - 1) * self.game.scheduler.time_step_s)
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """Times of the scenario steps of the log since the run's start (K) [s]."""
+        """Give the times of the scenario steps of the log since the run's start (K) [s]."""
         scheduler = self.game.scheduler
         return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
 
@@ -143,7 +143,7 @@ class Run(ABC):
 
     @cached_property
     def usual_criticality(self) -> Criticality:
-        """Its criticality by the usual thresholds."""
+        """Measure its criticality by the usual thresholds."""
         return measure_log(self.log)
 
     def criticality(self, thresholds: Thresholds = USUAL) -> dict[str, VehicleCriticality]:

@@ -65,33 +65,33 @@ class OfflineRun(Run):
 
     @cached_property
     def record(self) -> RunRecord:
-        """The log, and what drivers did, and events."""
+        """Give the log, and what drivers did, and events."""
         return run_record_of(self.result)
 
     @property
     def log(self) -> RunLog:
-        """How everybody moved, at the scenario's time steps."""
+        """Tell how everybody moved, at the scenario's time steps."""
         return self.record.log
 
     @property
     def state_hash(self) -> str:
-        """SHA-256 over all states: equal for equal inputs."""
+        """Give the SHA-256 over all states: equal for equal inputs."""
         return self.result.state_hash
 
     @property
     def answers(self) -> 'Mapping[str, PlanRecord]':
-        """What planners answered, by AV."""
+        """Tell what planners answered, by AV."""
         from crgame_ros.analysis.scores.plan_record import plans_of_result
         return plans_of_result(self.result)
 
     @property
     def contacts(self) -> list[dict[str, Any]]:
-        """First contacts, as `timing.json` has them."""
+        """Give the first contacts, as `timing.json` has them."""
         return [item.as_dict() for item in contacts_of(self.result)]
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What is to be known of the game, one line each."""
+        """Tell what is to be known of the game, one line each."""
         return self.result.setup.notices
 
     def summary(self) -> dict[str, Any]:

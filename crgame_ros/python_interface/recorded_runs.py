@@ -54,22 +54,22 @@ class RecordedRun(Run):
 
     @property
     def bag(self) -> Path:
-        """Its recording."""
+        """Name its recording."""
         return self._bag
 
     @property
     def log(self) -> RunLog:
-        """How everybody moved, at the scenario's time steps."""
+        """Tell how everybody moved, at the scenario's time steps."""
         return self._log
 
     @cached_property
     def record(self) -> RunRecord:
-        """The log, and what drivers did, and events."""
+        """Give the log, and what drivers did, and events."""
         return record_of_log(self._bag, self._log)
 
     @cached_property
     def _timed(self) -> tuple[Mapping[str, Any] | None, tuple[str, ...]]:
-        """What `timing.json` says, or why nothing does."""
+        """Tell what `timing.json` says, or why nothing does."""
         try:
             return timing_report(self._bag, self.game.epoch, self._log), ()
         except CrgameError as error:
@@ -77,23 +77,23 @@ class RecordedRun(Run):
 
     @property
     def timing(self) -> Mapping[str, Any] | None:
-        """What `timing.json` says; None of a recording without cycles."""
+        """Tell what `timing.json` says; None of a recording without cycles."""
         return self._timed[0]
 
     @property
     def answers(self) -> 'Mapping[str, PlanRecord]':
-        """What planners answered, by AV, as far as it was recorded."""
+        """Tell what planners answered, by AV, as far as it was recorded."""
         from crgame_ros.analysis.scores.plan_record import plans_of_report
         return plans_of_report(self.timing)
 
     @property
     def contacts(self) -> list[dict[str, Any]] | None:
-        """First contacts, as `timing.json` has them; None where nobody knows."""
+        """Give the first contacts, as `timing.json` has them; None where nobody knows."""
         return None if self.timing is None else self.timing['contacts']
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What of the run is not in the recording, one line each."""
+        """Tell what of the run is not in the recording, one line each."""
         timing, refusal = self._timed
         told = () if timing is None else timing['notices']
         return tuple(dict.fromkeys((*told, *self._log.notices, *refusal)))
