@@ -66,13 +66,24 @@ class Run(ABC):
 
     @property
     @abstractmethod
-    def answers(self) -> 'Mapping[str, PlanRecord]':
-        """Tell what planners answered, by AV, as far as it is known."""
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Give planners, violations and contacts, as `timing.json` has them; None: not known."""
 
     @property
-    @abstractmethod
+    def answers(self) -> 'dict[str, PlanRecord]':
+        """Tell what planners answered, by AV, as far as it is known."""
+        from crgame_ros.analysis.scores.plan_record import plans_of_report
+        return plans_of_report(self.outcome)
+
+    @property
     def contacts(self) -> list[dict[str, Any]] | None:
         """Give the first contacts, as `timing.json` has them; None where nobody knows."""
+        return None if self.outcome is None else self.outcome['contacts']
+
+    @property
+    def violations(self) -> list[dict[str, Any]] | None:
+        """Give what was violated, as `timing.json` has it; None where nobody knows."""
+        return None if self.outcome is None else self.outcome['drivability']['list']
 
     @property
     @abstractmethod
@@ -124,6 +135,10 @@ class Run(ABC):
         if vehicle_id not in self.vehicles:
             raise KeyError(vehicle_id)
         return self.log.vehicle_states[:, self.vehicles.index(vehicle_id)]
+
+    @property
+    def _offline(self) -> Mapping[str, Any] | None:
+        return self.outcome if self.timing is None else None
 
     @abstractmethod
     def setup_against(self, planner: str) -> Setup:
@@ -194,7 +209,7 @@ class Run(ABC):
         """Give it as tables want it."""
         from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
         return TabulatedRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
-                            self.plans_of_table(), self.answers, scores)
+                            self.plans_of_table(), self._offline, scores)
 
     def reported(self, key: str = 'run1') -> 'ReportRun':
         """
@@ -206,7 +221,7 @@ class Run(ABC):
 
         from crgame_ros.analysis.report.report_run import measured_run
         return replace(measured_run(self.name, self.bag, self.record, self.timing,
-                                    notices=self.notices, answers=self.answers), key=key)
+                                    notices=self.notices, offline=self._offline), key=key)
 
     def report(self, path: FileName) -> Path:
         """

@@ -19,7 +19,7 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game
@@ -32,6 +32,7 @@ from crgame_ros.python_interface.games import as_game, FileName
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
 from crgame_ros.python_interface.run_summary import run_summary
 from crgame_ros.recording.export import scenario_path, write_scenario
+from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.recorded_inputs import (
     inputs_of,
     recorded_inputs,
@@ -40,14 +41,10 @@ from crgame_ros.recording.recorded_inputs import (
 )
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import run_record_of, RunRecord
-from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from crgame_ros.analysis.scores.plan_record import PlanRecord
 
 
 class OfflineRun(Run):
@@ -78,16 +75,10 @@ class OfflineRun(Run):
         """Give the SHA-256 over all states: equal for equal inputs."""
         return self.result.state_hash
 
-    @property
-    def answers(self) -> 'Mapping[str, PlanRecord]':
-        """Tell what planners answered, by AV."""
-        from crgame_ros.analysis.scores.plan_record import plans_of_result
-        return plans_of_result(self.result)
-
-    @property
-    def contacts(self) -> list[dict[str, Any]]:
-        """Give the first contacts, as `timing.json` has them."""
-        return [item.as_dict() for item in contacts_of(self.result)]
+    @cached_property
+    def outcome(self) -> Mapping[str, Any]:
+        """Give planners, violations and contacts, as `timing.json` has them."""
+        return offline_outcome(self.result)
 
     @property
     def notices(self) -> tuple[str, ...]:

@@ -17,7 +17,7 @@
 from collections.abc import Mapping
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.launcher.arguments import RunRequest
@@ -34,9 +34,6 @@ from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from crgame_ros.analysis.scores.plan_record import PlanRecord
 
 
 class RecordedRun(Run):
@@ -81,15 +78,9 @@ class RecordedRun(Run):
         return self._timed[0]
 
     @property
-    def answers(self) -> 'Mapping[str, PlanRecord]':
-        """Tell what planners answered, by AV, as far as it was recorded."""
-        from crgame_ros.analysis.scores.plan_record import plans_of_report
-        return plans_of_report(self.timing)
-
-    @property
-    def contacts(self) -> list[dict[str, Any]] | None:
-        """Give the first contacts, as `timing.json` has them; None where nobody knows."""
-        return None if self.timing is None else self.timing['contacts']
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Give planners, violations and contacts; None of a recording without cycles."""
+        return self.timing
 
     @property
     def notices(self) -> tuple[str, ...]:

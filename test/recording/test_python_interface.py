@@ -146,11 +146,24 @@ def test_a_recording_is_the_same_kind_of_object(
     assert crgame_ros.replay(folder, 'idm')['idm'].human_differs_s is None
 
 
-def test_an_offline_run_has_scores_of_its_plans_in_its_table(run: OfflineRun) -> None:
-    """They are known without a recording."""
-    vehicles = run.tables()['vehicles'].to_pydict()
-    assert vehicles['score_accepted_share'] == [None, run.answers['av0'].accepted_share]
+def test_an_offline_run_knows_what_a_recording_tells(tmp_path: Path) -> None:
+    """Plans, contacts and violations, in tables and in its report, by the run's own records."""
+    run = crgame_ros.run(CUT_IN, planner='constant-velocity', duration_s=12.0)
+    tables = {name: table.to_pydict() for name, table in run.tables().items()}
+    counters = run.result.planners['av0'].counters
+    assert tables['vehicles']['score_accepted_share'] == [None, run.answers['av0'].accepted_share]
+    assert tables['vehicles']['requests'] == [None, counters.requests]
+    # The AV runs into the human, who has cut in and brakes.
+    first = next(each.n for each in run.result.violations if not each.is_valid)
+    assert [each['n'] for each in run.contacts or ()] == [first]
+    assert {(each['n'], each['vehicle'], each['what']) for each in run.violations or ()} == {
+        (first, 'hv0', 'collision with av0'), (first, 'av0', 'collision with hv0')}
+    assert (tables['runs']['contacts'], tables['runs']['violations']) == ([1], [2])
     assert run.tables(scores=False)['vehicles']['score_nuplan'].null_count == 2
+    text = run.report(tmp_path / 'x.html').read_text()
+    assert '<td>collision with av0</td>' in text.replace('<bdi>', '').replace('</bdi>', '')
+    assert f'<td>{counters.requests}</td>' in text and 'An offline run keeps no clock' in text
+    assert 'does not tell' not in text
 
 
 def test_objects_and_classes_drive_alike(run: OfflineRun) -> None:

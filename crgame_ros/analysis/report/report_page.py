@@ -134,12 +134,12 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     contacts = contacts_of_report(run)
     if contacts is not None:
         yield 'contacts', str(len(contacts))
-    if run.timing is not None:
-        yield 'violations', str(run.timing['drivability']['violations'])
+    if run.outcome is not None:
+        yield 'violations', str(run.outcome['drivability']['violations'])
     yield 'least TTC [s]', worst_of_all(run, 'ttc')
     yield 'least distance [m]', worst_of_all(run, 'min_distance')
     yield 'greatest DRAC [m/s²]', worst_of_all(run, 'drac')
-    if run.log.game.avs and run.timing is not None:
+    if run.log.game.avs and run.outcome is not None:
         yield 'plans accepted', accepted(run).partition(' (')[0]
     if run.timing is not None:
         yield 'real-time ratio', number(run.timing['real_time_ratio']['final'], 3)

@@ -26,7 +26,7 @@ from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, MEA
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.analysis.pictures.critical_moments import Moment
 from crgame_ros.analysis.report.story_moments import story_moments
-from crgame_ros.analysis.scores.plan_record import PlanRecord, plans_of_report
+from crgame_ros.analysis.scores.plan_record import plans_of_report
 from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.objects import Role
@@ -65,6 +65,7 @@ class ReportRun:
     :param began_ns: log time of its first message, since 1970 [ns]; None of an offline run.
     :param notices: what is wrong with the recording.
     :param scores: how well everybody drove.
+    :param offline: of an offline run what `offline_outcome` gives; None otherwise.
     """
 
     key: str
@@ -77,6 +78,12 @@ class ReportRun:
     began_ns: int | None
     notices: tuple[str, ...]
     scores: RunScores = RunScores()
+    offline: Mapping[str, Any] | None = None
+
+    @property
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Give plans, violations and contacts as `timing.json` has them; None: nobody knows."""
+        return self.timing if self.offline is None else self.offline
 
     @cached_property
     def behaviour(self) -> tuple[DriverBehaviour, ...]:
@@ -127,13 +134,13 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
                  timing: Mapping[str, Any] | None,
                  progress: Callable[[float], object] = lambda _: None,
                  notices: tuple[str, ...] = (), *, drives_only: bool = False,
-                 answers: Mapping[str, PlanRecord] | None = None) -> ReportRun:
+                 offline: Mapping[str, Any] | None = None) -> ReportRun:
     """
     Measure a run that has been read.
 
     :param bag: its recording, if there is one.
     :param timing: as `timing_report` gives it.
-    :param answers: what planners answered, by AV; None: what `timing` tells of it.
+    :param offline: of an offline run what `offline_outcome` gives.
     :param drives_only: score without CommonRoad's tools, which take longest.
     """
     log = record.log
@@ -148,17 +155,17 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
     found = measure_log(log, progress=lambda part: progress(
         _READ_SHARE + _MEASURE_SHARE * part), on_tick=take)
     measured = _READ_SHARE + _MEASURE_SHARE
-    plans = plans_of_report(timing) if answers is None else answers
-    scores = scores_of(record, plans, drives_only=drives_only,
+    outcome = timing if offline is None else offline
+    scores = scores_of(record, plans_of_report(outcome), drives_only=drives_only,
                        progress=lambda part: progress(measured + (1.0 - measured) * part))
     began_ns = None
     if bag is not None:
         with BagReader(bag, parts=True) as reader:
             began_ns = reader.start_ns or None
     told = () if timing is None else timing['notices']
-    moments = story_moments(record, found, () if timing is None else timing['contacts'] or ())
+    moments = story_moments(record, found, () if outcome is None else outcome['contacts'] or ())
     return ReportRun('run1', name, record, found, course, moments, timing, began_ns,
-                     tuple(dict.fromkeys((*told, *log.notices, *notices))), scores)
+                     tuple(dict.fromkeys((*told, *log.notices, *notices))), scores, offline)
 
 
 def _most_critical(values: FloatArray) -> FloatArray:

@@ -68,8 +68,7 @@ def score_vehicles(run: TabulatedRun, progress: Callable[[float], object]) -> No
 
     :param progress: is told how much has been done, 0 to 1.
     """
-    plans = plans_of_report(run.timing) if run.answers is None else run.answers
-    found = scores_of(run.record, plans, progress=progress)
+    found = scores_of(run.record, plans_of_report(run.outcome), progress=progress)
     run.scores = {each.vehicle_id: each for each in found.vehicles}
     if found.refusal:
         run.remarks.append(f'no scores: {found.refusal}')

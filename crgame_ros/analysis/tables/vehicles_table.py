@@ -100,14 +100,14 @@ def _worst_columns() -> list[Column]:
 
 def _planning(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
     ids = [item.id for item in run.record.log.vehicles]
-    timing = (run.timing or {}).get('planners', {})
+    planners = {} if run.outcome is None else run.outcome['planners']
     tallies = [run.tallies.get(name) for name in ids]
     latencies = [None if tally is None or not tally.latencies_s else tally.latencies_s
                  for tally in tallies]
     return {
         **{f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key:
-           [timing.get(name, {}).get(key) for name in ids] for key in COUNTS},
-        'fallbacks': [timing.get(name, {}).get('fallback') for name in ids],
+           [planners.get(name, {}).get(key) for name in ids] for key in COUNTS},
+        'fallbacks': [planners.get(name, {}).get('fallback') for name in ids],
         'plans': [None if tally is None else tally.answers for tally in tallies],
         'plans_passing': [None if tally is None or tally.checked < tally.answers
                           else tally.passing for tally in tallies],
