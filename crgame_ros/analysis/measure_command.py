@@ -63,12 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def measure(values: argparse.Namespace) -> int:
     """Measure a run, and print what was found."""
     from crgame_ros.analysis.behaviour.behaviour_text import behaviour_lines
-    from crgame_ros.analysis.run_measures import check_requests, check_thresholds, measure_run
+    from crgame_ros.analysis.run_measures import check_requests, measure_run
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_record import read_run_record
     thresholds = Thresholds(values.ttc, values.drac, values.pet)
-    check_thresholds(thresholds, '--')
+    thresholds.check('--')
     path = values.run
     say = partial(print, file=sys.stderr, flush=True)
     record = read_run_record(recording_in(path), values.epoch, Progress(say, f'reading {path}'))

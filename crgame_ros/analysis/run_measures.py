@@ -15,7 +15,6 @@
 """What `crgame measure` measures of a run: how critical it was, and how people drove."""
 
 from collections.abc import Callable, Collection
-import math
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
@@ -55,26 +54,13 @@ def measure_run(record: RunRecord, thresholds: Thresholds = USUAL,
     :param requests: names of the events that ask to take over an AV, as orders of its seat do.
     :param critical: is told how much of the criticality has been measured, 0 to 1.
     :param driven: is told the same of how people drove.
-    :raises InputError: as `check_thresholds` and `check_requests`, or if the run's scenario cannot
-        be used.
+    :raises InputError: if a threshold is not positive, as `check_requests`, or if the run's
+        scenario cannot be used.
     """
-    check_thresholds(thresholds)
+    thresholds.check()
     check_requests(record, requests)
     return RunMeasures(measure_log(record.log, thresholds, critical),
                        measure_behaviour(record, requests=requests, progress=driven))
-
-
-def check_thresholds(thresholds: Thresholds, prefix: str = '') -> None:
-    """
-    Refuse what is no threshold.
-
-    :param prefix: of the names by which the user knows them.
-    :raises InputError: if one is not positive.
-    """
-    for name, value in thresholds._asdict().items():
-        if not 0.0 < value < math.inf:
-            raise InputError(f'is {value}', prefix + name.removesuffix('_s'),
-                             'give a positive number')
 
 
 def check_requests(record: RunRecord, requests: Collection[str], where: str = 'requests') -> None:

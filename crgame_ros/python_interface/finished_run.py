@@ -15,18 +15,14 @@
 """A run that is over, whoever drove it: what happened, and what is measured of it."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 import warnings
 
-from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
-from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
-from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
-from crgame_ros.analysis.run_measures import check_requests, check_thresholds
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.recording.recorded_inputs import RecordedInputs
@@ -36,11 +32,14 @@ from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # They take a second to import, and not every notebook asks for them.
+if TYPE_CHECKING:  # They take a second to import, and not everybody asks for measures.
+    from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+    from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
     from crgame_ros.analysis.report.report_run import ReportRun
     from crgame_ros.analysis.scores.plan_record import PlanRecord
     from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
     from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+    from crgame_ros.recording.recorded_plans import RecordedPlan
     import pyarrow as pa
 
 
@@ -152,33 +151,37 @@ class Run(ABC):
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
         """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
 
-    @abstractmethod
-    def plans_of_table(self) -> Any:
-        """Give what reads the recorded plans one by one; None where there are none."""
+    def recorded_plans(self) -> 'Callable[[], Iterable[RecordedPlan]] | None':
+        """Give what reads the recorded plans one by one; None where nobody keeps them."""
+        return None
 
     @cached_property
-    def usual_criticality(self) -> Criticality:
+    def usual_criticality(self) -> 'Criticality':
         """Measure its criticality by the usual thresholds."""
+        from crgame_ros.analysis.criticality.recorded_criticality import measure_log
         return measure_log(self.log)
 
-    def criticality(self, thresholds: Thresholds = USUAL) -> dict[str, VehicleCriticality]:
+    def criticality(self, thresholds: Thresholds = USUAL) -> 'dict[str, VehicleCriticality]':
         """
         Measure how critical it was, by vehicle (docs/criticality.md).
 
         :raises InputError: if a threshold is not positive.
         """
-        check_thresholds(thresholds)
+        from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+        thresholds.check()
         found = self.usual_criticality if thresholds == USUAL else measure_log(
             self.log, thresholds)
         return {each.vehicle_id: each for each in found.report()}
 
-    def behaviour(self, requests: Collection[str] = ()) -> dict[str, DriverBehaviour]:
+    def behaviour(self, requests: Collection[str] = ()) -> 'dict[str, DriverBehaviour]':
         """
         Measure how each vehicle was driven (docs/behaviour.md).
 
         :param requests: names of the events that ask to take over an AV.
         :raises InputError: if the run has no such event.
         """
+        from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+        from crgame_ros.analysis.run_measures import check_requests
         check_requests(self.record, requests)
         return {each.vehicle_id: each
                 for each in measure_behaviour(self.record, requests=requests)}
@@ -209,7 +212,7 @@ class Run(ABC):
         """Give it as tables want it."""
         from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
         return TabulatedRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
-                            self.plans_of_table(), self._offline, scores)
+                            self.recorded_plans(), self._offline, scores)
 
     def reported(self, key: str = 'run1') -> 'ReportRun':
         """
@@ -217,8 +220,6 @@ class Run(ABC):
 
         :param key: tells it from others of a report.
         """
-        from dataclasses import replace
-
         from crgame_ros.analysis.report.report_run import measured_run
         return replace(measured_run(self.name, self.bag, self.record, self.timing,
                                     notices=self.notices, offline=self._offline), key=key)

@@ -103,9 +103,6 @@ class OfflineRun(Run):
         """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return {name: self.result.states_of(name) for name in self.result.setup.vehicle_ids}
 
-    def plans_of_table(self) -> None:
-        """Give nothing: plans of offline runs are not kept."""
-
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
         """Write the scenario; give its file, and what it does not express."""
         found = write_scenario(self.log, out)

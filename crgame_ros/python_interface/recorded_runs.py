@@ -14,7 +14,7 @@
 # limitations under the License.
 """Recordings of runs, as objects of the same kind as offline runs."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.recording.conversion import convert_log
 from crgame_ros.recording.recorded_game import read_game_document
+from crgame_ros.recording.recorded_plans import read_plans, RecordedPlan
 from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_log import read_run_log, RunLog
@@ -107,9 +108,8 @@ class RecordedRun(Run):
         """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return recorded_states(self._bag, self.game.epoch)
 
-    def plans_of_table(self) -> Any:
+    def recorded_plans(self) -> Callable[[], Iterable[RecordedPlan]]:
         """Give what reads the recorded plans one by one."""
-        from crgame_ros.recording.recorded_plans import read_plans
         return partial(read_plans, self._bag, self.game.epoch)
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
