@@ -21,6 +21,7 @@ from pathlib import Path
 import time
 from typing import Any
 
+from crgame_ros.driver.source import parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game
 from crgame_ros.launcher.arguments import RunRequest
@@ -118,7 +119,8 @@ def run(game: Game | FileName | None = None, *,
     """
     Drive a game on a virtual clock, planners in lockstep: equal arguments give equal states.
 
-    :param game: the game, its file, or a CommonRoad scenario; None for the cut-in.
+    :param game: the game, its file, or a CommonRoad scenario; None for the cut-in, or, where the
+        driver is a recording, for its own game.
     :param planner: for all AVs, or one for each: a name, a class derived from `crgame_ros.Planner`
         or an object of one; None for those of the game.
     :param options: keyword arguments of the planner's constructor, instead of the game's.
@@ -131,7 +133,9 @@ def run(game: Game | FileName | None = None, *,
     :param problems: planning problems that become AVs, where the game names no AVs.
     :raises InputError: if something that was given cannot be used.
     """
-    chosen = as_game(game)
+    # With a recorded driver and no game it is the game of the recording.
+    repeats = game is None and driver is not None and parse_source(driver).kind == 'replay'
+    chosen = None if repeats else as_game(game)
     named = name_planners(planner)
     request = RunRequest(planners=named.names, driver=driver, duration_s=duration_s,
                          rate_hz=rate_hz, problems=tuple(problems))
@@ -142,7 +146,7 @@ def run(game: Game | FileName | None = None, *,
         named.check_objects(len(setup.avs))
         if options is not None:
             setup = _with_options(setup, options)
-        name = chosen.title or setup.loaded.benchmark_id
+        name = setup.game.title or setup.loaded.benchmark_id
         return drive(name, setup, latency_steps, list((triggers or {}).items()))
 
 
@@ -166,7 +170,9 @@ def drive(name: str, setup: Setup, latency_steps: int = 0,
     return OfflineRun(name, result, time.perf_counter() - began_s)
 
 
-def _seeded(game: Game, seed: int) -> Game:
+def _seeded(game: Game | None, seed: int) -> Game:
+    if game is None:
+        raise InputError('the game is that of the recording', 'seed', 'name a game')
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
         raise InputError(f'is {seed}', 'seed', 'give a whole number from 0 to 2^63 - 1')
     return replace(game, seed=seed)

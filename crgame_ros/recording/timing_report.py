@@ -46,7 +46,7 @@ REPORT_KEYS = frozenset((
     'real_time_ratio', 'time_efficiency', 'precision_ratio'))
 # Counts of a status `sim_node: <av> plans`, as the engine keeps them.
 PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
-                'steps_without_plan')
+               'steps_without_plan')
 # Of a status of a planner that braked, and of a tracked AV.
 _BRAKING, _WORST = 'braking: ', 'worst_'
 

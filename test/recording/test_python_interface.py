@@ -143,6 +143,11 @@ def test_a_recording_is_the_same_kind_of_object(
         written = polars.read_parquet(folder / 'tables' / f'{name}.parquet')
         assert polars.from_arrow(table).equals(written), name
     assert recorded.tables(scores=False)['vehicles']['score_nuplan'].null_count == 2
+    # By its own game, too.
+    driver = f'replay:{folder / "bag"}'
+    assert crgame_ros.run(driver=driver, duration_s=3.0).state_hash == run.state_hash
+    with pytest.raises(crgame_ros.InputError, match='seed: the game is that of the recording'):
+        crgame_ros.run(driver=driver, seed=1)
     # A later run of the same human is the recorded one again.
     assert crgame_ros.replay(folder, 'idm')['idm'].human_differs_s is None
 

@@ -38,8 +38,6 @@ _WORDS = {
     'last_distance_m': 'Distance to the goal at the end',
     'accepted_share': 'Plans accepted that are no braking plans',
     'latency_ms': 'Latency of plans, median', 'age_ms': 'Age of the plan in use, median'}
-# At the end of a run they are left out.
-_SLOW = (*_COSTS, 'valid', 'feasible', 'reached_s', 'last_distance_m')
 _LEFT_OUT = (" CommonRoad's costs, checks and feasibility, and how near the goal was, are left "
              'out of the report at the end of a run: <code>crgame report</code> adds them.')
 
@@ -97,7 +95,7 @@ def _table(caption: str, drivers: Sequence[_Driver]) -> str:
 def _rows(drivers: Sequence[_Driver]) -> Iterator[Sequence[str]]:
     values = [each.scores.values() for each in drivers]
     for name, words in _WORDS.items():
-        if name in _SLOW and not _is_whole(drivers):
+        if all(each[name] is None for each in values):
             continue
         measure = MEASURES[name]
         title = plain(f'{measure.definition}; {measure.variant}')
@@ -127,4 +125,8 @@ def _remarks(run: ReportRun, scores: VehicleScores) -> Iterator[str]:
     if scores.commonroad is not None:
         yield from (f'{who} fails {plain(name)}: {free(reason)}'
                     for name, reason in scores.commonroad.checks.failed.items())
+        for reason in dict.fromkeys(cost.reason for cost in scores.commonroad.costs):
+            names = [cost.name for cost in scores.commonroad.costs if cost.reason == reason]
+            if reason:
+                yield f'{who} has no {", ".join(names)}: {free(reason)}'
     yield from (f'{who}: {free(remark)}' for remark in scores.remarks)

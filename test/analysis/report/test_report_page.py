@@ -271,6 +271,8 @@ def test_how_planners_drove_is_told_in_numbers(page: Page, run: ReportRun) -> No
     assert rows['Plans accepted that are no braking plans'] == ['0.700', '–']
     texts = ' '.join(text for _, text in page.texts)
     assert 'fails goal_reached' in texts and 'free drive at the speed limit' in texts
+    # Nobody measured ages: there is no row of dashes.
+    assert 'Age of the plan in use, median' not in rows
     titles = [each.get('title') or '' for each in page.attributes('span')]
     assert any(title.startswith(MEASURES_OF_SCORES['SM1'].definition) for title in titles)
 
@@ -283,6 +285,13 @@ def test_at_the_end_of_a_run_what_takes_long_is_left_out(run: ReportRun) -> None
     rows = _rows(Page(section.html), 'How planners drove')
     assert 'nuPlan score, of 1' in rows and 'Feasible' not in rows
     assert not any(name.startswith('CommonRoad') for name in rows)
+    av = run.scores.vehicles[1]
+    assert av.commonroad is not None
+    costs = tuple(replace(cost, total=None, reason='no <i>lane</i>')
+                  for cost in av.commonroad.costs)
+    lost = replace(av, commonroad=replace(av.commonroad, costs=costs))
+    without = planners_section(replace(run, scores=RunScores((lost,))))
+    assert without is not None and 'TR1: <bdi>no &lt;i&gt;lane&lt;/i&gt;</bdi>' in without.html
     refused = planners_section(replace(run, scores=RunScores((), 'the run: <b>no</b> step')))
     assert refused is not None and '&lt;b&gt;no&lt;/b&gt; step' in refused.html
 
