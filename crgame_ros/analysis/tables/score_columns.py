@@ -62,7 +62,8 @@ def _declared(column: _ScoreColumn) -> Column:
         empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
 
 
-def score_vehicles(run: TabulatedRun, progress: Callable[[float], object]) -> None:
+def score_vehicles(run: TabulatedRun,
+                   progress: Callable[[float], object] = lambda _: None) -> None:
     """
     Score a run, for the table of vehicles; why it cannot be scored is for the table of runs.
 
