@@ -96,7 +96,7 @@ def _add_rows(run: TabulatedRun, writers: Mapping[str, TableRows],
     progress(f'measuring how people drove in {run.id}', 0.0)
     write_behaviour(run, writers)
     if run.scored and run.record.log.vehicles:
-        score_vehicles(run, partial(progress, f'scoring {run.id}'))
+        score_vehicles(run, progress=partial(progress, f'scoring {run.id}'))
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         if (values := part_rows(parts, run))['run']:
             writers[table.name].add(values)

@@ -62,14 +62,16 @@ def _declared(column: _ScoreColumn) -> Column:
         empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
 
 
-def score_vehicles(run: TabulatedRun,
+def score_vehicles(run: TabulatedRun, *, drives_only: bool = False,
                    progress: Callable[[float], object] = lambda _: None) -> None:
     """
     Score a run, for the table of vehicles; why it cannot be scored is for the table of runs.
 
+    :param drives_only: without CommonRoad's tools, which take most of the time.
     :param progress: is told how much has been done, 0 to 1.
     """
-    found = scores_of(run.record, plans_of_report(run.outcome), progress=progress)
+    found = scores_of(run.record, plans_of_report(run.outcome), drives_only=drives_only,
+                      progress=progress)
     run.scores = {each.vehicle_id: each for each in found.vehicles}
     if found.refusal:
         run.remarks.append(f'no scores: {found.refusal}')
