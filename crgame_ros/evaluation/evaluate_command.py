@@ -22,6 +22,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.summary.summary_command import add_summary_arguments
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
     from crgame_ros.evaluation.evaluation import Computing
@@ -79,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     after = parser.add_argument_group('of an evaluation, instead')
     after.add_argument('--cell', metavar='KEY', help='run one cell again, and write its report')
     after.add_argument('--summary', action='store_true', help='sum it up')
+    add_summary_arguments(after)
     parser.set_defaults(command=run_command)
 
 
@@ -110,6 +112,7 @@ def run_command(values: argparse.Namespace) -> int:
 
 def _look(values: argparse.Namespace) -> int:
     from crgame_ros.evaluation.cell_report import report_cell
+    from crgame_ros.evaluation.summary.summary_command import summarise_command
     if values.plan is None or not values.plan.is_dir():
         raise InputError('needs the folder of an evaluation',
                          '--cell' if values.cell else '--summary',
@@ -117,7 +120,7 @@ def _look(values: argparse.Namespace) -> int:
     if values.cell:
         print(report_cell(values.plan, values.cell, partial(print, file=sys.stderr, flush=True)))
         return 0
-    raise NotImplementedError
+    return summarise_command(values.plan, values)
 
 
 def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
