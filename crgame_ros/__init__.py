@@ -15,3 +15,51 @@
 """Real-time, human-in-the-loop driving simulation on CommonRoad and ROS 2."""
 
 __version__ = '0.1.0'
+
+# Importing this package loads nothing more: each name below is loaded when somebody asks for it.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from crgame_ros.errors import CrgameError, InputError, PlanningError
+    from crgame_ros.evaluation.evaluation import Computing
+    from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
+    from crgame_ros.game.game import Game
+    from crgame_ros.messages.plan import Plan, PlanRequest
+    from crgame_ros.paths import scenarios_directory
+    from crgame_ros.planner.interface import Planner, PlannerContext
+    from crgame_ros.python_interface.finished_evaluation import evaluate
+    from crgame_ros.python_interface.finished_run import Run
+    from crgame_ros.python_interface.games import load_game
+    from crgame_ros.python_interface.offline_runs import run
+    from crgame_ros.python_interface.recorded_runs import read_run
+    from crgame_ros.python_interface.replays import replay
+    from crgame_ros.python_interface.run_functions import export, measure, report
+else:
+    # Type checkers are not shown this: to them a name that is not imported above is an error.
+    def __getattr__(name: str) -> object:
+        if name not in _PLACES:
+            raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+        from importlib import import_module
+        found = getattr(import_module(f'{__name__}.{_PLACES[name]}'), name)
+        globals()[name] = found
+        return found
+
+__all__ = [
+    'Computing', 'CrgameError', 'evaluate', 'EvaluationPlan', 'export', 'Game', 'InputError',
+    'load_game', 'measure', 'Plan', 'Planner', 'PlannerContext', 'PlanningError', 'PlanRequest',
+    'read_run', 'replay', 'report', 'run', 'Run', 'scenarios_directory']
+# The module of each name, within this package.
+_PLACES = {
+    'CrgameError': 'errors', 'InputError': 'errors', 'PlanningError': 'errors',
+    'Computing': 'evaluation.evaluation', 'EvaluationPlan': 'evaluation.evaluation_plan',
+    'evaluate': 'python_interface.finished_evaluation', 'scenarios_directory': 'paths',
+    'Game': 'game.game', 'Plan': 'messages.plan', 'PlanRequest': 'messages.plan',
+    'Planner': 'planner.interface', 'PlannerContext': 'planner.interface',
+    'Run': 'python_interface.finished_run',
+    'load_game': 'python_interface.games', 'run': 'python_interface.offline_runs',
+    'read_run': 'python_interface.recorded_runs', 'replay': 'python_interface.replays',
+    'export': 'python_interface.run_functions', 'measure': 'python_interface.run_functions',
+    'report': 'python_interface.run_functions'}
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -21,14 +21,10 @@ import importlib
 import json
 from pathlib import Path
 import sys
-import time
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import NamedTuple
 
 from crgame_ros import __version__
 from crgame_ros.errors import CrgameError, InputError
-
-if TYPE_CHECKING:  # A command that needs no engine starts without it.
-    from crgame_ros.simulation.offline import OfflineResult
 
 
 class _Tool(NamedTuple):
@@ -171,10 +167,8 @@ def _trigger(text: str) -> tuple[str, float]:
 def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.launcher.arguments import RunRequest
     from crgame_ros.launcher.run_plan import effective_setup, naming
-    from crgame_ros.recording.export import prepare_folder, write_scenario
-    from crgame_ros.recording.recorded_inputs import recorded_inputs
-    from crgame_ros.recording.run_log import run_log_of
-    from crgame_ros.simulation.offline import run_offline
+    from crgame_ros.python_interface.offline_runs import drive
+    from crgame_ros.recording.export import prepare_folder
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
@@ -188,48 +182,13 @@ def _offline(values: argparse.Namespace) -> int:
             raise InputError(f'{setup.game.duration} s are less than a time step of the scenario',
                              '--duration', f'give {setup.scheduler.time_step_s} s or more')
         prepare_folder(values.out)
-    drivers, intervals_s = recorded_inputs(setup)
-    triggers = [(round(time_s / setup.scheduler.dt_s), name) for name, time_s in values.trigger]
-    start_s = time.perf_counter()
     with naming(request):
-        result = run_offline(setup, latency_steps=values.latency, drivers=drivers,
-                             intervals_s=intervals_s, clock_s=time.perf_counter,
-                             triggers=triggers)
-    wall_s = time.perf_counter() - start_s
-    print(json.dumps(_summary(result, wall_s), indent=2))
+        run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger)
+    print(json.dumps(run.summary(), indent=2))
     if values.out is not None:
-        for notice in write_scenario(run_log_of(result), values.out).notices:
+        for notice in run.exported(values.out)[1]:
             print(f'note: {notice}', file=sys.stderr)
     return 0
-
-
-def _summary(result: 'OfflineResult', wall_s: float) -> dict[str, Any]:
-    """Say what came of a run, as JSON has it."""
-    from crgame_ros.simulation.contacts import contacts_of
-    simulated_s = (len(result.vehicle_states) - 1) * result.setup.scheduler.dt_s
-    return {
-        'scenario': result.setup.loaded.benchmark_id, 'simulated_s': round(simulated_s, 6),
-        'wall_s': round(wall_s, 3), 'state_hash': result.state_hash,
-        'planners': {
-            av_id: {'accepted_ratio': round(record.accepted_ratio, 4),
-                    'requests': record.counters.requests, 'accepted': record.counters.accepted,
-                    'refused': record.counters.refused,
-                    'fallbacks': record.statistics.fallbacks,
-                    'reasons': dict(record.statistics.reasons),
-                    **({} if record.tracking is None else {'worst_tracking_errors': {
-                        key: round(value, 4) for key, value in {
-                            'lane': record.lane_error or 0.0,
-                            **record.tracking._asdict()}.items()}})}
-            for av_id, record in result.planners.items()},
-        'events': [{'name': event.name, 'n': event.n, 'k': event.k, 'by': event.by}
-                   for event in result.fired],
-        'violations': [{'vehicle': item.vehicle_id, 'n': item.n, 'hit': list(item.hit),
-                        'off_road': item.off_road}
-                       for item in result.violations if not item.is_valid],
-        'stop': None if result.stop is None else {
-            'vehicle': result.stop.vehicle_id, 'violation_n': result.stop.n,
-            'stop_n': len(result.vehicle_states) - 1},
-        'contacts': [item.as_dict() for item in contacts_of(result)]}
 
 
 def _convert(values: argparse.Namespace) -> int:

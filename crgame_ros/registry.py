@@ -102,6 +102,24 @@ class ModelRegistry:
         :raises InputError: if there is none of that name, or it is not of this kind.
         """
         label = self.label(name, where)
+        found = self.look_up(name, where, label)
+        if not (inspect.isclass(found) and issubclass(found, self._base)):
+            raise InputError(f'is no {self.kind}', label, 'derive the class from '
+                             f'{self._base.__module__}.{self._base.__qualname__}')
+        if inspect.isabstract(found):
+            missing = ', '.join(sorted(getattr(found, '__abstractmethods__', ())))
+            raise InputError(f'does not define {missing}', label, self._remedy)
+        return found
+
+    def look_up(self, name: str, where: str, label: str) -> Any:
+        """
+        Find what a name stands for, whatever it is.
+
+        :param where: as for `find`.
+        :param label: which one a message is about.
+        :raises InputError: if there is none of that name.
+        """
+        found: Any
         if name in self.built_in:
             found = _from_module(self.built_in[name], label)
         elif ':' in name:
@@ -119,12 +137,6 @@ class ModelRegistry:
                                  f'known are {", ".join(self.names())}, or give module:Class or '
                                  'file.py:Class')
             found = _from_module(points[0].value, label)
-        if not (inspect.isclass(found) and issubclass(found, self._base)):
-            raise InputError(f'is no {self.kind}', label, 'derive the class from '
-                             f'{self._base.__module__}.{self._base.__qualname__}')
-        if inspect.isabstract(found):
-            missing = ', '.join(sorted(getattr(found, '__abstractmethods__', ())))
-            raise InputError(f'does not define {missing}', label, self._remedy)
         return found
 
     def label(self, name: str, where: str = '') -> str:

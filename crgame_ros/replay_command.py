@@ -24,7 +24,6 @@ import subprocess
 import sys
 from typing import Any, TYPE_CHECKING
 
-from crgame_ros.analysis.measure_command import TOLD_S
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import numbered
 
@@ -45,7 +44,6 @@ reacts, the table says from when on the world around the human is another than i
 With --human trajectory the human takes the recorded way itself, for recordings that lack cycles or
 inputs. With --live each run is driven in real time, with the page, and recorded."""
 FOLDER = 'replays'
-NEVER = '-'
 # The folder of the comparison, and its runs one by one.
 _Runs = tuple[Path, Iterator['Alternative']]
 
@@ -176,24 +174,10 @@ def _file_name(planner: str, among: Sequence[str] | Mapping[str, Any]) -> str:
 
 
 def _table(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Lay the comparison out: a row for each planner and vehicle."""
-    head = ('planner', 'vehicle', 'gap [m]', 'ttc [s]', 'a_req [m/s^2]', 'distance [m]', 'tet [s]',
-            'contacts', 'human differs', 'others differ')
-    rows = [head]
-    for each in found:
-        for vehicle_id, vehicle in each['criticality']['vehicles'].items():
-            worst = {name: f'{entry["value"]:.2f}' for name, entry in vehicle['worst'].items()
-                     if entry['unit'] != 's' or entry['value'] < TOLD_S}
-            touched = [item for item in each.get('contacts') or ()
-                       if vehicle_id in (item['vehicle'], item['with'])]
-            rows.append((
-                each['planner'], vehicle_id,
-                *(worst.get(name, NEVER) for name in ('gap', 'ttc', 'a_req', 'min_distance')),
-                f'{vehicle["tet_s"]:.1f}',
-                str(len(touched)) if each.get('contacts') is not None else NEVER,
-                *(NEVER if each.get(name) is None else f'from {each[name]:.1f} s'
-                  for name in ('human_differs_s', 'others_differ_s'))))
-    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
+    """Lay the comparison out in columns."""
+    from crgame_ros.analysis.replay_rows import HEAD, replay_rows
+    rows = [HEAD, *replay_rows(found)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
     for row in rows:
         yield '  '.join(f'{text:<{width}}' for text, width in zip(row, widths, strict=True)
                         ).rstrip()

@@ -43,7 +43,7 @@ FOLDERS = (
     'traffic', 'simulation', 'recording', 'analysis/criticality', 'analysis/behaviour',
     'analysis/scores', 'analysis/tables', 'analysis/pictures', 'analysis/report', 'analysis',
     'evaluation/summary', 'evaluation', 'cockpit', 'ros', 'nodes/sim', 'nodes/cockpit',
-    'nodes/markers', 'nodes', 'launcher', 'analysis/reproduction', HIGHEST)
+    'nodes/markers', 'nodes', 'launcher', 'analysis/reproduction', 'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].
 CELL, NAMES, TOP = 22, 150, 120
@@ -68,7 +68,8 @@ def imports() -> dict[tuple[str, str], list[str]]:
     known = modules()
     found: dict[tuple[str, str], list[str]] = {}
     for path in known.values():
-        for name in sorted(_imported(path, known)):
+        # The package's own file loads nothing before somebody asks for it.
+        for name in sorted(_imported(path, known)) if path != PACKAGE / '__init__.py' else ():
             pair = folder_of(path), folder_of(known[name])
             if pair[0] != pair[1]:
                 found.setdefault(pair, []).append(

@@ -53,7 +53,7 @@ class Alternative:
         fallback; None where it is not known.
     :param contacts: the first contact of each pair, as entries of `timing.json`; None where they
         are not known.
-    :param state_hash: over all states of an offline run.
+    :param result: of an offline run; None of a live one.
     """
 
     planner: str
@@ -63,7 +63,12 @@ class Alternative:
     others_differ_s: float | None
     accepted_ratio: Mapping[str, float | None]
     contacts: Sequence[Mapping[str, Any]] | None
-    state_hash: str | None = None
+    result: OfflineResult | None = None
+
+    @property
+    def state_hash(self) -> str | None:
+        """Give the hash over all states of an offline run."""
+        return None if self.result is None else self.result.state_hash
 
     def as_dict(self) -> dict[str, Any]:
         """Say what came of it, as JSON has it."""
@@ -96,7 +101,7 @@ def drive_against(planner: str, setup: Setup, recorded: RunLog, latency_steps: i
     return _compare(
         planner, run_log_of(result), recorded,
         {av: record.accepted_ratio for av, record in result.planners.items()},
-        [item.as_dict() for item in contacts_of(result)], result.state_hash)
+        [item.as_dict() for item in contacts_of(result)], result)
 
 
 def driven_live(planner: str, folder: Path, recorded: RunLog) -> Alternative:
@@ -137,14 +142,14 @@ def _drive_trajectory(setup: Setup, latency_steps: int,
 def _compare(planner: str, log: RunLog, recorded: RunLog,
              accepted_ratio: Mapping[str, float | None],
              contacts: Sequence[Mapping[str, Any]] | None,
-             state_hash: str | None = None) -> Alternative:
+             result: OfflineResult | None = None) -> Alternative:
     humans = len(recorded.game.humans)
     return Alternative(
         planner, log, measure_log(log),
         _differs_s(log, recorded, log.published_states[:, :humans, :3],
                    recorded.published_states[:, :humans, :3]),
         _differs_s(log, recorded, log.object_poses, recorded.object_poses),
-        accepted_ratio, contacts, state_hash)
+        accepted_ratio, contacts, result)
 
 
 def _differs_s(log: RunLog, recorded: RunLog, found: NDArray[np.float64],

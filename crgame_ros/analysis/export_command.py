@@ -44,6 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         '(default: "tables" beside the recording of a single run)')
     parser.add_argument('--epoch', type=int, help='which run of recordings that hold several '
                         '(resets count them from 0; default: the last)')
+    parser.add_argument('--no-scores', action='store_true', help='leave out how well vehicles '
+                        'drove, which takes most of the time')
     parser.set_defaults(command=export)
 
 
@@ -66,7 +68,8 @@ def export(values: argparse.Namespace) -> int:
         progress.what = what
         progress(share)
 
-    rows = write_tables(tabulated_runs(values.runs, values.epoch, tell), out, values.to, tell)
+    runs = tabulated_runs(values.runs, values.epoch, tell, not values.no_scores)
+    rows = write_tables(runs, out, values.to, tell)
     width = max(map(len, rows))
     for name, count in rows.items():
         print(f'{name:<{width}} {count:>9} rows')

@@ -15,19 +15,14 @@
 """`crgame measure`: how critical a recorded run was and how it was driven, also as JSON."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 import json
-import math
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
-from crgame_ros.errors import InputError, short
-
-if TYPE_CHECKING:  # Other commands do not wait for it.
-    from crgame_ros.game.documents import GameDocument
 
 # Behind what is beyond its threshold.
 CRITICAL = '   <- critical'
@@ -68,38 +63,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def measure(values: argparse.Namespace) -> int:
     """Measure a run, and print what was found."""
     from crgame_ros.analysis.behaviour.behaviour_text import behaviour_lines
-    from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
-    from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+    from crgame_ros.analysis.run_measures import check_requests, measure_run
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_record import read_run_record
-    for name in ('ttc', 'drac', 'pet'):
-        if not 0.0 < getattr(values, name) < math.inf:
-            raise InputError(f'is {getattr(values, name)}', f'--{name}', 'give a positive number')
+    thresholds = Thresholds(values.ttc, values.drac, values.pet)
+    thresholds.check('--')
     path = values.run
     say = partial(print, file=sys.stderr, flush=True)
     record = read_run_record(recording_in(path), values.epoch, Progress(say, f'reading {path}'))
-    _check_requests(values.request, record.log.game)
-    found = measure_log(record.log, Thresholds(values.ttc, values.drac, values.pet),
-                        Progress(say, f'measuring {path}')).as_dict()
-    behaviour = measure_behaviour(record, requests=values.request,
-                                  progress=Progress(say, f'measuring the drivers of {path}'))
+    check_requests(record, values.request, '--request')
+    found = measure_run(record, thresholds, values.request, Progress(say, f'measuring {path}'),
+                        Progress(say, f'measuring the drivers of {path}'))
     if values.json:
-        found['behaviour'] = {each.vehicle_id: each.as_dict() for each in behaviour}
-        print(json.dumps(found, indent=2))
+        print(json.dumps(found.as_dict(), indent=2))
     else:
-        lines = [*_lines(found), *(line for each in behaviour if each.human or each.take_overs
-                                   for line in behaviour_lines(each))]
+        lines = [*_lines(found.criticality.as_dict()),
+                 *(line for each in found.behaviour if each.human or each.take_overs
+                   for line in behaviour_lines(each))]
         print('\n'.join(lines))
     return 0
-
-
-def _check_requests(names: Sequence[str], game: 'GameDocument') -> None:
-    known = [event.name for event in game.events]
-    for name in names:
-        if name not in known:
-            raise InputError(f'the run has no event {short(name)}', '--request',
-                             'it has ' + (', '.join(known) or 'none'))
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:

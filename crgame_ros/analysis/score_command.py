@@ -143,7 +143,7 @@ def _write(found: 'list[PlannerScores]', out: Path) -> None:
     scores = found[0]
     write_text(scores.xml_text, out / f'{scores.scenario_id}.xml')
     for vehicle in scores.vehicles:
-        if vehicle.role == 'solution':
+        if vehicle.commonroad is None or vehicle.role == 'solution':
             continue
         for solution in vehicle.commonroad.solutions(scores.scenario_id).values():
             write_text(solution_text(dated(solution, when)),

@@ -63,6 +63,13 @@ class VehicleDrivability(NamedTuple):
         """Tell whether nothing is violated."""
         return not (self.collision or self.off_road)
 
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Say what is violated, for people."""
+        return tuple(text for wrong, text in (
+            (self.collision, 'collision with ' + ', '.join(self.hit)),
+            (self.off_road, 'off the road')) if wrong)
+
 
 class DrivabilityMonitor:
     """

@@ -21,11 +21,11 @@ from typing import Any, Self
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import (
+    CellScene,
     files_of,
     GAME_SUFFIXES,
     runs_of,
     SCENARIO_SUFFIXES,
-    Scene,
     scene_of_game,
     scene_of_run,
     scene_of_scenario,
@@ -68,7 +68,7 @@ class CellGrid:
     :param engine: digest of the engine's code.
     """
 
-    scenes: tuple[Scene, ...]
+    scenes: tuple[CellScene, ...]
     planners: tuple[GridPlanner, ...]
     perception: dict[str, Any]
     traffic: dict[str, Any]
@@ -93,7 +93,7 @@ class CellGrid:
                                 planner.choice, seen, flow, self.duration_s, self.latency_steps,
                                 (self.engine, *self._code(scene, planner)))
 
-    def _code(self, scene: Scene, planner: GridPlanner) -> tuple[str, ...]:
+    def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
         return (planner.digest,) if planner.choice is not None else scene.digests
 
     def as_dict(self) -> dict[str, Any]:
@@ -104,7 +104,7 @@ class CellGrid:
     def from_dict(cls, values: dict[str, Any]) -> Self:
         """Give what `as_dict` told."""
         return cls(**values | {
-            'scenes': tuple(Scene(**scene | {'digests': tuple(scene['digests'])})
+            'scenes': tuple(CellScene(**scene | {'digests': tuple(scene['digests'])})
                             for scene in values['scenes']),
             'planners': tuple(GridPlanner(**planner) for planner in values['planners']),
             'seeds': tuple(values['seeds'])})
@@ -130,7 +130,7 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
         *((scene_of_scenario, path) for path in files_of(
             plan.scenarios, plan.base, SCENARIO_SUFFIXES, 'CommonRoad file')),
         *((scene_of_run, path) for path in runs_of(plan.humans, plan.base))]
-    scenes: list[Scene] = []
+    scenes: list[CellScene] = []
     for number, (make, path) in enumerate(places):
         scene = make(path, store)
         if any(each.label == scene.label for each in scenes):

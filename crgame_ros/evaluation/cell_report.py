@@ -23,6 +23,7 @@ from crgame_ros.evaluation.cell_run import run_cell
 from crgame_ros.evaluation.evaluation_folder import EvaluationFolder, REPORTS
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.recording.export import prepare_folder, write_scenario
+from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.run_record import run_record_of
 
 
@@ -45,6 +46,7 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     record = run_record_of(result)
     path = folder / REPORTS / f'{cell.key}.html'
     prepare_folder(path.parent)
-    write_report([measured_run(cell.label, None, record, None)], path)
+    write_report([measured_run(cell.label, None, record, None,
+                               offline=offline_outcome(result))], path)
     write_scenario(record.log, path.with_suffix('.xml'))
     return path

@@ -14,7 +14,7 @@
 # limitations under the License.
 """What is kept of a cell: its rows in the tables, and their declarations."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from crgame_ros.analysis.tables.column import (
@@ -29,7 +29,7 @@ from crgame_ros.analysis.tables.table_part import part_rows
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS
 from crgame_ros.simulation.contacts import contacts_of
-from crgame_ros.simulation.offline import OfflineResult, PlannerRecord
+from crgame_ros.simulation.offline import OfflineResult
 
 STATUSES = ('ok', 'error', 'timeout', 'memory', 'died')
 _KEY = Column('cell', TEXT, '', 'key of the cell: a hash of everything that it depends on')
@@ -99,14 +99,6 @@ def vehicle_rows(run: TabulatedRun, result: OfflineResult) -> list[dict[str, Any
             'accepted_ratio': None if record is None else record.accepted_ratio,
             **{name: _plain(values[place]) for name, values in columns.items()}})
     return rows
-
-
-def planner_counts(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
-    """Give what `timing.json` would say of the planners."""
-    return {name: {**{key: getattr(record.counters, key) for key in (
-        'requests', 'skipped', 'timed_out', 'accepted', 'refused', 'realigned',
-        'steps_without_plan')}, 'fallback': record.statistics.fallbacks}
-        for name, record in planners.items()}
 
 
 def _plain(value: Any) -> Any:

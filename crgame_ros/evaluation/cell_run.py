@@ -23,10 +23,11 @@ import time
 from typing import Any
 
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.evaluation.cell import Cell
-from crgame_ros.evaluation.cell_rows import outcome_of, planner_counts, vehicle_rows
+from crgame_ros.evaluation.cell_rows import outcome_of, vehicle_rows
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
 from crgame_ros.evaluation.evaluation_plan import OWN
@@ -34,6 +35,7 @@ from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import parse_game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
@@ -110,9 +112,11 @@ def _inputs(cell: Cell, contents: Path) -> RecordedInputs:
 def measured(cell: Cell, result: OfflineResult) -> TabulatedRun:
     """Measure a run, as a run to tabulate."""
     record = run_record_of(result)
-    run = TabulatedRun(cell.key, record, {'planners': planner_counts(result.planners)})
+    run = TabulatedRun(cell.key, record, offline=offline_outcome(result))
     found = measure_log(record.log)
     run.criticality.update({item.vehicle_id: item for item in found.report()})
+    # CommonRoad's tools would double the time that a short cell takes.
+    score_vehicles(run, drives_only=True)
     return run
 
 

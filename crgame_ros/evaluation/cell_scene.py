@@ -49,7 +49,7 @@ SCENARIO_SUFFIXES, GAME_SUFFIXES = ('.xml',), ('.yaml', '.yml')
 
 
 @dataclass(frozen=True)
-class Scene:
+class CellScene:
     """
     A game whose files are in a store.
 
@@ -74,7 +74,7 @@ class Scene:
         return self.human or self.game or self.scenario
 
 
-def scene_of_game(path: Path, store: ContentStore) -> Scene:
+def scene_of_game(path: Path, store: ContentStore) -> CellScene:
     """
     Take a game with its files into a store.
 
@@ -91,7 +91,7 @@ def scene_of_game(path: Path, store: ContentStore) -> Scene:
     return _scene(game, loaded, store, game_name=path.stem)
 
 
-def scene_of_scenario(path: Path, store: ContentStore) -> Scene:
+def scene_of_scenario(path: Path, store: ContentStore) -> CellScene:
     """
     Take a scenario into a store; nobody but its AVs is driven.
 
@@ -101,7 +101,7 @@ def scene_of_scenario(path: Path, store: ContentStore) -> Scene:
     return _scene(game, load_scenario(path), store)
 
 
-def scene_of_run(path: Path, store: ContentStore) -> Scene:
+def scene_of_run(path: Path, store: ContentStore) -> CellScene:
     """
     Take a recorded run into a store: its game, and what its humans did.
 
@@ -130,14 +130,14 @@ def _run_name(path: Path) -> str:
 
 
 def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name: str = '',
-           human: str = '', inputs: str = '') -> Scene:
+           human: str = '', inputs: str = '') -> CellScene:
     parts, _ = cast_avs(game, loaded)
     game = replace(game, avs=tuple(spec for spec, _ in parts))
     values = write(game, game.base)
     scenario = Content('scenario.xml', {'scenario.xml': guard.encode(loaded.xml_text)})
     store.put(scenario)
     values['scenario'] = scenario.reference
-    return Scene(loaded.benchmark_id, game_name, human, with_contents(values, store), inputs,
+    return CellScene(loaded.benchmark_id, game_name, human, with_contents(values, store), inputs,
                  tuple(planner_digest(spec.planner) for spec in game.avs or ()))
 
 

@@ -25,7 +25,8 @@ from crgame_ros.planner.planner_registry import BUILT_IN, EXTERNAL, planner_clas
 
 # Folders and modules whose code no offline run and no measure executes.
 WITHOUT = ('cockpit', 'nodes', 'ros', 'launcher', 'evaluation/summary', 'analysis/pictures',
-           'analysis/report', 'analysis/reproduction', 'gym', 'cli.py', 'doctor.py')
+           'analysis/report', 'analysis/reproduction', 'gym', 'python_interface', 'cli.py',
+           'doctor.py')
 
 
 @cache

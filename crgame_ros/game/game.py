@@ -302,6 +302,13 @@ class Game:
     traffic: TrafficSpec | None = None
     occupancy: Annotated[Path, Advice('name the YAML file of a map')] | None = None
 
+    def _repr_html_(self) -> str:
+        """Show it in a notebook as its file says it."""
+        from html import escape
+
+        from crgame_ros.game.game_file import dump_game
+        return f'<pre>{escape(dump_game(self))}</pre>'
+
     def check(self) -> None:
         """Refuse more vehicles than anybody can follow."""
         count = len(self.humans) + len(self.avs or ())

@@ -86,13 +86,16 @@ class RunPlan:
         return self.folder / 'bag'
 
 
-def effective_game(request: RunRequest) -> Game:
+def effective_game(request: RunRequest, game: Game | None = None) -> Game:
     """
     Combine the game file with what the command line says.
 
+    :param game: instead of the game file's.
     :raises InputError: if a file or name cannot be used.
     """
-    if request.game is not None:
+    if game is not None:
+        pass
+    elif request.game is not None:
         game = load_game(request.game)
     elif request.scenario is not None:
         # The human of an exported run is a recording in it: the same cast drives again.
@@ -125,19 +128,20 @@ def _with_limits(game: Game, request: RunRequest) -> Game:
     return game
 
 
-def effective_setup(request: RunRequest) -> Setup:
+def effective_setup(request: RunRequest, game: Game | None = None) -> Setup:
     """
     Load and place what a request asks for, with its planners and whatever it repeats.
 
     With `--driver replay:BAG` and no game it is the game of the recording.
 
+    :param game: instead of the one that the request names.
     :raises InputError: if a file or name cannot be used, or game and recording don't belong
         together.
     """
-    bag = _own_recording(request)
+    bag = None if game is not None else _own_recording(request)
     with naming(request):
         if bag is None:
-            setup = build_setup(effective_game(request))
+            setup = build_setup(effective_game(request, game))
         else:
             recorded = read_recorded_game(bag, other_planners=bool(request.planners))
             setup = build_setup(_with_limits(recorded.game, request), recorded.loaded)

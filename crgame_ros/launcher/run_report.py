@@ -46,7 +46,8 @@ def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object]
     watch = Progress(say, f'measuring {finished.bag}') if progress else lambda _: None
     try:
         run = measured_run(folder.resolve().name, finished.bag,
-                           record_of_log(finished.bag, finished.log), finished.timing, watch)
+                           record_of_log(finished.bag, finished.log), finished.timing, watch,
+                           drives_only=True)
         write_report([run], path, driven_here=True)
     except (CrgameError, OSError) as error:
         say(f'error: no report: {error}')

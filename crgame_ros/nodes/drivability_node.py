@@ -64,9 +64,7 @@ class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
     def _report(self, verdicts: Sequence[VehicleDrivability], stamp_ns: int) -> None:
         spec = self._spec
         for verdict in verdicts:
-            faults = [text for wrong, text in (
-                (verdict.collision, 'collision with ' + ', '.join(verdict.hit)),
-                (verdict.off_road, 'off the road')) if wrong]
+            faults = verdict.faults
             self._reports[verdict.vehicle_id].publish(self.endpoints.diagnostics.array(
                 f'{verdict.vehicle_id}/drivability',
                 DiagnosticStatus.ERROR if faults else DiagnosticStatus.OK,

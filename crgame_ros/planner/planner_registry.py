@@ -14,7 +14,9 @@
 # limitations under the License.
 """The planners that a game may name."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+import contextlib
+import inspect
 from typing import Any
 
 from crgame_ros.errors import InputError
@@ -37,6 +39,44 @@ class PlannerRegistry(ModelRegistry):
 
     def __init__(self) -> None:
         super().__init__('planners', 'planner', BUILT_IN, Planner, 'docs/planners.md')
+        self._given: dict[str, type[Planner] | Planner] = {}
+
+    @contextlib.contextmanager
+    def giving(self, planners: Mapping[str, type[Planner] | Planner]) -> Iterator[None]:
+        """
+        Know classes and objects of the caller's own, for as long as the context lasts.
+
+        :param planners: by the name under which a game has them.
+        """
+        earlier = self._given
+        self._given = {**earlier, **planners}
+        try:
+            yield
+        finally:
+            self._given = earlier
+
+    def look_up(self, name: str, where: str, label: str) -> Any:
+        """Find what a name stands for; of an object the caller has given, its class."""
+        if name not in self._given:
+            return super().look_up(name, where, label)
+        given = self._given[name]
+        return given if inspect.isclass(given) else type(given)
+
+    def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
+               **given: Any) -> Any:
+        """
+        Make a planner, or take the object that the caller has given.
+
+        :raises InputError: as for any model; if an object, which is made, is given options.
+        """
+        own = self._given.get(name)
+        if own is None or inspect.isclass(own):
+            return super().create(name, options, where, **given)
+        self.find(name, where)
+        if options:
+            raise InputError('is an object and takes no options', self.label(name, where),
+                             'give its class')
+        return own
 
     def find(self, name: str, where: str = '') -> type[Planner]:
         """

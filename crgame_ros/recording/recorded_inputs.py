@@ -29,6 +29,7 @@ from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +74,17 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
         drivers.update({av.id: ReplayDriver(commands[av.id])
                         for av in setup.avs if av.id in commands})
     return RecordedInputs(drivers, intervals)
+
+
+def inputs_of(result: OfflineResult) -> RecordedInputs:
+    """Give what the humans of an offline run did, and who took over its AVs."""
+    # Row 0 was consumed by no step.
+    drivers = {human.id: ReplayDriver(result.commands[1:, place])
+               for place, human in enumerate(result.setup.humans)}
+    drivers.update({av.id: ReplayDriver(result.av_commands[1:, place])
+                    for place, av in enumerate(result.setup.avs)
+                    if np.isfinite(result.av_commands[1:, place]).any()})
+    return RecordedInputs(drivers, result.intervals_s[1:, 0])
 
 
 def _check_same(setup: Setup, recorded: GameDocument, bag: Path) -> None:

@@ -45,8 +45,8 @@ REPORT_KEYS = frozenset((
     'notices', 'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',
     'real_time_ratio', 'time_efficiency', 'precision_ratio'))
 # Counts of a status `sim_node: <av> plans`, as the engine keeps them.
-_PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
-                'steps_without_plan')
+PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
+               'steps_without_plan')
 # Of a status of a planner that braked, and of a tracked AV.
 _BRAKING, _WORST = 'braking: ', 'worst_'
 
@@ -206,7 +206,7 @@ class _Collector:
         engine = self._statuses.get(f'sim_node: {av} plans', {})
         name = f'planner_node: {av}'
         node = self._statuses.get(name, {})
-        report: dict[str, Any] = {key: _count(engine, key) for key in _PLAN_COUNTS}
+        report: dict[str, Any] = {key: _count(engine, key) for key in PLAN_COUNTS}
         # The node reports its counts now and then, but every fallback at once.
         report['last_refusal'] = engine.get('last_refusal') or None
         report['plans'] = max(self._answers[av], _count(node, 'plans') or 0)

@@ -30,6 +30,7 @@ from crgame_ros.analysis.scores.score_measures import MEASURES
 from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.cli import main
+from crgame_ros.errors import InputError
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
@@ -38,7 +39,24 @@ from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
+import polars
 import pytest
+
+# Columns of the table of vehicles, and where their values stand in what `crgame score` says.
+COLUMNS = {
+    'score_nuplan': ('nuplan', 'score'),
+    **{f'score_{name}': ('nuplan', 'multipliers', name) for name in (
+        'no_collision_at_fault', 'drivable_area', 'driving_direction', 'making_progress')},
+    **{f'score_{name}': ('nuplan', 'weighted', name, 'value') for name in (
+        'progress', 'time_to_collision', 'speed_limit', 'comfort')},
+    **{f'score_{name.lower()}': ('commonroad', 'costs', name, 'total') for name in (
+        'JB1', 'SA1', 'WX1', 'SM1', 'SM2', 'SM3', 'MW1', 'TR1')},
+    'score_valid': ('commonroad', 'valid'),
+    'score_feasible': ('commonroad', 'feasibility', 'feasible'),
+    'score_failed_checks': ('commonroad', 'failed'), 'score_expert': ('nuplan', 'expert'),
+    'score_reached_s': ('goal', 'reached_s'), 'score_last_distance': ('goal', 'last_distance_m'),
+    'score_accepted_share': ('plans', 'accepted_share'),
+    'score_age_p50_s': ('plans', 'age_ms', 'p50')}
 
 
 @pytest.fixture(scope='module')
@@ -76,6 +94,59 @@ def run(result: OfflineResult, recorder: Any, tmp_path_factory: pytest.TempPathF
                  for number, (name, message, values) in enumerate(statuses)]
     recorder.ours(folder / 'bag', messages)
     return folder
+
+
+@pytest.fixture(scope='module')
+def told(run: Path, tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """Return what `crgame score` says of the vehicles of the recording."""
+    out = tmp_path_factory.mktemp('scores')
+    assert main(['score', str(run), '--out', str(out)]) == 0
+    found: list[dict[str, Any]] = json.loads((out / 'scores.json').read_text())['vehicles']
+    return found
+
+
+@pytest.fixture(scope='module')
+def vehicles(run: Path, tmp_path_factory: pytest.TempPathFactory) -> polars.DataFrame:
+    """Return the table of vehicles of the same recording."""
+    out = tmp_path_factory.mktemp('tables')
+    assert main(['export', str(run), '--out', str(out)]) == 0
+    return polars.read_parquet(out / 'vehicles.parquet')
+
+
+@pytest.mark.parametrize('column', COLUMNS)
+def test_the_table_has_what_the_command_says(
+        column: str, told: list[dict[str, Any]], vehicles: polars.DataFrame) -> None:
+    """Each score of both who drove; a human has no plans."""
+    expected = []
+    for vehicle in told:
+        value: Any = vehicle
+        for key in COLUMNS[column]:
+            value = None if value is None else value[key]
+        if isinstance(value, dict):
+            value = ', '.join(value) or None
+        expected.append(1e-3 * value if column.endswith('p50_s') and value else value)
+    assert vehicles[column].to_list() == pytest.approx(expected, rel=1e-12)
+    assert expected != [None, None]
+
+
+def test_no_score_is_left_out_of_the_table(vehicles: polars.DataFrame) -> None:
+    """Latencies, which stand with the plans, aside."""
+    assert {name for name in vehicles.columns if name.startswith('score_')} == set(COLUMNS)
+    assert len(COLUMNS) == len(MEASURES) - 1 + 2
+
+
+def test_a_run_that_cannot_be_scored_has_its_tables_all_the_same(
+        run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table of runs says why; with `--no-scores` nobody asks."""
+    def refuse(*_: Any) -> None:
+        raise InputError('has no step', 'the run', 'record again')
+    monkeypatch.setattr(ScoredScenario, 'of_run', refuse)
+    for words, notices in (((), 'no scores: the run: has no step; record again'),
+                           (('--no-scores',), None)):
+        assert main(['export', str(run), '--out', str(tmp_path), *words]) == 0
+        table = polars.read_parquet(tmp_path / 'vehicles.parquet')
+        assert [table[name].null_count() for name in COLUMNS] == [2] * len(COLUMNS)
+        assert polars.read_parquet(tmp_path / 'runs.parquet')['notices'].to_list() == [notices]
 
 
 def test_scores_of_an_offline_run(record: RunRecord, result: OfflineResult) -> None:

@@ -22,7 +22,9 @@ import subprocess
 import sys
 from typing import Any
 
+from crgame_ros.analysis.scores.solution_judge import SolutionJudge
 from crgame_ros.cli import main
+from crgame_ros.game.game import AvSpec
 from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.simulation.offline import OfflineResult
 import pytest
@@ -105,6 +107,24 @@ def test_a_run_that_ends_writes_its_report_last(session: Path) -> None:
     assert said[-1].startswith(f'  {session / "report.html"} (') and said[-1].endswith(' s)')
     text = (session / 'report.html').read_text(encoding='utf-8')
     assert 'Run and report are of crgame_ros' in text
+
+
+def test_at_the_end_of_a_run_nobody_waits_for_the_checker(
+        tmp_path: Path, recorder: Any, drive: Callable[..., OfflineResult],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planners have nuPlan's score at once, CommonRoad's by the command."""
+    result = drive('ZAM_CutIn-1_1_T-1.xml', avs=(AvSpec('av0'),))
+    recorder.ours(tmp_path / 'bag', recorder.messages(result))
+    finisher = Finisher(tmp_path, lambda _: None)
+    assert finisher.finish_all() == 0
+    with monkeypatch.context() as patched:
+        patched.setattr(SolutionJudge, 'judge', None)
+        finisher.write_reports()
+    text = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert 'nuPlan score, of 1' in text and 'CommonRoad cost' not in text
+    assert main(['report', str(tmp_path)]) == 0
+    text = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert 'nuPlan score, of 1' in text and 'CommonRoad cost SM1' in text
 
 
 def test_without_report_there_is_none(session: Path) -> None:

@@ -231,7 +231,9 @@ def test_offline_run_and_recording_have_the_same_tables(
                     assert here[column].equals(there[column]), column
                 continue
             one, two = (frame[column].fill_null(np.nan).to_numpy() for frame in (here, there))
-            assert np.allclose(one, two, rtol=1e-9, atol=1e-9, equal_nan=True), column
+            # Jerks in scores magnify what rounding in messages leaves.
+            rounding = 1e-6 if column.startswith('score_') else 1e-9
+            assert np.allclose(one, two, rtol=rounding, atol=1e-9, equal_nan=True), column
     assert polars.read_parquet(tmp_path / 'plans.parquet').height == 0
 
 
@@ -278,7 +280,8 @@ def test_several_runs_in_the_same_tables(recorded: Recorded, tmp_path: Path, dri
     other = tmp_path / 'pedestrian'
     recorder.ours(other / 'bag', recorder.messages(drive('ZAM_CutIn-1_1_T-1.xml')))
     out = tmp_path / 'out'
-    assert main(['export', str(recorded.folder), str(other), '--out', str(out)]) == 0
+    assert main(['export', str(recorded.folder), str(other), '--no-scores', '--out',
+                 str(out)]) == 0
     assert polars.read_parquet(out / 'runs.parquet')['run'].to_list() == [
         'pedestrian:0', 'pedestrian:0~2']
     states = polars.read_parquet(out / 'states.parquet')
@@ -358,12 +361,12 @@ def _stretched(result: OfflineResult, times: int) -> TabulatedRun:
         log, ks=np.arange(len(log.ks) * times),
         **{name: np.tile(getattr(log, name), (times, 1, 1)) for name in (
             'vehicle_states', 'published_states', 'object_poses', 'object_velocities')})
-    return TabulatedRun('a', replace(record, log=longer))
+    return TabulatedRun('a', replace(record, log=longer), scored=False)
 
 
 def test_memory_does_not_grow_with_the_run(recorded: Recorded, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a run eight times as long the tables take no more, but for how people drove."""
+    """Of a run eight times as long the tables take no more, but for how it was driven."""
     for module, name in ((table_writer, 'PIECE_ROWS'), (states_table, 'PIECE_ROWS'),
                          (pairs_table, '_BUFFERED_ROWS')):
         monkeypatch.setattr(module, name, 200)

@@ -14,7 +14,10 @@
 # limitations under the License.
 """What counts as critical."""
 
+import math
 from typing import NamedTuple
+
+from crgame_ros.errors import InputError
 
 
 class Thresholds(NamedTuple):
@@ -34,6 +37,18 @@ class Thresholds(NamedTuple):
         """Tell whether a value is critical; of measures without a threshold none is."""
         return {'ttc': value < self.ttc_s, 'drac': value > self.drac,
                 'pet': value < self.pet_s}.get(measure, False)
+
+    def check(self, prefix: str = '') -> None:
+        """
+        Refuse what is no threshold.
+
+        :param prefix: of the names by which the user knows them.
+        :raises InputError: if one is not positive.
+        """
+        for name, value in self._asdict().items():
+            if not 0.0 < value < math.inf:
+                raise InputError(f'is {value}', prefix + name.removesuffix('_s'),
+                                 'give a positive number')
 
 
 USUAL = Thresholds()

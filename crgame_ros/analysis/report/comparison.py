@@ -19,6 +19,8 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.report.criticality_section import is_critical, marked
+from crgame_ros.analysis.report.outcome_section import contacts_of_report
+from crgame_ros.analysis.report.planners_section import planners_compared
 from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
 from crgame_ros.analysis.report.report_section import Dash, Plot, PlotLine, Section
 from crgame_ros.analysis.report.report_text import free, NOTHING, number, share, table
@@ -41,7 +43,8 @@ def comparison_section(runs: Sequence[ReportRun]) -> Section:
     rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
     return Section('comparison', 'Comparison', table(
         'The runs side by side; of measures the worst of all driven vehicles', head, rows,
-        'numbers comparison'), tuple(_plots(runs)))
+        'numbers comparison') + planners_compared(runs, [letter(i) for i in range(len(runs))]),
+        tuple(_plots(runs)))
 
 
 def letter(place: int) -> str:
@@ -64,10 +67,10 @@ def _rows() -> Iterator[tuple[str, Callable[[ReportRun], str]]]:
     yield 'time below the threshold of TTC [s]', lambda run: number(sum(
         each.tet_s for each in run.criticality.report()))
     yield 'least PET [s]', _least_pet
-    yield 'contacts', lambda run: _told(run, lambda timing: str(len(timing['contacts']))
-                                        if timing['contacts'] is not None else NOTHING)
-    yield 'violations', lambda run: _told(
-        run, lambda timing: str(timing['drivability']['violations']))
+    yield 'contacts', lambda run: NOTHING if (found := contacts_of_report(run)) is None \
+        else str(len(found))
+    yield 'violations', lambda run: NOTHING if run.outcome is None \
+        else str(run.outcome['drivability']['violations'])
     yield 'events that took effect', lambda run: str(len(run.record.fired))
     yield 'plans accepted', accepted
     yield 'worst latency p99 [ms]', _latency
@@ -88,7 +91,7 @@ def worst_of_all(run: ReportRun, name: str) -> str:
 
 def accepted(run: ReportRun) -> str:
     """Write how many plans of all AVs were accepted."""
-    entries = () if run.timing is None else run.timing['planners'].values()
+    entries = () if run.outcome is None else run.outcome['planners'].values()
     asked, taken = (sum(entry[key] or 0 for entry in entries) for key in ('requests', 'accepted'))
     return f'{taken} of {asked} ({share(taken, asked)})' if asked else NOTHING
 
@@ -107,7 +110,7 @@ def _least_pet(run: ReportRun) -> str:
 
 
 def _latency(run: ReportRun) -> str:
-    entries = () if run.timing is None else run.timing['planners'].values()
+    entries = () if run.outcome is None else run.outcome['planners'].values()
     known = [entry['latency_ms']['p99'] for entry in entries if entry['latency_ms']]
     return number(max(known), 1) if known else NOTHING
 

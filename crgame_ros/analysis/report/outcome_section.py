@@ -32,7 +32,7 @@ def outcome_section(run: ReportRun) -> Section:
 
 def contacts_of_report(run: ReportRun) -> Sequence[Mapping[str, Any]] | None:
     """Give the contacts as `timing.json` has them; None where nobody knows."""
-    return None if run.timing is None else run.timing['contacts']
+    return None if run.outcome is None else run.outcome['contacts']
 
 
 def _contacts(run: ReportRun) -> str:
@@ -56,9 +56,9 @@ def _time_s(run: ReportRun, item: Mapping[str, Any]) -> float | None:
 
 
 def _violations(run: ReportRun) -> str:
-    if run.timing is None:
+    if run.outcome is None:
         return note('Violations: the recording does not tell.')
-    found = run.timing['drivability']['list']
+    found = run.outcome['drivability']['list']
     if not found:
         return note('Nobody left the road or broke a rule that was checked.')
     return table('Violations, when each began', ('vehicle', 'what', 'at [s]'), [

@@ -20,8 +20,6 @@ from functools import partial
 from pathlib import Path
 import sys
 
-from crgame_ros.errors import InputError
-
 REPORT_FILE = 'report.html'
 DESCRIPTION = """\
 Write one HTML file that tells of a recorded run: what was run, its story in pictures, how critical
@@ -31,8 +29,6 @@ it was, what drivers and planners did, and how true to the clock it was. Several
   crgame report runs/FIRST runs/SECOND --out comparison.html
 
 The file opens in any browser, without network. docs/report.md shows one."""
-# More lines nobody tells apart.
-MOST_RUNS = 12
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,16 +47,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def report(values: argparse.Namespace) -> int:
     """Write a report, and print where it is."""
-    from crgame_ros.analysis.report.report_file import write_report
+    from crgame_ros.analysis.report.report_file import (
+        check_report_path,
+        check_report_runs,
+        write_report,
+    )
     from crgame_ros.analysis.report.report_run import read_report_run
     from crgame_ros.recording.progress import Progress
-    if len(values.runs) > MOST_RUNS:
-        raise InputError(f'{len(values.runs)} runs', 'RUN', f'give {MOST_RUNS} at most')
+    check_report_runs(len(values.runs))
     out = values.out or _place(values.runs[0])
-    if out.suffix.lower() not in ('.html', '.htm'):
-        raise InputError('is no name of an HTML file', str(out), 'give --out FILE.html')
-    if not out.parent.is_dir():
-        raise InputError('no such folder', str(out.parent), 'give another --out')
+    check_report_path(out)
     say = partial(print, file=sys.stderr, flush=True)
     runs = [replace(read_report_run(path, values.epoch, Progress(say, f'measuring {path}')),
                     key=f'run{number}') for number, path in enumerate(values.runs, 1)]

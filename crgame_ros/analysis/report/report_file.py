@@ -24,8 +24,11 @@ from crgame_ros import __version__
 from crgame_ros.analysis.report.report_page import report_html
 from crgame_ros.analysis.report.report_run import ReportRun
 from crgame_ros.analysis.report.run_section import software_note
+from crgame_ros.errors import InputError
 from crgame_ros.recording.export import write_text
 
+# More lines nobody tells apart.
+MOST_RUNS = 12
 # Of those that compute what a report tells.
 _PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker',
              'plotly')
@@ -42,6 +45,24 @@ def write_report(runs: Sequence[ReportRun], path: Path, driven_here: bool = Fals
     :raises CrgameError: if Plotly is not installed.
     """
     write_text(report_html(runs, software_note(_software(), driven_here)), path)
+
+
+def check_report_path(path: Path) -> None:
+    """
+    See, before the work, that a report may be written to a file.
+
+    :raises InputError: if its name is none of an HTML file, or its folder is missing.
+    """
+    if path.suffix.lower() not in ('.html', '.htm'):
+        raise InputError('is no name of an HTML file', str(path), 'give FILE.html')
+    if not path.parent.is_dir():
+        raise InputError('no such folder', str(path.parent), 'name a file in another one')
+
+
+def check_report_runs(count: int) -> None:
+    """Refuse more runs than anybody could compare, by their number."""
+    if count > MOST_RUNS:
+        raise InputError(f'{count} runs', 'report', f'give {MOST_RUNS} at most')
 
 
 def _software() -> tuple[tuple[str, str], ...]:

@@ -26,6 +26,7 @@ from crgame_ros.analysis.report.criticality_section import criticality_section
 from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.motion_section import input_section, motion_section
 from crgame_ros.analysis.report.outcome_section import contacts_of_report, outcome_section
+from crgame_ros.analysis.report.planners_section import planners_section
 from crgame_ros.analysis.report.plot_series import columns_for, encoded, script_json
 from crgame_ros.analysis.report.report_document import plotted_document
 from crgame_ros.analysis.report.report_run import ReportRun
@@ -37,8 +38,8 @@ from crgame_ros.analysis.report.timing_section import plan_section, timing_secti
 
 # The parts of a run's report, in their order: whoever has more to tell adds one.
 SECTIONS: tuple[Callable[[ReportRun], Section | None], ...] = (
-    story_section, criticality_section, outcome_section, driving_section, input_section,
-    motion_section, plan_section, timing_section, run_section)
+    story_section, criticality_section, outcome_section, driving_section, planners_section,
+    input_section, motion_section, plan_section, timing_section, run_section)
 
 
 def report_html(runs: Sequence[ReportRun], software: str = '') -> str:
@@ -98,12 +99,12 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     contacts = contacts_of_report(run)
     if contacts is not None:
         yield 'contacts', str(len(contacts))
-    if run.timing is not None:
-        yield 'violations', str(run.timing['drivability']['violations'])
+    if run.outcome is not None:
+        yield 'violations', str(run.outcome['drivability']['violations'])
     yield 'least TTC [s]', worst_of_all(run, 'ttc')
     yield 'least distance [m]', worst_of_all(run, 'min_distance')
     yield 'greatest DRAC [m/s²]', worst_of_all(run, 'drac')
-    if run.log.game.avs and run.timing is not None:
+    if run.log.game.avs and run.outcome is not None:
         yield 'plans accepted', accepted(run).partition(' (')[0]
     if run.timing is not None:
         yield 'real-time ratio', number(run.timing['real_time_ratio']['final'], 3)

@@ -26,6 +26,8 @@ from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, MEA
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.analysis.pictures.critical_moments import Moment
 from crgame_ros.analysis.report.story_moments import story_moments
+from crgame_ros.analysis.scores.plan_record import plans_of_report
+from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.objects import Role
 from crgame_ros.recording.reader import BagReader
@@ -43,8 +45,8 @@ COLOURS = {Role.HUMAN: ('human-0', 'human-1', 'human-2'),
            Role.AUTONOMOUS: ('av-0', 'av-1', 'av-2')}
 # What is plotted over time.
 PLOTTED = ('gap', 'ttc', 'thw', 'drac', 'min_distance')
-# Reading takes about so much of the time that a report takes.
-_READ_SHARE = 0.2
+# Reading and measuring take about so much of the time that a report takes.
+_READ_SHARE, _MEASURE_SHARE = 0.2, 0.6
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class ReportRun:
     :param timing: the content of `timing.json`; None where the recording does not tell.
     :param began_ns: log time of its first message, since 1970 [ns]; None of an offline run.
     :param notices: what is wrong with the recording.
+    :param scores: how well everybody drove.
+    :param offline: of an offline run what `offline_outcome` gives; None otherwise.
     """
 
     key: str
@@ -73,6 +77,13 @@ class ReportRun:
     timing: Mapping[str, Any] | None
     began_ns: int | None
     notices: tuple[str, ...]
+    scores: RunScores = RunScores()
+    offline: Mapping[str, Any] | None = None
+
+    @property
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Give plans, violations and contacts as `timing.json` has them; None: nobody knows."""
+        return self.timing if self.offline is None else self.offline
 
     @cached_property
     def behaviour(self) -> tuple[DriverBehaviour, ...]:
@@ -122,12 +133,15 @@ def read_report_run(path: Path, epoch: int | None = None,
 def measured_run(name: str, bag: Path | None, record: RunRecord,
                  timing: Mapping[str, Any] | None,
                  progress: Callable[[float], object] = lambda _: None,
-                 notices: tuple[str, ...] = ()) -> ReportRun:
+                 notices: tuple[str, ...] = (), *, drives_only: bool = False,
+                 offline: Mapping[str, Any] | None = None) -> ReportRun:
     """
     Measure a run that has been read.
 
     :param bag: its recording, if there is one.
     :param timing: as `timing_report` gives it.
+    :param offline: of an offline run what `offline_outcome` gives.
+    :param drives_only: score without CommonRoad's tools, which take longest.
     """
     log = record.log
     course = np.full((len(log.vehicles), len(PLOTTED), len(log.ks)), np.nan)
@@ -139,15 +153,19 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
             course[subject, :, row] = _most_critical(values)
         row += 1
     found = measure_log(log, progress=lambda part: progress(
-        _READ_SHARE + (1.0 - _READ_SHARE) * part), on_tick=take)
+        _READ_SHARE + _MEASURE_SHARE * part), on_tick=take)
+    measured = _READ_SHARE + _MEASURE_SHARE
+    outcome = timing if offline is None else offline
+    scores = scores_of(record, plans_of_report(outcome), drives_only=drives_only,
+                       progress=lambda part: progress(measured + (1.0 - measured) * part))
     began_ns = None
     if bag is not None:
         with BagReader(bag, parts=True) as reader:
             began_ns = reader.start_ns or None
     told = () if timing is None else timing['notices']
-    moments = story_moments(record, found, () if timing is None else timing['contacts'] or ())
+    moments = story_moments(record, found, () if outcome is None else outcome['contacts'] or ())
     return ReportRun('run1', name, record, found, course, moments, timing, began_ns,
-                     tuple(dict.fromkeys((*told, *log.notices, *notices))))
+                     tuple(dict.fromkeys((*told, *log.notices, *notices))), scores, offline)
 
 
 def _most_critical(values: FloatArray) -> FloatArray:

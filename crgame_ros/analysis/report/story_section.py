@@ -14,17 +14,12 @@
 # limitations under the License.
 """The story of a run in frames: the scene at the moments that count."""
 
-from urllib.parse import quote
-
-from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.report.moment_image import moment_image
 from crgame_ros.analysis.report.report_run import ReportRun
 from crgame_ros.analysis.report.report_section import Section
-from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain
+from crgame_ros.analysis.report.report_text import free, note, NOTHING, number
 from crgame_ros.analysis.report.story_moments import nearest_moment
-
-# Of a picture [px].
-_WIDTH = 560
 
 
 def story_section(run: ReportRun) -> Section | None:
@@ -32,19 +27,12 @@ def story_section(run: ReportRun) -> Section | None:
     if not run.log.vehicles:
         return None
     scene = FrameScene(run.log)
-    ks = [scene.k_at(moment.time_s) for moment in run.moments]
+    driven = [item.id for item in run.log.vehicles]
     figures = []
-    for place, (k, moment) in enumerate(zip(ks, run.moments, strict=True)):
-        driven = [item.id for item in run.log.vehicles]
-        # Each for itself: what it is about is in the middle.
-        window = scene.windows([scene.row(k)], moment.vehicles)[0]
-        labelled = {*driven, *moment.vehicles}
-        svg = frame_svg(scene.at(k, window, labelled), _WIDTH)
-        words = f'{moment.time_s:.1f} s: {moment.why}'
+    for place, moment in enumerate(run.moments):
         figures.append(
             f'<figure class="frame" id="{frame_address(run, place)}" tabindex="-1" '
-            f'data-time="{moment.time_s:.6f}"><img alt="The scene from above at {plain(words)}" '
-            f'src="data:image/svg+xml,{quote(svg, safe=_SAFE)}">'
+            f'data-time="{moment.time_s:.6f}">{moment_image(scene, moment, driven)}'
             f'<figcaption><b>{number(moment.time_s, 1)} s</b> {free(moment.why)}</figcaption>'
             '</figure>')
     return Section('story', 'The story', note(
@@ -52,10 +40,6 @@ def story_section(run: ReportRun) -> Section | None:
         'drives to the right. Humans are warm, AVs cold colours, all others grey; behind each '
         'driven vehicle is its way of the last two seconds.')
         + f'<div class="frames">{"".join(figures)}</div>')
-
-
-# What may stand in an address of data in quotes, beside letters and digits.
-_SAFE = " =:;/,.-+()!*?@$'"
 
 
 def frame_address(run: ReportRun, place: int) -> str:

@@ -44,7 +44,9 @@ _RATIO = ('final', 'mean', 'min')
 def timing_section(run: ReportRun) -> Section:
     """Show table I, and the errors over time."""
     if run.timing is None:
-        return Section('timing', 'Timing', note('The recording does not tell of its cycles.'))
+        return Section('timing', 'Timing', note(
+            'An offline run keeps no clock.' if run.offline is not None else
+            'The recording does not tell of its cycles.'))
     html = table('Timing (table I of the CommonRoad-Game paper)', ('', 'value', 'unit'),
                  _rows(run.timing), 'numbers')
     return Section('timing', 'Timing', html, tuple(_plots(run)))
@@ -75,9 +77,9 @@ def plan_section(run: ReportRun) -> Section | None:
     """Show what became of the planners' answers; None without planners."""
     if not run.log.game.avs:
         return None
-    if run.timing is None:
+    if run.outcome is None:
         return Section('plans', 'Plans', note('The recording does not tell.'))
-    planners = run.timing['planners']
+    planners = run.outcome['planners']
     rows = [(named(run, av.id), free(av.planner), *_counts(planners.get(av.id, {})))
             for av in run.log.game.avs]
     html = table('What became of plan requests', (

@@ -22,11 +22,10 @@ import sys
 import time
 
 from crgame_ros.analysis.counterfactual import Alternative, drive_against, driven_live
-from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
-from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.recording.recorded_inputs import inputs_of, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
 from crgame_ros.simulation.offline import run_offline
@@ -76,12 +75,7 @@ def record_offline(game: Path, planner: str, duration_s: float | None = None) ->
         return effective_setup(RunRequest(game=game, planners=(name,)))
 
     result = run_offline(setup_for(planner), duration_s=duration_s, clock_s=time.perf_counter)
-    humans = [human.id for human in result.setup.humans]
-    inputs = RecordedInputs(
-        # Row 0 was consumed by no step.
-        {human: ReplayDriver(result.commands[1:, place]) for place, human in enumerate(humans)},
-        result.intervals_s[1:, 0])
-    return RecordedHuman(game.stem, run_log_of(result), setup_for, inputs)
+    return RecordedHuman(game.stem, run_log_of(result), setup_for, inputs_of(result))
 
 
 def record_live(game: Path, planner: str, folder: Path,

@@ -22,14 +22,14 @@ from commonroad.geometry.shape import ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.state import KSState
 from crgame_ros.analysis.scores.driven_states import goal_step
-from crgame_ros.recording.timing_report import spread_of
+from crgame_ros.recording.offline_outcome import planner_entries
+from crgame_ros.recording.timing_report import PLAN_COUNTS
 from crgame_ros.scenario.loading import group_outline
-from crgame_ros.simulation.offline import OfflineResult, PlannerRecord
+from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import shapely
 
-_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
-           'steps_without_plan', 'plans')
+_COUNTS = (*PLAN_COUNTS, 'plans')
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,13 @@ class GoalRecord:
                 'least_distance_m': self.least_distance}
 
 
-def plans_of_report(report: Mapping[str, Any]) -> dict[str, PlanRecord]:
+def plans_of_report(report: Mapping[str, Any] | None) -> dict[str, PlanRecord]:
     """
     Take the plans of each AV out of a timing report.
 
-    :param report: of `recording.timing_report`.
+    :param report: of `recording.timing_report` or `offline_outcome`; None where nobody knows.
     """
-    return {
+    return {} if report is None else {
         av: PlanRecord({name: entry[name] for name in _COUNTS}, entry['fallback'],
                        entry['fallback_reasons'] or {}, entry['last_refusal'],
                        {name: entry[name] for name in ('latency_ms', 'plan_time_ms', 'age_ms')},
@@ -105,12 +105,8 @@ def plans_of_report(report: Mapping[str, Any]) -> dict[str, PlanRecord]:
 
 
 def plans_of_result(result: OfflineResult) -> dict[str, PlanRecord]:
-    """
-    Take the plans of each AV out of an offline run.
-
-    Its planners answer after a stated number of steps: there is no latency to measure.
-    """
-    return {av: _of_record(record) for av, record in result.planners.items()}
+    """Take the plans of each AV out of an offline run."""
+    return plans_of_report({'planners': planner_entries(result)})
 
 
 def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) -> GoalRecord:
@@ -131,19 +127,3 @@ def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) 
 
 def _area(position: Any) -> shapely.Geometry:
     return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))
-
-
-def _of_record(record: PlannerRecord) -> PlanRecord:
-    counters, statistics = record.counters, record.statistics
-    counts: dict[str, int | None] = {name: getattr(counters, name) for name in _COUNTS[:-1]}
-    counts['plans'] = statistics.plans
-    tracking = None
-    if record.tracking is not None:
-        tracking = dict(record.tracking._asdict())
-        if record.lane_error is not None:
-            tracking['lane'] = record.lane_error
-    durations = np.array(statistics.durations_s) * 1e3
-    return PlanRecord(counts, statistics.fallbacks, dict(statistics.reasons),
-                      counters.last_refusal or None,
-                      {'latency_ms': None, 'plan_time_ms': spread_of(durations), 'age_ms': None},
-                      tracking)

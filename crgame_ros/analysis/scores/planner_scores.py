@@ -19,11 +19,11 @@ from typing import Any
 
 from commonroad.common.solution import CostFunction, PlanningProblemSolution, Solution
 from commonroad.scenario.scenario import ScenarioID
-from crgame_ros.analysis.scores.commonroad_costs import checker_version, COSTS, TrajectoryCost
-from crgame_ros.analysis.scores.nuplan_score import NuplanScore
-from crgame_ros.analysis.scores.plan_record import GoalRecord, PlanRecord
+from crgame_ros.analysis.scores.commonroad_costs import checker_version, TrajectoryCost
+from crgame_ros.analysis.scores.cost_definitions import COSTS
 from crgame_ros.analysis.scores.solution_checks import SolutionChecks
 from crgame_ros.analysis.scores.trajectory_feasibility import TrajectoryFeasibility
+from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
 
 REMARKS = (
     'costs are those of the code: its weights and the table of the benchmark site differ; '
@@ -63,41 +63,6 @@ class SolutionScores:
         return {name: Solution(scenario_id, [PlanningProblemSolution(
             found.planning_problem_id, found.vehicle_model, found.vehicle_type,
             CostFunction[name], found.trajectory)]) for name in COSTS}
-
-
-@dataclass(frozen=True)
-class VehicleScores:
-    """
-    The scores of one vehicle.
-
-    :param vehicle_id: who it was; of a solution the name of its file.
-    :param role: human, autonomous or solution.
-    :param planner: name of an AV's planner; empty otherwise.
-    :param commonroad: by CommonRoad's tools.
-    :param nuplan: nuPlan's score; None where it cannot be had.
-    :param goal: how it came to its goal.
-    :param plans: what its planner answered; None of who has none, or where it is not known.
-    :param remarks: one line each.
-    """
-
-    vehicle_id: str
-    role: str
-    planner: str
-    commonroad: SolutionScores
-    nuplan: NuplanScore | None
-    goal: GoalRecord
-    plans: PlanRecord | None
-    remarks: tuple[str, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
-        return {
-            'vehicle': self.vehicle_id, 'role': self.role, 'planner': self.planner,
-            'commonroad': self.commonroad.as_dict(),
-            'nuplan': None if self.nuplan is None else self.nuplan.as_dict(),
-            'goal': self.goal.as_dict(),
-            'plans': None if self.plans is None else self.plans.as_dict(),
-            'remarks': list(self.remarks)}
 
 
 @dataclass(frozen=True)

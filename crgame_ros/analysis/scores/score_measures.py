@@ -16,7 +16,7 @@
 
 from typing import NamedTuple
 
-from crgame_ros.analysis.scores.commonroad_costs import COSTS
+from crgame_ros.analysis.scores.cost_definitions import COSTS
 
 
 class ScoreMeasure(NamedTuple):
@@ -26,7 +26,7 @@ class ScoreMeasure(NamedTuple):
     :param unit: as tables write it; 1 of a share.
     :param definition: in a sentence.
     :param variant: which of several definitions this is.
-    :param undefined: what stands where there is none.
+    :param undefined: where there is none; empty of what there always is.
     """
 
     unit: str
@@ -37,7 +37,8 @@ class ScoreMeasure(NamedTuple):
 
 _NUPLAN = 'nuplan-devkit, closed loop'
 _OURS = 'crgame_ros'
-_SHORT = 'none of runs of fewer than 5 time steps'
+_SHORT = 'the run has fewer than 5 time steps'
+_NO_PLANS = 'it has no planner, or nobody recorded it'
 MEASURES = {
     'nuplan_score': ScoreMeasure('1', 'product of the multipliers times the weighted mean',
                                  _NUPLAN, _SHORT),
@@ -51,26 +52,31 @@ MEASURES = {
     'making_progress': ScoreMeasure('1', '1 where progress is above 0.2', _NUPLAN, _SHORT),
     'progress': ScoreMeasure(
         '1', "way along the expert's route over the expert's way, 0 to 1",
-        'without an expert: over that of a free drive at the speed limit', '1 without a route'),
+        'without an expert: over that of a free drive at the speed limit; 1 where the expert has '
+        'no route', _SHORT),
     'time_to_collision': ScoreMeasure(
         '1', '1 where it is always above 0.95 s, sampled each 0.1 s within 3 s', _NUPLAN, _SHORT),
-    'speed_limit': ScoreMeasure('1', '1 - mean excess / 2.23 m/s, 0 at least', _NUPLAN,
-                                '1 where no limit is known'),
+    'speed_limit': ScoreMeasure('1', '1 - mean excess / 2.23 m/s, 0 at least',
+                                f'{_NUPLAN}; 1 where no limit is known', _SHORT),
     'comfort': ScoreMeasure('1', '1 where accelerations, jerks and yaw are within bounds',
                             'derivatives of speed and yaw', _SHORT),
-    **{name: ScoreMeasure('1', cost.definition, cost.variant,
-                          'none where the checker finds no lane or lacks a state')
+    **{name: ScoreMeasure('1', f'CommonRoad cost {name} as docs/scores.md has it: '
+                          f'{cost.definition}', cost.variant,
+                          'the checker finds no lane or lacks a state')
        for name, cost in COSTS.items()},
     'valid': ScoreMeasure('', 'whether all checks of valid_solution are passed',
-                          'road: union of the lanelets', ''),
+                          'road: union of the lanelets; of a human the goal is where its drive '
+                          'ended', ''),
     'feasible': ScoreMeasure('', 'whether the model KS can make every transition',
-                             'the checker, 2 cm and 0.03 rad, at 0.1 s', 'none: not asked'),
+                             'the checker, 2 cm and 0.03 rad, at 0.1 s', 'nobody could be asked'),
     'accepted_share': ScoreMeasure('1', 'answers accepted that are no fallback, of all answers',
-                                   _OURS, 'none without an answer'),
-    'latency_ms': ScoreMeasure('ms', 'from a request to its plan', _OURS, 'none offline'),
-    'age_ms': ScoreMeasure('ms', 'of the plan in use, sampled once a second', _OURS,
-                           'none offline'),
-    'reached_s': ScoreMeasure('s', 'until a state first meets the goal', _OURS, 'none: never'),
-    'last_distance_m': ScoreMeasure('m', "from the centre to the goal's area at the end", _OURS,
-                                    'none of a goal without a position'),
+                                   _OURS, f'{_NO_PLANS}, or it never answered'),
+    'latency_ms': ScoreMeasure('ms', 'time from a request to its plan', _OURS, _NO_PLANS),
+    'age_ms': ScoreMeasure('ms', 'age of the plan in use, sampled once a second', _OURS,
+                           _NO_PLANS),
+    'reached_s': ScoreMeasure('s', 'time until a state first meets the goal',
+                              'of a human the goal is where its drive ended', 'it never did'),
+    'last_distance_m': ScoreMeasure('m', "distance from the centre to the goal's area at the end",
+                                    'of a human the goal is where its drive ended',
+                                    'the goal has no position'),
 }

@@ -15,6 +15,7 @@
 """Scores a run, recorded or offline: each of its driven vehicles."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 
 from commonroad.common.solution import CostFunction, PlanningProblemSolution, VehicleModel
@@ -24,18 +25,15 @@ from crgame_ros.analysis.scores.driven_states import (
     goal_step,
     until_goal,
 )
-from crgame_ros.analysis.scores.nuplan_score import Expert, NuplanScore, NuplanScorer
+from crgame_ros.analysis.scores.nuplan_score import Expert
 from crgame_ros.analysis.scores.plan_record import find_goal, PlanRecord
-from crgame_ros.analysis.scores.planner_scores import PlannerScores, REMARKS, VehicleScores
-from crgame_ros.analysis.scores.run_expert import recorded_expert
-from crgame_ros.analysis.scores.scored_drive import drive_of
+from crgame_ros.analysis.scores.planner_scores import PlannerScores, REMARKS
+from crgame_ros.analysis.scores.scored_drives import score_drives
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import SolutionJudge
-from crgame_ros.errors import InputError
-from crgame_ros.game.objects import Role
+from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import RunRecord
-from crgame_ros.scenario.loading import parse_scenario
 
 
 def score_run(record: RunRecord, *, expert: Expert | None = None,
@@ -52,15 +50,13 @@ def score_run(record: RunRecord, *, expert: Expert | None = None,
     :raises InputError: if nobody drives in the run, or it cannot be exported.
     """
     log = record.log
-    if not log.vehicles:
-        raise InputError('nobody drives in it', 'the run', 'score a run with a human or an AV')
+    drives = score_drives(log, expert=expert, plans=plans)
     scored, exported = ScoredScenario.of_run(log)
-    run = _Run(log, scored, expert)
-    vehicles = []
-    for number, item in enumerate(log.vehicles):
-        vehicles.append(run.score(
-            number, exported.problem_ids[item.id], (plans or {}).get(item.id),
-            partial(_share, progress, number, len(log.vehicles))))
+    judge = SolutionJudge(scored)
+    vehicles = [
+        _judged(log, number, drive, exported.problem_ids[drive.vehicle_id], scored, judge,
+                partial(_share, progress, number, len(drives)))
+        for number, drive in enumerate(drives)]
     return PlannerScores(scored.loaded.scenario.scenario_id, exported.xml_text, tuple(vehicles),
                          (*REMARKS, *exported.notices))
 
@@ -69,47 +65,21 @@ def _share(progress: Callable[[float], object], number: int, count: int, done: f
     progress((number + done) / count)
 
 
-class _Run:
-    """Scores the vehicles of one run."""
-
-    def __init__(self, log: RunLog, scored: ScoredScenario, expert: Expert | None) -> None:
-        self._log, self._scored, self._expert = log, scored, expert
-        self._judge = SolutionJudge(scored)
-        original = parse_scenario(log.xml_text, '/scenario/xml')
-        self._nuplan = NuplanScorer(original)
-        self._original = ScoredScenario.of_file(original)
-        self._problems = {problem.planning_problem_id: problem
-                          for problem in original.planning_problems}
-
-    def score(self, number: int, problem_id: int, plans: PlanRecord | None,
-              progress: Callable[[float], object]) -> VehicleScores:
-        """Score one vehicle by its number, and the id of its planning problem in the export."""
-        log = self._log
-        item, driven = log.vehicles[number], log.game.vehicles[number]
-        chosen = choose_type(driven.vehicle)
-        states = driven_states(log, number, chosen.kind)
-        problem = self._scored.problem(problem_id)
-        trajectory = until_goal(states, goal_step(problem, states))
-        solved = PlanningProblemSolution(problem_id, VehicleModel.KS, chosen.kind,
-                                         CostFunction.JB1, trajectory)
-        remarks = [] if chosen.is_exact else [
-            f'no vehicle type of CommonRoad has its dimensions: KS{chosen.kind.value} is nearest, '
-            f'{chosen.difference:.2f} m off in all']
-        av = log.game.av(item.id)
-        return VehicleScores(
-            item.id, 'human' if item.role is Role.HUMAN else 'autonomous',
-            '' if av is None else av.planner,
-            self._judge.judge(solved, trajectory, exact_type=chosen.is_exact, progress=progress),
-            self._score_drive(number, remarks),
-            find_goal(problem, states, log.game.scheduler.time_step_s), plans, tuple(remarks))
-
-    def _score_drive(self, number: int, remarks: list[str]) -> NuplanScore | None:
-        av = self._log.game.av(self._log.vehicles[number].id)
-        problem = None if av is None else self._problems.get(av.planning_problem)
-        expert = self._expert or recorded_expert(
-            self._original, problem, int(self._log.ks[0]), len(self._log.ks))
-        try:
-            return self._nuplan.score(drive_of(self._log, number), expert, problem)
-        except InputError as error:
-            remarks.append(f'no nuPlan score: {error}')
-            return None
+def _judged(log: RunLog, number: int, drive: VehicleScores, problem_id: int,
+            scored: ScoredScenario, judge: SolutionJudge,
+            progress: Callable[[float], object]) -> VehicleScores:
+    """Add what CommonRoad's tools say, and how the vehicle came to its goal."""
+    chosen = choose_type(log.game.vehicles[number].vehicle)
+    states = driven_states(log, number, chosen.kind)
+    problem = scored.problem(problem_id)
+    trajectory = until_goal(states, goal_step(problem, states))
+    solved = PlanningProblemSolution(problem_id, VehicleModel.KS, chosen.kind, CostFunction.JB1,
+                                     trajectory)
+    remarks = () if chosen.is_exact else (
+        f'no vehicle type of CommonRoad has its dimensions: KS{chosen.kind.value} is nearest, '
+        f'{chosen.difference:.2f} m off in all',)
+    return replace(
+        drive, commonroad=judge.judge(solved, trajectory, exact_type=chosen.is_exact,
+                                      progress=progress),
+        goal=find_goal(problem, states, log.game.scheduler.time_step_s),
+        remarks=(*remarks, *drive.remarks))

@@ -29,12 +29,13 @@ from commonroad.scenario.trajectory import Trajectory
 from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.nuplan_score import NuplanScore, NuplanScorer
 from crgame_ros.analysis.scores.plan_record import find_goal
-from crgame_ros.analysis.scores.planner_scores import PlannerScores, REMARKS, VehicleScores
+from crgame_ros.analysis.scores.planner_scores import PlannerScores, REMARKS
 from crgame_ros.analysis.scores.run_expert import recorded_expert
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import poses_of, SolutionJudge, speeds_of
 from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility, simulated
+from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.geometry.shape import Shape
@@ -89,8 +90,7 @@ def _score(scored: ScoredScenario, judge: SolutionJudge, nuplan: NuplanScorer, n
             told.append('its positions are those of the rear axle, as files of 2021 have them: '
                         'as such they would be feasible')
         result.append(VehicleScores(
-            who, 'solution', '', judged,
-            _score_drive(scored, nuplan, drive, part, told),
+            who, 'solution', '', _score_drive(scored, nuplan, drive, part, told), judged,
             find_goal(problem, part.driven.state_list, drive.dt_s), None, tuple(told)))
     return result
 

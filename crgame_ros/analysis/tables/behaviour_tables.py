@@ -22,7 +22,7 @@ from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
 from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.table_part import TablePart
-from crgame_ros.analysis.tables.table_writer import TableWriter
+from crgame_ros.analysis.tables.table_rows import TableRows
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 
 _PER_VEHICLE = tuple(name for name, measure in MEASURES.items() if measure.per == 'vehicle')
@@ -88,7 +88,7 @@ TAKE_OVERS = TableDeclaration(
 BEHAVIOUR_TABLES = REACTIONS, LANE_CHANGES, TAKE_OVERS
 
 
-def write_behaviour(run: TabulatedRun, writers: Mapping[str, TableWriter]) -> None:
+def write_behaviour(run: TabulatedRun, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to the tables of reactions, lane changes and take-overs."""
     for table, rows in ((REACTIONS, _reactions(run)), (LANE_CHANGES, _lane_changes(run)),
                         (TAKE_OVERS, _take_overs(run))):

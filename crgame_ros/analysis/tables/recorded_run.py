@@ -46,12 +46,14 @@ def run_name(path: Path) -> str:
 
 
 def tabulated_runs(paths: Sequence[Path], epoch: int | None,
-                   progress: Callable[[str, float], object]) -> Iterator[TabulatedRun]:
+                   progress: Callable[[str, float], object],
+                   scored: bool = True) -> Iterator[TabulatedRun]:
     """
     Read runs one after the other.
 
     :param paths: folders of runs, or recordings.
     :param epoch: which run of each, where a recording holds several; None for the last.
+    :param scored: whether vehicles are scored, which takes most of the time.
     :raises InputError: if one cannot be read, or is given twice.
     """
     ids: dict[str, Path] = {}
@@ -63,13 +65,17 @@ def tabulated_runs(paths: Sequence[Path], epoch: int | None,
         if place in taken:
             raise InputError('this run is given twice', str(path), 'give each run once')
         taken.add(place)
-        run.id = _own(run.id, ids)
+        run.id, run.scored = own_id(run.id, ids), scored
         ids[run.id] = path
         yield run
 
 
-def _own(name: str, taken: Iterable[str]) -> str:
-    """Give an id that no other run has: folders in different places may be named alike."""
+def own_id(name: str, taken: Iterable[str]) -> str:
+    """
+    Give a run an id that no other has: folders in different places may be named alike.
+
+    :param taken: ids of the others.
+    """
     found, number = name, 1
     while found in taken:
         number += 1

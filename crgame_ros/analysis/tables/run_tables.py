@@ -24,10 +24,12 @@ from crgame_ros.analysis.tables.events_table import EVENT_PARTS, EVENTS
 from crgame_ros.analysis.tables.pairs_table import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.plans_table import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs_table import RUN_PARTS, RUNS
+from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.states_table import state_rows, STATES
 from crgame_ros.analysis.tables.table_folder import TableFolder
 from crgame_ros.analysis.tables.table_part import part_rows
-from crgame_ros.analysis.tables.table_writer import Format, TableWriter
+from crgame_ros.analysis.tables.table_rows import KeptTable, TableRows
+from crgame_ros.analysis.tables.table_writer import Format
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS, VEHICLES
 from crgame_ros.errors import InputError
@@ -54,18 +56,37 @@ def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
     """
     with TableFolder(out, TABLES, file_format, 'tables') as folder:
         for run in runs:
-            try:
-                _add_run(run, folder.writers, progress)
-            except (OverflowError, pa.ArrowInvalid) as error:
-                # Documents of a recording may hold any number.
-                raise InputError(f'a number in it is out of all bounds ({error})', run.id,
-                                 'the recording is damaged; record again') from error
+            _add_run(run, folder.writers, progress)
         return {name: writer.rows for name, writer in folder.writers.items()}
 
 
-def _add_run(run: TabulatedRun, writers: Mapping[str, TableWriter],
+def tables_of(runs: Iterable[TabulatedRun]) -> dict[str, pa.Table]:
+    """
+    Give the tables of runs, by name; memory is that of all of them.
+
+    :param runs: ids must differ.
+    :raises InputError: if a scenario cannot be used.
+    """
+    kept = {table.name: KeptTable(table) for table in TABLES}
+    for run in runs:
+        _add_run(run, kept, lambda _what, _share: None)
+    return {name: each.table for name, each in kept.items()}
+
+
+def _add_run(run: TabulatedRun, writers: Mapping[str, TableRows],
              progress: Callable[[str, float], object]) -> None:
-    """Add the rows of a run to all tables; vehicles and runs come last, for they sum it up."""
+    """Add the rows of a run to all tables."""
+    try:
+        _add_rows(run, writers, progress)
+    except (OverflowError, pa.ArrowInvalid) as error:
+        # Documents of a recording may hold any number.
+        raise InputError(f'a number in it is out of all bounds ({error})', run.id,
+                         'the recording is damaged; record again') from error
+
+
+def _add_rows(run: TabulatedRun, writers: Mapping[str, TableRows],
+              progress: Callable[[str, float], object]) -> None:
+    """Fill tables one after the other; vehicles and runs come last, for they sum it up."""
     for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):
         writers[STATES.name].add(rows)
     write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name],
@@ -74,6 +95,8 @@ def _add_run(run: TabulatedRun, writers: Mapping[str, TableWriter],
         writers[PLANS.name].add(rows)
     progress(f'measuring how people drove in {run.id}', 0.0)
     write_behaviour(run, writers)
+    if run.scored and run.record.log.vehicles:
+        score_vehicles(run, progress=partial(progress, f'scoring {run.id}'))
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         if (values := part_rows(parts, run))['run']:
             writers[table.name].add(values)

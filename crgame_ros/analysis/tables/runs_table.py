@@ -25,6 +25,7 @@ from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.game.objects import Role
 
 UNTIMED = 'its timing was not recorded, as that of an offline run'
+UNTOLD = 'its cycles were not recorded'
 # Of `timing.json`: key, unit there, column, its unit and factor; docs/timing.md defines them.
 _MS = ('s', 1e-3)
 TIMING = {
@@ -63,19 +64,21 @@ def _identity(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
         'avs': [len(game.avs)], 'objects': [len(log.objects)],
         'agents': [sum(item.role is Role.TRAFFIC for item in log.objects)],
         'planners': [json.dumps(planners)], 'events': [len(run.record.fired)],
-        'notices': ['\n'.join((run.timing or {}).get('notices', log.notices))]}
+        'notices': ['\n'.join((*(run.timing or {}).get('notices', log.notices),
+                               *run.remarks))]}
 
 
 def _timing(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
     timing = run.timing
-    if timing is None:
-        return {}
-    return {
+    found: dict[str, Sequence[Any]] = {} if timing is None else {
         **{name: [timing[key] * factor] for key, (name, _, factor, _) in TIMING.items()},
         **{f'real_time_ratio_{key}': [timing['real_time_ratio'][key]] for key in RATIOS},
-        **{key: [timing[key]] for key in COUNTS},
-        'violations': [timing['drivability']['violations']],
-        'contacts': [None if timing['contacts'] is None else len(timing['contacts'])]}
+        **{key: [timing[key]] for key in COUNTS}}
+    if run.outcome is not None:
+        contacts = run.outcome['contacts']
+        found['violations'] = [run.outcome['drivability']['violations']]
+        found['contacts'] = [None if contacts is None else len(contacts)]
+    return found
 
 
 RUN_PARTS = (
@@ -109,7 +112,7 @@ RUN_PARTS = (
                  empty=UNTIMED) for key, what in RATIOS.items()),
         *(Column(key, INTEGER, '1', what, empty=UNTIMED) for key, what in COUNTS.items()),
         Column('violations', INTEGER, '1', 'collisions and departures from the road that began',
-               variant='of all driven vehicles, each as often as it began', empty=UNTIMED),
+               variant='of all driven vehicles, each as often as it began', empty=UNTOLD),
         Column('contacts', INTEGER, '1', 'first contacts of driven vehicles with something',
-               empty=f'{UNTIMED}, or nobody can name them')), _timing))
+               empty=f'{UNTOLD}, or nobody can name them')), _timing))
 RUNS = declare('runs', 'a run', ('run',), RUN_PARTS)

@@ -14,13 +14,13 @@
 # limitations under the License.
 """One table's file, written in pieces: memory is that of a piece, however long the run."""
 
-from collections.abc import Mapping
 import csv
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
 
 from crgame_ros.analysis.tables.column import NUMBER, TableDeclaration, TEXT
+from crgame_ros.analysis.tables.table_rows import TableRows
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -33,7 +33,7 @@ FORMULA_BEGINS, FORMULA_GUARD = ('=', '+', '-', '@', '\t', '\r'), "'"
 NOT_A_NUMBER = 'NaN'
 
 
-class TableWriter:
+class TableWriter(TableRows):
     """
     Writes the rows of one table.
 
@@ -43,12 +43,10 @@ class TableWriter:
     :param declaration: the table.
     :param path: of the file to write.
     :param file_format: Parquet or CSV.
-    :ivar rows: that have been added.
     """
 
     def __init__(self, declaration: TableDeclaration, path: Path, file_format: Format) -> None:
-        self.declaration = declaration
-        self.rows = 0
+        super().__init__(declaration)
         self._kept: list[pa.RecordBatch] = []
         self._kept_rows = 0
         self._csv = self._parquet = None
@@ -59,25 +57,10 @@ class TableWriter:
         else:
             self._parquet = pq.ParquetWriter(path, declaration.schema, compression='zstd')
 
-    def add(self, columns: Mapping[str, Any]) -> None:
-        """
-        Add rows.
-
-        :param columns: values by column: arrays, lists, or a single value for all rows; columns
-            that are not named stay empty.
-        :raises KeyError: if a column is not declared.
-        """
-        unknown = columns.keys() - set(self.declaration.schema.names)
-        if unknown:
-            raise KeyError(f'{self.declaration.name}: no columns {sorted(unknown)}')
-        rows = max((len(values) for values in columns.values() if _are_many(values)), default=1)
-        if not rows:
-            return
-        self._kept.append(pa.RecordBatch.from_arrays(
-            [_array(columns.get(column.name), column.type, rows)
-             for column in self.declaration.columns], schema=self.declaration.schema))
-        self.rows += rows
-        self._kept_rows += rows
+    def take(self, batch: pa.RecordBatch) -> None:
+        """Keep rows until a piece is worth writing."""
+        self._kept.append(batch)
+        self._kept_rows += len(batch)
         if self._kept_rows >= PIECE_ROWS:
             self._write()
 
@@ -112,33 +95,6 @@ class TableWriter:
             self.close()
         else:
             self.release()
-
-
-def _are_many(values: Any) -> bool:
-    return hasattr(values, '__len__') and not isinstance(values, str)
-
-
-def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
-    """Give a column's values in its type; NaN becomes missing."""
-    if values is None:
-        return pa.nulls(rows, kind)
-    if isinstance(values, pa.Array):
-        return values
-    if not _are_many(values):
-        return pa.repeat(pa.scalar(None if values == '' else _plain_text(values), kind), rows)
-    if kind == TEXT:
-        values = [_plain_text(text) if text else None for text in values]
-    return pa.array(values, kind, from_pandas=True)
-
-
-def _plain_text(value: Any) -> Any:
-    """Give text that every reader takes: no control characters but tabs and ends of lines."""
-    if not isinstance(value, str) or value.isprintable():
-        return value
-    text = value.encode('utf-8', 'replace').decode('utf-8')
-    return ''.join(character if character.isprintable() or character in '\t\n\r '
-                   or ord(character) >= 0xa0 else '\N{REPLACEMENT CHARACTER}'
-                   for character in text)
 
 
 def _spelled(column: pa.Array) -> list[Any]:

@@ -22,6 +22,7 @@ from typing import Any
 from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
 from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import VehicleCriticality
+from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.recording.recorded_plans import RecordedPlan
 from crgame_ros.recording.run_record import RunRecord
@@ -48,16 +49,29 @@ class TabulatedRun:
     :param record: how everybody moved, what drivers did, and events.
     :param timing: as `recording.timing_report` gives it; None where nobody measured it.
     :param plans: gives the recorded plans, one by one; None where they were not recorded.
+    :param offline: of an offline run what `offline_outcome` gives; None otherwise.
+    :param scored: whether its vehicles are scored, which takes most of the time.
     :ivar criticality: by vehicle, once `pairs` has been written.
     :ivar tallies: by AV, once `plans` has been written.
+    :ivar scores: by vehicle, once it has been scored.
+    :ivar remarks: what could not be had of it, one line each.
     """
 
     id: str  # noqa: A003
     record: RunRecord
     timing: Mapping[str, Any] | None = None
     plans: Callable[[], Iterable[RecordedPlan]] | None = None
+    offline: Mapping[str, Any] | None = None
+    scored: bool = True
     criticality: dict[str, VehicleCriticality] = field(default_factory=dict)
     tallies: dict[str, PlanTally] = field(default_factory=dict)
+    scores: dict[str, VehicleScores] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Give plans, violations and contacts as `timing.json` has them; None: nobody knows."""
+        return self.timing if self.offline is None else self.offline
 
     @cached_property
     def behaviour(self) -> tuple[DriverBehaviour, ...]:

@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The table of driven vehicles: who drove, how far, and the worst moments."""
+"""The table of driven vehicles: who drove, how far and how well, and the worst moments."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,6 +22,7 @@ from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.tables.behaviour_tables import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.pairs_table import FOOTPRINTS, measure_column
+from crgame_ros.analysis.tables.score_columns import VEHICLE_SCORES
 from crgame_ros.analysis.tables.table_part import declare, TablePart
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman
@@ -99,14 +100,14 @@ def _worst_columns() -> list[Column]:
 
 def _planning(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
     ids = [item.id for item in run.record.log.vehicles]
-    timing = (run.timing or {}).get('planners', {})
+    planners = {} if run.outcome is None else run.outcome['planners']
     tallies = [run.tallies.get(name) for name in ids]
     latencies = [None if tally is None or not tally.latencies_s else tally.latencies_s
                  for tally in tallies]
     return {
         **{f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key:
-           [timing.get(name, {}).get(key) for name in ids] for key in COUNTS},
-        'fallbacks': [timing.get(name, {}).get('fallback') for name in ids],
+           [planners.get(name, {}).get(key) for name in ids] for key in COUNTS},
+        'fallbacks': [planners.get(name, {}).get('fallback') for name in ids],
         'plans': [None if tally is None else tally.answers for tally in tallies],
         'plans_passing': [None if tally is None or tally.checked < tally.answers
                           else tally.passing for tally in tallies],
@@ -159,5 +160,5 @@ VEHICLE_PARTS = (
                variant='interpolated linearly', empty=UNRECORDED),
         Column('latency_max_s', NUMBER, 's', 'greatest latency, that of the first plan included',
                empty=UNRECORDED)), _planning),
-    VEHICLE_BEHAVIOUR)
+    VEHICLE_BEHAVIOUR, VEHICLE_SCORES)
 VEHICLES = declare('vehicles', 'a driven vehicle of a run', ('run', 'id'), VEHICLE_PARTS)

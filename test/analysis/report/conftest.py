@@ -38,7 +38,9 @@ TIMING: dict[str, Any] = {
     'real_time_ratio': {'final': 1.0, 'mean': 1.0, 'min': 0.25},
     'planners': {'av0': {
         'requests': 20, 'accepted': 17, 'refused': 2, 'timed_out': 1, 'skipped': 0, 'fallback': 3,
-        'steps_without_plan': 0, 'last_refusal': '<img src=x onerror=alert(2)>',
+        'realigned': 0, 'plans': 20, 'fallback_reasons': None, 'age_ms': None,
+        'worst_tracking_errors': None, 'steps_without_plan': 0,
+        'last_refusal': '<img src=x onerror=alert(2)>',
         'latency_ms': {'p50': 4.5, 'p99': 9.25, 'max': 11.0}, 'plan_time_ms': None,
         'first_latency_ms': 100.0}},
     'drivability': {'violations': 1, 'list': [

@@ -23,8 +23,11 @@ import re
 
 from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
 from crgame_ros.analysis.report.driving_section import driving_section
+from crgame_ros.analysis.report.planners_section import planners_section
 from crgame_ros.analysis.report.report_page import report_html
 from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
+from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
+from crgame_ros.analysis.scores.score_measures import MEASURES as MEASURES_OF_SCORES
 import numpy as np
 import pytest
 
@@ -233,3 +236,71 @@ def test_how_people_drove_is_told_with_its_variants(page: Page, run: ReportRun) 
     section = driving_section(run)
     assert section is not None and [line.name for line in section.plots[0].lines] == ['hv0']
     assert not av.human
+
+
+def _rows(page: Page, caption: str) -> dict[str, list[str]]:
+    """Give the cells of a table that hold anything, by the names of its rows."""
+    rows: dict[str, list[str]] = {}
+    inside, name = False, ''
+    for path, text in page.texts:
+        if 'caption' in path:
+            inside = text == caption
+        elif inside and 'tbody' in path and 'th' in path:
+            name, rows[text] = text, []
+        elif inside and 'tbody' in path and 'td' in path:
+            rows[name].append(text)
+    return rows
+
+
+def test_how_planners_drove_is_told_in_numbers(page: Page, run: ReportRun) -> None:
+    """The AV first, the human beside it, as the scores have them; why it is not valid."""
+    human, av = run.scores.vehicles
+    assert (human.role, av.planner) == ('human', 'idm')
+    assert 'How planners drove' in page.text_of('h2')
+    rows = _rows(page, 'How planners drove')
+    assert av.nuplan is not None and human.nuplan is not None
+    assert rows['nuPlan score, of 1'] == [f'{av.nuplan.score:.3f}', f'{human.nuplan.score:.3f}']
+    for place, each in enumerate((av, human)):
+        assert each.commonroad is not None and each.goal is not None
+        values = {name: cells[-2:][place] for name, cells in rows.items()}
+        for cost in each.commonroad.costs:
+            assert values[f'CommonRoad cost {cost.name}'] == f'{cost.total:.4g}'
+        assert values['Feasible'] == ('yes' if each.commonroad.feasibility.feasible else 'no')
+        assert values['Distance to the goal at the end'] == f'{each.goal.last_distance:.1f}'
+    # 17 accepted, 3 of them braking, of 20.
+    assert rows['Plans accepted that are no braking plans'] == ['0.700', '–']
+    texts = ' '.join(text for _, text in page.texts)
+    assert 'fails goal_reached' in texts and 'free drive at the speed limit' in texts
+    # Nobody measured ages: there is no row of dashes.
+    assert 'Age of the plan in use, median' not in rows
+    titles = [each.get('title') or '' for each in page.attributes('span')]
+    assert any(title.startswith(MEASURES_OF_SCORES['SM1'].definition) for title in titles)
+
+
+def test_at_the_end_of_a_run_what_takes_long_is_left_out(run: ReportRun) -> None:
+    """No cost, no check; the page names the command that adds them. Without scores it says why."""
+    quick = replace(run, scores=scores_of(run.record, {}, drives_only=True))
+    section = planners_section(quick)
+    assert section is not None and 'crgame report</code> adds them' in section.html
+    rows = _rows(Page(section.html), 'How planners drove')
+    assert 'nuPlan score, of 1' in rows and 'Feasible' not in rows
+    assert not any(name.startswith('CommonRoad') for name in rows)
+    av = run.scores.vehicles[1]
+    assert av.commonroad is not None
+    costs = tuple(replace(cost, total=None, reason='no <i>lane</i>')
+                  for cost in av.commonroad.costs)
+    lost = replace(av, commonroad=replace(av.commonroad, costs=costs))
+    without = planners_section(replace(run, scores=RunScores((lost,))))
+    assert without is not None and 'TR1: <bdi>no &lt;i&gt;lane&lt;/i&gt;</bdi>' in without.html
+    refused = planners_section(replace(run, scores=RunScores((), 'the run: <b>no</b> step')))
+    assert refused is not None and '&lt;b&gt;no&lt;/b&gt; step' in refused.html
+
+
+def test_planners_of_several_runs_stand_side_by_side(run: ReportRun) -> None:
+    """A column for the AV of each run, with its letter."""
+    page = Page(report_html([run, replace(run, key='run2', name='another')]))
+    rows = _rows(page, 'How planners drove, the runs side by side')
+    score = run.scores.vehicles[1].nuplan
+    assert score is not None and rows['nuPlan score, of 1'] == [f'{score.score:.3f}'] * 2
+    heads = [text for path, text in page.texts if 'thead' in path]
+    assert 'A: ' in heads and 'B: ' in heads

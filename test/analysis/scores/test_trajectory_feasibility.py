@@ -26,7 +26,10 @@ from commonroad.planning.goal import GoalRegion
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.state import InitialState, InputState, KSState, PMState
 from commonroad.scenario.trajectory import Trajectory
-from commonroad_dc.feasibility.feasibility_checker import trajectory_feasibility
+from commonroad_dc.feasibility.feasibility_checker import (
+    state_transition_feasibility,
+    trajectory_feasibility,
+)
 from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
 from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility, simulated
 import numpy as np
@@ -130,6 +133,18 @@ def test_point_masses_and_inputs(problem: PlanningProblem) -> None:
     found = check_feasibility(_solution(inputs), problem, DT_S)
     assert found.feasible is False and found.first_step == 3
     assert len(simulated(_solution(inputs), problem, DT_S).state_list) == 4
+
+
+@pytest.mark.parametrize('aside', [0.0, 0.012, 0.019, 0.021, 0.04])
+@pytest.mark.parametrize('along', [0.0, -0.015, 0.025, 0.2])
+def test_the_verdict_is_that_of_the_search(problem: PlanningProblem, aside: float,
+                                           along: float) -> None:
+    """Around the tolerances, where inputs are tried before the checker searches for better."""
+    now, then = _driven(problem)[:2]
+    heading = np.array([np.cos(then.orientation), np.sin(then.orientation)])
+    then.position = then.position + along * heading + aside * np.array([-heading[1], heading[0]])
+    expected, _ = state_transition_feasibility(now, then, VehicleDynamics.KS(KIND), DT_S)
+    assert check_feasibility(_solution([now, then]), problem, DT_S).feasible is expected
 
 
 def test_a_single_state_has_no_transition(problem: PlanningProblem) -> None:

@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What `crgame measure` measures of a run: how critical it was, and how people drove."""
+
+from collections.abc import Callable, Collection
+from typing import Any, NamedTuple
+
+from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.errors import InputError, short
+from crgame_ros.recording.run_record import RunRecord
+
+
+class RunMeasures(NamedTuple):
+    """
+    The measures of a run.
+
+    :param criticality: of all driven vehicles.
+    :param behaviour: of each driven vehicle, in the log's order.
+    """
+
+    criticality: Criticality
+    behaviour: tuple[DriverBehaviour, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Say it as `crgame measure --json` does."""
+        return {**self.criticality.as_dict(),
+                'behaviour': {each.vehicle_id: each.as_dict() for each in self.behaviour}}
+
+
+def measure_run(record: RunRecord, thresholds: Thresholds = USUAL,
+                requests: Collection[str] = (),
+                critical: Callable[[float], object] = lambda _: None,
+                driven: Callable[[float], object] = lambda _: None) -> RunMeasures:
+    """
+    Measure a run.
+
+    :param thresholds: beyond which a value is critical.
+    :param requests: names of the events that ask to take over an AV, as orders of its seat do.
+    :param critical: is told how much of the criticality has been measured, 0 to 1.
+    :param driven: is told the same of how people drove.
+    :raises InputError: if a threshold is not positive, as `check_requests`, or if the run's
+        scenario cannot be used.
+    """
+    thresholds.check()
+    check_requests(record, requests)
+    return RunMeasures(measure_log(record.log, thresholds, critical),
+                       measure_behaviour(record, requests=requests, progress=driven))
+
+
+def check_requests(record: RunRecord, requests: Collection[str], where: str = 'requests') -> None:
+    """
+    Refuse events that a run does not have.
+
+    :param where: name by which the user knows them.
+    :raises InputError: naming the events that it has.
+    """
+    known = [event.name for event in record.log.game.events]
+    for name in requests:
+        if name not in known:
+            raise InputError(f'the run has no event {short(name)}', where,
+                             'it has ' + (', '.join(known) or 'none'))

@@ -1,0 +1,74 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Scores the drives of a run alone: nuPlan's score and plans, without CommonRoad's checker."""
+
+from collections.abc import Mapping
+
+from crgame_ros.analysis.scores.nuplan_score import Expert, NuplanScore, NuplanScorer
+from crgame_ros.analysis.scores.plan_record import PlanRecord
+from crgame_ros.analysis.scores.run_expert import recorded_expert
+from crgame_ros.analysis.scores.scored_drive import drive_of
+from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import Role
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.scenario.loading import parse_scenario
+
+
+def score_drives(log: RunLog, *, expert: Expert | None = None,
+                 plans: Mapping[str, PlanRecord] | None = None) -> tuple[VehicleScores, ...]:
+    """
+    Score how every driven vehicle of a run drove; CommonRoad's tools are not asked.
+
+    :param expert: as for `score_run`.
+    :param plans: as for `score_run`.
+    :raises InputError: if nobody drives in the run.
+    """
+    if not log.vehicles:
+        raise InputError('nobody drives in it', 'the run', 'score a run with a human or an AV')
+    run = _Drives(log, expert)
+    vehicles = []
+    for number, item in enumerate(log.vehicles):
+        av = log.game.av(item.id)
+        nuplan, remarks = run.score(number)
+        vehicles.append(VehicleScores(
+            item.id, 'human' if item.role is Role.HUMAN else 'autonomous',
+            '' if av is None else av.planner, nuplan, None, None, (plans or {}).get(item.id),
+            remarks))
+    return tuple(vehicles)
+
+
+class _Drives:
+    """The drives of one run, on the roads of its scenario."""
+
+    def __init__(self, log: RunLog, expert: Expert | None) -> None:
+        self._log, self._expert = log, expert
+        original = parse_scenario(log.xml_text, '/scenario/xml')
+        self._nuplan = NuplanScorer(original)
+        self._original = ScoredScenario.of_file(original)
+        self._problems = {problem.planning_problem_id: problem
+                          for problem in original.planning_problems}
+
+    def score(self, number: int) -> tuple[NuplanScore | None, tuple[str, ...]]:
+        """Score a vehicle by its number; without a score the remark says why."""
+        av = self._log.game.av(self._log.vehicles[number].id)
+        problem = None if av is None else self._problems.get(av.planning_problem)
+        expert = self._expert or recorded_expert(
+            self._original, problem, int(self._log.ks[0]), len(self._log.ks))
+        try:
+            return self._nuplan.score(drive_of(self._log, number), expert, problem), ()
+        except InputError as error:
+            return None, (f'no nuPlan score: {error}',)

@@ -1,0 +1,107 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How well each vehicle drove, in the table of vehicles: the scores of `crgame score`."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from crgame_ros.analysis.scores.plan_record import plans_of_report
+from crgame_ros.analysis.scores.run_scores import scores_of
+from crgame_ros.analysis.scores.score_measures import MEASURES
+from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER, TEXT
+from crgame_ros.analysis.tables.table_part import TablePart
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+
+NOT_SCORED = 'the run was not scored'
+
+
+class _ScoreColumn(NamedTuple):
+    """
+    The column of a measure.
+
+    :param name: of the column.
+    :param measure: of the scores.
+    :param factor: from the measure's unit to SI.
+    :param median: whether the measure is a spread, of which the median is taken.
+    """
+
+    name: str
+    measure: str
+    factor: float = 1.0
+    median: bool = False
+
+
+# Latencies stand in the plans' own columns.
+_COLUMNS = (
+    _ScoreColumn('score_nuplan', 'nuplan_score'),
+    *(_ScoreColumn(f'score_{name.removesuffix("_m").lower()}', name) for name in MEASURES
+      if name not in ('nuplan_score', 'latency_ms', 'age_ms')),
+    _ScoreColumn('score_age_p50_s', 'age_ms', 1e-3, True))
+
+
+def _declared(column: _ScoreColumn) -> Column:
+    measure = MEASURES[column.measure]
+    flag = not measure.unit
+    return Column(
+        column.name, FLAG if flag else NUMBER, 's' if column.median else measure.unit,
+        f'median {measure.definition}' if column.median else measure.definition,
+        variant=measure.variant,
+        empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
+
+
+def score_vehicles(run: TabulatedRun, *, drives_only: bool = False,
+                   progress: Callable[[float], object] = lambda _: None) -> None:
+    """
+    Score a run, for the table of vehicles; why it cannot be scored is for the table of runs.
+
+    :param drives_only: without CommonRoad's tools, which take most of the time.
+    :param progress: is told how much has been done, 0 to 1.
+    """
+    found = scores_of(run.record, plans_of_report(run.outcome), drives_only=drives_only,
+                      progress=progress)
+    run.scores = {each.vehicle_id: each for each in found.vehicles}
+    if found.refusal:
+        run.remarks.append(f'no scores: {found.refusal}')
+
+
+def _scores(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    found = [run.scores.get(item.id) for item in run.record.log.vehicles]
+    values = [{} if each is None else each.values() for each in found]
+    return {
+        **{column.name: [_value(row.get(column.measure), column) for row in values]
+           for column in _COLUMNS},
+        'score_expert': [None if each is None or each.nuplan is None else each.nuplan.expert
+                         for each in found],
+        'score_failed_checks': [_failed(each) for each in found]}
+
+
+def _value(value: float | None, column: _ScoreColumn) -> float | None:
+    return value if value is None or column.factor == 1.0 else column.factor * value
+
+
+def _failed(scores: VehicleScores | None) -> str | None:
+    if scores is None or scores.commonroad is None:
+        return None
+    return ', '.join(scores.commonroad.checks.failed)
+
+
+VEHICLE_SCORES = TablePart((
+    *map(_declared, _COLUMNS),
+    Column('score_expert', TEXT, '', 'with whose progress it was compared: scores with different '
+           'experts are not comparable', empty=f'{MEASURES["progress"].undefined}, or '
+           f'{NOT_SCORED}'),
+    Column('score_failed_checks', TEXT, '', 'names of the checks of valid_solution that it fails',
+           variant='docs/scores.md', empty=f'all are passed, or {NOT_SCORED}')), _scores)

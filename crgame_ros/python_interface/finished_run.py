@@ -1,0 +1,271 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A run that is over, whoever drove it: what happened, and what is measured of it."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+import warnings
+
+from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.game.documents import GameDocument
+from crgame_ros.python_interface.games import as_path, FileName
+from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.simulation.setup import Setup
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # They take a second to import, and not everybody asks for measures.
+    from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+    from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
+    from crgame_ros.analysis.report.report_run import ReportRun
+    from crgame_ros.analysis.scores.plan_record import PlanRecord
+    from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+    from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+    from crgame_ros.recording.recorded_plans import RecordedPlan
+    import pyarrow as pa
+
+
+class Run(ABC):
+    """
+    A run: everything that is measured is measured when somebody asks for it.
+
+    :ivar name: for people.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    @property
+    @abstractmethod
+    def log(self) -> RunLog:
+        """Tell how everybody moved, at the scenario's time steps."""
+
+    @property
+    @abstractmethod
+    def record(self) -> RunRecord:
+        """Give the log, and what drivers did, and events."""
+
+    @property
+    @abstractmethod
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Give planners, violations and contacts, as `timing.json` has them; None: not known."""
+
+    @property
+    def answers(self) -> 'dict[str, PlanRecord]':
+        """Tell what planners answered, by AV, as far as it is known."""
+        from crgame_ros.analysis.scores.plan_record import plans_of_report
+        return plans_of_report(self.outcome)
+
+    @property
+    def contacts(self) -> list[dict[str, Any]] | None:
+        """Give the first contacts, as `timing.json` has them; None where nobody knows."""
+        return None if self.outcome is None else self.outcome['contacts']
+
+    @property
+    def violations(self) -> list[dict[str, Any]] | None:
+        """Give what was violated, as `timing.json` has it; None where nobody knows."""
+        return None if self.outcome is None else self.outcome['drivability']['list']
+
+    @property
+    @abstractmethod
+    def notices(self) -> tuple[str, ...]:
+        """Tell what is to be known of it, one line each."""
+
+    @property
+    def state_hash(self) -> str | None:
+        """Give the SHA-256 over all states of an offline run; None of a recording."""
+        return None
+
+    @property
+    def timing(self) -> Mapping[str, Any] | None:
+        """Tell what `timing.json` says; None of an offline run, or without recorded cycles."""
+        return None
+
+    @property
+    def bag(self) -> Path | None:
+        """Name its recording; None of an offline run."""
+        return None
+
+    @property
+    def game(self) -> GameDocument:
+        """Give the game as it was run."""
+        return self.log.game
+
+    @property
+    def vehicles(self) -> tuple[str, ...]:
+        """Give the ids of the driven vehicles: humans, then AVs."""
+        return tuple(item.id for item in self.log.vehicles)
+
+    @property
+    def duration_s(self) -> float:
+        """Tell how long it lasted, on the scenario's time line [s]."""
+        return float((len(self.log.ks) - 1) * self.game.scheduler.time_step_s)
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Give the times of the scenario steps of the log since the run's start (K) [s]."""
+        scheduler = self.game.scheduler
+        return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
+
+    def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
+        """
+        Give the rear-axle states (K, 8) of a driven vehicle, columns as in `StateColumn`.
+
+        :raises KeyError: if it takes no part.
+        """
+        if vehicle_id not in self.vehicles:
+            raise KeyError(vehicle_id)
+        return self.log.vehicle_states[:, self.vehicles.index(vehicle_id)]
+
+    @property
+    def _offline(self) -> Mapping[str, Any] | None:
+        return self.outcome if self.timing is None else None
+
+    @abstractmethod
+    def setup_against(self, planner: str) -> Setup:
+        """Give the same game with another planner, to drive its humans again."""
+
+    @abstractmethod
+    def recorded_inputs(self) -> RecordedInputs | None:
+        """Give what its humans did; None where the setup names the recording that has it."""
+
+    @abstractmethod
+    def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
+        """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
+
+    def recorded_plans(self) -> 'Callable[[], Iterable[RecordedPlan]] | None':
+        """Give what reads the recorded plans one by one; None where nobody keeps them."""
+        return None
+
+    @cached_property
+    def usual_criticality(self) -> 'Criticality':
+        """Measure its criticality by the usual thresholds."""
+        from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+        return measure_log(self.log)
+
+    def criticality(self, thresholds: Thresholds = USUAL) -> 'dict[str, VehicleCriticality]':
+        """
+        Measure how critical it was, by vehicle (docs/criticality.md).
+
+        :raises InputError: if a threshold is not positive.
+        """
+        from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+        thresholds.check()
+        found = self.usual_criticality if thresholds == USUAL else measure_log(
+            self.log, thresholds)
+        return {each.vehicle_id: each for each in found.report()}
+
+    def behaviour(self, requests: Collection[str] = ()) -> 'dict[str, DriverBehaviour]':
+        """
+        Measure how each vehicle was driven (docs/behaviour.md).
+
+        :param requests: names of the events that ask to take over an AV.
+        :raises InputError: if the run has no such event.
+        """
+        from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+        from crgame_ros.analysis.run_measures import check_requests
+        check_requests(self.record, requests)
+        return {each.vehicle_id: each
+                for each in measure_behaviour(self.record, requests=requests)}
+
+    def scores(self, expert: 'Run | None' = None) -> 'dict[str, VehicleScores]':
+        """
+        Score who drove, by vehicle (docs/scores.md).
+
+        :param expert: run whose first human's progress is the measure.
+        :raises InputError: if nobody drives in it, or it cannot be exported.
+        """
+        from crgame_ros.analysis.scores.run_expert import expert_of_run
+        from crgame_ros.analysis.scores.scored_run import score_run
+        measure = None if expert is None else expert_of_run(expert.log, self.log, expert.name)
+        found = score_run(self.record, expert=measure, plans=self.answers)
+        return {each.vehicle_id: each for each in found.vehicles}
+
+    def tables(self, scores: bool = True) -> 'dict[str, pa.Table]':
+        """
+        Give its tables by name: runs, vehicles, states, pairs and so on (docs/tables.md).
+
+        :param scores: whether vehicles are scored, which takes most of the time.
+        """
+        from crgame_ros.analysis.tables.run_tables import tables_of
+        return tables_of([self.tabulated(scores)])
+
+    def tabulated(self, scores: bool = True) -> 'TabulatedRun':
+        """Give it as tables want it."""
+        from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+        return TabulatedRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
+                            self.recorded_plans(), self._offline, scores)
+
+    def reported(self, key: str = 'run1') -> 'ReportRun':
+        """
+        Give it as reports want it.
+
+        :param key: tells it from others of a report.
+        """
+        from crgame_ros.analysis.report.report_run import measured_run
+        return replace(measured_run(self.name, self.bag, self.record, self.timing,
+                                    notices=self.notices, offline=self._offline), key=key)
+
+    def report(self, path: FileName) -> Path:
+        """
+        Write one HTML file that tells of it (docs/report.md).
+
+        :raises InputError: if the file cannot be written.
+        """
+        from crgame_ros.analysis.report.report_file import check_report_path, write_report
+        file = as_path(path, 'path')
+        check_report_path(file)
+        write_report([self.reported()], file)
+        return file
+
+    def save_scenario(self, path: FileName) -> Path:
+        """
+        Write it as a CommonRoad scenario; what that cannot express is a warning.
+
+        :param path: file (`*.xml`), or folder for `<benchmark id>.xml`.
+        :return: the file.
+        :raises InputError: if it cannot be written, or is no exported run.
+        """
+        from crgame_ros.recording.export import prepare_folder
+        out = as_path(path, 'path')
+        prepare_folder(out)
+        file, notices = self.exported(out)
+        warn_of(notices)
+        return file
+
+    @abstractmethod
+    def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
+        """Write the scenario; give its file, and what it does not express."""
+
+    def __repr__(self) -> str:
+        who = ', '.join((*(item.id for item in self.game.humans),
+                         *(f'{item.id} ({item.planner})' for item in self.game.avs)))
+        return f'<{type(self).__name__} {self.name}: {who or "nobody"}, {self.duration_s:.1f} s>'
+
+    def _repr_html_(self) -> str:
+        from crgame_ros.python_interface.run_html import run_html
+        return run_html(self)
+
+
+def warn_of(notices: Iterable[str]) -> None:
+    """Let notebooks show remarks."""
+    for notice in notices:
+        warnings.warn(notice, stacklevel=3)

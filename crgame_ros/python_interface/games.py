@@ -1,0 +1,65 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Games, from files or as they are given."""
+
+from os import fspath, PathLike
+from pathlib import Path
+from typing import TypeAlias
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.game import game_file
+from crgame_ros.game.game import Game
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_game
+from crgame_ros.paths import default_game
+
+FileName: TypeAlias = str | PathLike[str]
+
+
+def load_game(path: FileName) -> Game:
+    """
+    Read a game file (YAML), or make a game of a CommonRoad scenario (XML) as `--scenario` does.
+
+    `dataclasses.replace` changes what a game says.
+
+    :raises InputError: naming the file, the key and the remedy.
+    """
+    file = as_path(path, 'game')
+    if file.suffix.lower() == '.xml':
+        return effective_game(RunRequest(scenario=file))
+    return game_file.load_game(file)
+
+
+def as_game(game: Game | FileName | None) -> Game:
+    """
+    Give a game, or that of a file; None is the cut-in.
+
+    :raises InputError: as `load_game`.
+    """
+    if isinstance(game, Game):
+        return game
+    return load_game(default_game() if game is None else game)
+
+
+def as_path(path: object, where: str) -> Path:
+    """
+    Give a path.
+
+    :param where: name of the argument.
+    :raises InputError: if it is none.
+    """
+    if isinstance(path, str | PathLike) and isinstance(text := fspath(path), str) and text:
+        return Path(text).expanduser()
+    raise InputError(f'is {short(path)}', where, 'give the name of a file or folder')

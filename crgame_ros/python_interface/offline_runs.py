@@ -1,0 +1,183 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Driving a game as fast as it goes, without ROS."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+import time
+from typing import Any
+
+from crgame_ros.driver.source import parse_source
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import Game
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_setup, with_planners
+from crgame_ros.planner.planner_registry import PLANNERS
+from crgame_ros.python_interface.argument_names import argument_names
+from crgame_ros.python_interface.finished_run import Run
+from crgame_ros.python_interface.games import as_game, FileName
+from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
+from crgame_ros.python_interface.run_summary import run_summary
+from crgame_ros.recording.export import scenario_path, write_scenario
+from crgame_ros.recording.offline_outcome import offline_outcome
+from crgame_ros.recording.recorded_inputs import (
+    inputs_of,
+    recorded_inputs,
+    RecordedInputs,
+    with_recorded_events,
+)
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_record import run_record_of, RunRecord
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import Setup
+import numpy as np
+from numpy.typing import NDArray
+
+
+class OfflineRun(Run):
+    """
+    A run that was driven on a virtual clock.
+
+    :ivar result: states of every simulation step, commands, events and violations.
+    :ivar wall_s: how long it took [s]
+    """
+
+    def __init__(self, name: str, result: OfflineResult, wall_s: float) -> None:
+        super().__init__(name)
+        self.result = result
+        self.wall_s = wall_s
+
+    @cached_property
+    def record(self) -> RunRecord:
+        """Give the log, and what drivers did, and events."""
+        return run_record_of(self.result)
+
+    @property
+    def log(self) -> RunLog:
+        """Tell how everybody moved, at the scenario's time steps."""
+        return self.record.log
+
+    @property
+    def state_hash(self) -> str:
+        """Give the SHA-256 over all states: equal for equal inputs."""
+        return self.result.state_hash
+
+    @cached_property
+    def outcome(self) -> Mapping[str, Any]:
+        """Give planners, violations and contacts, as `timing.json` has them."""
+        return offline_outcome(self.result)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Tell what is to be known of the game, one line each."""
+        return self.result.setup.notices
+
+    def summary(self) -> dict[str, Any]:
+        """Say what came of it, as `crgame offline` does."""
+        return run_summary(self.result, self.wall_s)
+
+    def setup_against(self, planner: str) -> Setup:
+        """Give the same game with another planner, and its events when they were."""
+        setup = self.result.setup
+        repeated = replace(setup, game=with_recorded_events(setup.game, self.result.fired))
+        return with_planners(repeated, (planner,))
+
+    def recorded_inputs(self) -> RecordedInputs:
+        """Give what its humans did."""
+        return inputs_of(self.result)
+
+    def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
+        """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
+        return {name: self.result.states_of(name) for name in self.result.setup.vehicle_ids}
+
+    def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
+        """Write the scenario; give its file, and what it does not express."""
+        found = write_scenario(self.log, out)
+        return scenario_path(out, found.benchmark_id), found.notices
+
+
+def run(game: Game | FileName | None = None, *,
+        planner: PlannerLike | Sequence[PlannerLike] | None = None,
+        options: Mapping[str, Any] | None = None, driver: str | None = None,
+        seed: int | None = None, duration_s: float | None = None, rate_hz: float | None = None,
+        latency_steps: int = 0, triggers: Mapping[str, float] | None = None,
+        problems: Sequence[int] = ()) -> OfflineRun:
+    """
+    Drive a game on a virtual clock, planners in lockstep: equal arguments give equal states.
+
+    :param game: the game, its file, or a CommonRoad scenario; None for the cut-in, or, where the
+        driver is a recording, for its own game.
+    :param planner: for all AVs, or one for each: a name, a class derived from `crgame_ros.Planner`
+        or an object of one; None for those of the game.
+    :param options: keyword arguments of the planner's constructor, instead of the game's.
+    :param driver: of the first human: keys:FILE, joy:FILE, replay:BAG, idle; None: the game's.
+    :param seed: of everything random; None: the game's.
+    :param duration_s: simulated time; None: the game's, else 20 s [s]
+    :param rate_hz: simulation rate; None: the game's [Hz]
+    :param latency_steps: simulation steps between a request and its plan.
+    :param triggers: events of the game to trigger, and when after the start [s]
+    :param problems: planning problems that become AVs, where the game names no AVs.
+    :raises InputError: if something that was given cannot be used.
+    """
+    # With a recorded driver and no game it is the game of the recording.
+    repeats = game is None and driver is not None and parse_source(driver).kind == 'replay'
+    chosen = None if repeats else as_game(game)
+    named = name_planners(planner)
+    request = RunRequest(planners=named.names, driver=driver, duration_s=duration_s,
+                         rate_hz=rate_hz, problems=tuple(problems))
+    if seed is not None:
+        chosen = _seeded(chosen, seed)
+    with argument_names(), PLANNERS.giving(named.own):
+        setup = effective_setup(request, chosen)
+        named.check_objects(len(setup.avs))
+        if options is not None:
+            setup = _with_options(setup, options)
+        name = setup.game.title or setup.loaded.benchmark_id
+        return drive(name, setup, latency_steps, list((triggers or {}).items()))
+
+
+def drive(name: str, setup: Setup, latency_steps: int = 0,
+          triggers: Sequence[tuple[str, float]] = ()) -> OfflineRun:
+    """
+    Drive a setup, with the recorded inputs of humans whose driver is a recording.
+
+    :param name: of the run, for people.
+    :param latency_steps: simulation steps between a request and its plan.
+    :param triggers: names of events, and when each is triggered after the start [s]
+    :raises InputError: as `run_offline`; if the latency is negative.
+    """
+    if latency_steps < 0:
+        raise InputError(f'is {latency_steps}', 'latency', 'give 0 or more steps')
+    drivers, intervals_s = recorded_inputs(setup)
+    steps = [(round(time_s / setup.scheduler.dt_s), event) for event, time_s in triggers]
+    began_s = time.perf_counter()
+    result = run_offline(setup, latency_steps=latency_steps, drivers=drivers,
+                         intervals_s=intervals_s, clock_s=time.perf_counter, triggers=steps)
+    return OfflineRun(name, result, time.perf_counter() - began_s)
+
+
+def _seeded(game: Game | None, seed: int) -> Game:
+    if game is None:
+        raise InputError('the game is that of the recording', 'seed', 'name a game')
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
+        raise InputError(f'is {seed}', 'seed', 'give a whole number from 0 to 2^63 - 1')
+    return replace(game, seed=seed)
+
+
+def _with_options(setup: Setup, options: Mapping[str, Any]) -> Setup:
+    avs = tuple(replace(av, spec=replace(av.spec, options=dict(options))) for av in setup.avs)
+    return replace(setup, avs=avs, game=replace(setup.game, avs=tuple(av.spec for av in avs)))

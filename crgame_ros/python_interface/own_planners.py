@@ -1,0 +1,84 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Planners as Python has them: by name, as classes, or as objects."""
+
+from collections.abc import Sequence
+import inspect
+from typing import Any, NamedTuple, TypeAlias
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.planner.interface import Planner
+
+PlannerLike: TypeAlias = str | type[Planner] | Planner
+
+
+class NamedPlanners(NamedTuple):
+    """
+    Planners under names that a game may have.
+
+    :param names: one for all AVs, or one for each; empty for those of the game.
+    :param own: what the names stand for, of those that are no names of the registry.
+    """
+
+    names: tuple[str, ...]
+    own: dict[str, type[Planner] | Planner]
+
+    def check_objects(self, avs: int) -> None:
+        """
+        Refuse one object for several AVs: what it remembers of one is wrong for another.
+
+        :param avs: their number.
+        """
+        for name in self.names:
+            self.check_object(name, avs if len(self.names) == 1 else self.names.count(name))
+
+    def check_object(self, name: str, avs: int) -> None:
+        """
+        Refuse a planner that is one object for several AVs.
+
+        :param avs: their number.
+        """
+        if avs > 1 and not inspect.isclass(self.own.get(name, type)):
+            raise InputError(f'is one object for {avs} AVs', f'planner {name}',
+                             'give its class, or an object for each')
+
+
+def name_planners(planners: PlannerLike | Sequence[PlannerLike] | None) -> NamedPlanners:
+    """
+    Name planners: a class `module:Class`, as a game file would; objects likewise.
+
+    :raises InputError: if something is no planner.
+    """
+    if planners is None:
+        return NamedPlanners((), {})
+    several: Sequence[Any] = planners if isinstance(planners, list | tuple) else [planners]
+    names: list[str] = []
+    own: dict[str, type[Planner] | Planner] = {}
+    for planner in several:
+        if isinstance(planner, str):
+            names.append(planner)
+            continue
+        kind = planner if inspect.isclass(planner) else type(planner)
+        if not issubclass(kind, Planner):
+            raise InputError(f'is {short(planner)}', 'planner', 'give a name, or a class derived '
+                             'from crgame_ros.Planner, or an object of one')
+        whole = wanted = f'{kind.__module__}:{kind.__qualname__}'
+        number = 1
+        while own.get(whole, planner) is not planner:
+            number += 1
+            whole = f'{wanted}#{number}'
+        own[whole] = planner
+        names.append(whole)
+    return NamedPlanners(tuple(names), own)

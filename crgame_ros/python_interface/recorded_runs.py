@@ -1,0 +1,140 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Recordings of runs, as objects of the same kind as offline runs."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_setup
+from crgame_ros.python_interface.finished_run import Run
+from crgame_ros.python_interface.games import as_path, FileName
+from crgame_ros.recording.conversion import convert_log
+from crgame_ros.recording.recorded_game import read_game_document
+from crgame_ros.recording.recorded_plans import read_plans, RecordedPlan
+from crgame_ros.recording.recorded_states import recorded_states
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_log import read_run_log, RunLog
+from crgame_ros.recording.run_record import record_of_log, RunRecord
+from crgame_ros.recording.timing_report import timing_report
+from crgame_ros.simulation.setup import Setup
+import numpy as np
+from numpy.typing import NDArray
+
+
+class RecordedRun(Run):
+    """
+    A run in a recording: ours or of `ros2 bag record`.
+
+    :param name: for people.
+    :param bag: the recording.
+    :param log: the run in it.
+    """
+
+    def __init__(self, name: str, bag: Path, log: RunLog) -> None:
+        super().__init__(name)
+        self._bag, self._log = bag, log
+
+    @property
+    def bag(self) -> Path:
+        """Name its recording."""
+        return self._bag
+
+    @property
+    def log(self) -> RunLog:
+        """Tell how everybody moved, at the scenario's time steps."""
+        return self._log
+
+    @cached_property
+    def record(self) -> RunRecord:
+        """Give the log, and what drivers did, and events."""
+        return record_of_log(self._bag, self._log)
+
+    @cached_property
+    def _timed(self) -> tuple[Mapping[str, Any] | None, tuple[str, ...]]:
+        """Tell what `timing.json` says, or why nothing does."""
+        try:
+            return timing_report(self._bag, self.game.epoch, self._log), ()
+        except CrgameError as error:
+            return None, (str(error),)
+
+    @property
+    def timing(self) -> Mapping[str, Any] | None:
+        """Tell what `timing.json` says; None of a recording without cycles."""
+        return self._timed[0]
+
+    @property
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Give planners, violations and contacts; None of a recording without cycles."""
+        return self.timing
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Tell what of the run is not in the recording, one line each."""
+        timing, refusal = self._timed
+        told = () if timing is None else timing['notices']
+        return tuple(dict.fromkeys((*told, *self._log.notices, *refusal)))
+
+    def setup_against(self, planner: str) -> Setup:
+        """
+        Give the recorded game, driven by the recording, with another planner.
+
+        :raises InputError: if the recording lacks its game, or holds a later run.
+        """
+        if read_game_document(self._bag).epoch != self.game.epoch:
+            raise InputError('is not the last run of its recording', str(self._bag),
+                             'only the last one can be driven again')
+        return effective_setup(RunRequest(driver=f'replay:{self._bag}', planners=(planner,)))
+
+    def recorded_inputs(self) -> None:
+        """Give nothing: the setup names the recording."""
+
+    def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
+        """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
+        return recorded_states(self._bag, self.game.epoch)
+
+    def recorded_plans(self) -> Callable[[], Iterable[RecordedPlan]]:
+        """Give what reads the recorded plans one by one."""
+        return partial(read_plans, self._bag, self.game.epoch)
+
+    def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
+        """Write the scenario; give its file, and what it does not express."""
+        found = convert_log(self._log, self._bag, out)
+        return found.path, found.notices
+
+
+def read_run(path: FileName, epoch: int | None = None) -> RecordedRun:
+    """
+    Read a run from its folder, or from a recording.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if it cannot be read.
+    """
+    from crgame_ros.analysis.tables.recorded_run import run_name
+    place = as_path(path, 'run')
+    bag = recording_in(place)
+    return RecordedRun(run_name(place), bag, read_run_log(bag, epoch))
+
+
+def as_run(run: Run | FileName) -> Run:
+    """
+    Give a run, or that in a folder.
+
+    :raises InputError: as `read_run`.
+    """
+    return run if isinstance(run, Run) else read_run(run)

@@ -1,0 +1,112 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The human of a run again, against other planners."""
+
+from collections.abc import Sequence
+import time
+from typing import Literal, TYPE_CHECKING
+
+from crgame_ros.analysis.counterfactual import Alternative, drive_against
+from crgame_ros.errors import InputError
+from crgame_ros.planner.planner_registry import PLANNERS
+from crgame_ros.python_interface.argument_names import argument_names
+from crgame_ros.python_interface.finished_run import Run
+from crgame_ros.python_interface.games import FileName
+from crgame_ros.python_interface.offline_runs import OfflineRun
+from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
+from crgame_ros.python_interface.recorded_runs import as_run
+
+if TYPE_CHECKING:
+    from crgame_ros.simulation.offline import OfflineResult
+
+
+class ReplayedRun(OfflineRun):
+    """
+    A run of a recorded human against a planner.
+
+    :ivar alternative: it beside the recorded run.
+    """
+
+    def __init__(self, name: str, alternative: Alternative, result: 'OfflineResult',
+                 wall_s: float) -> None:
+        super().__init__(name, result, wall_s)
+        self.alternative = alternative
+
+    @property
+    def human_differs_s(self) -> float | None:
+        """When a human first is elsewhere than in the recorded run; None: never [s]."""
+        return self.alternative.human_differs_s
+
+    @property
+    def others_differ_s(self) -> float | None:
+        """When anybody but the driven vehicles first is; None: never [s]."""
+        return self.alternative.others_differ_s
+
+
+class Replays(dict[str, ReplayedRun]):
+    """
+    Runs by the names of their planners, in the order in which they were asked for.
+
+    :ivar recorded: the run whose human drives.
+    """
+
+    def __init__(self, recorded: Run) -> None:
+        super().__init__()
+        self.recorded = recorded
+
+    def _repr_html_(self) -> str:
+        from crgame_ros.python_interface.run_html import replays_html
+        return replays_html(self.recorded.usual_criticality,
+                            [each.alternative for each in self.values()])
+
+
+def replay(run: Run | FileName, planners: PlannerLike | Sequence[PlannerLike], *,
+           latency_steps: int = 0,
+           human: Literal['inputs', 'trajectory'] = 'inputs') -> Replays:
+    """
+    Drive the humans of a run again, against one planner after the other, as `crgame replay` does.
+
+    :param run: an offline or a recorded run, or the folder of one.
+    :param planners: names, classes or objects; each drives all AVs in a run of its own.
+    :param latency_steps: simulation steps between a request and its plan.
+    :param human: what of the humans is repeated: what they did, or where they were.
+    :raises InputError: if the run has no human and an AV, or a planner cannot be used.
+    """
+    recorded = as_run(run)
+    if not recorded.game.humans or not recorded.game.avs:
+        raise InputError('has no human and an AV', recorded.name,
+                         'give a run in which both drive')
+    if latency_steps < 0:
+        raise InputError(f'is {latency_steps}', 'latency_steps', 'give 0 or more steps')
+    if human not in ('inputs', 'trajectory'):
+        raise InputError(f'is {human!r}', 'human', 'give "inputs" or "trajectory"')
+    named = name_planners(planners)
+    found = Replays(recorded)
+    with argument_names(), PLANNERS.giving(named.own):
+        # Every planner is known before the first of them drives.
+        setups = {name: recorded.setup_against(name) for name in named.names}
+        for name in setups:
+            PLANNERS.find(name)
+        for name, setup in setups.items():
+            named.check_object(name, len(setup.avs))
+            began_s = time.perf_counter()
+            alternative = drive_against(
+                name, setup, recorded.log, latency_steps,
+                recorded.recorded_traces() if human == 'trajectory' else None,
+                recorded.recorded_inputs())
+            assert alternative.result is not None
+            found[name] = ReplayedRun(f'{recorded.name} against {name}', alternative,
+                                      alternative.result, time.perf_counter() - began_s)
+    return found

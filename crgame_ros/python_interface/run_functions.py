@@ -1,0 +1,97 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What is made of one run or of several: measures, reports and tables."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.analysis.run_measures import measure_run, RunMeasures
+from crgame_ros.errors import InputError
+from crgame_ros.python_interface.finished_run import Run
+from crgame_ros.python_interface.games import as_path, FileName
+from crgame_ros.python_interface.recorded_runs import as_run
+
+
+def measure(run: Run | FileName, *, thresholds: Thresholds = USUAL,
+            requests: Collection[str] = ()) -> RunMeasures:
+    """
+    Measure how critical a run was and how people drove, as `crgame measure` does.
+
+    :param run: the run, or its folder.
+    :param thresholds: beyond which a value is critical.
+    :param requests: names of the events that ask to take over an AV.
+    :raises InputError: if the run cannot be read, a threshold is not positive, or an event is
+        unknown.
+    """
+    return measure_run(as_run(run).record, thresholds, requests)
+
+
+def report(runs: Run | FileName | Sequence[Run | FileName], path: FileName) -> Path:
+    """
+    Write one HTML file that tells of a run, or of several side by side, as `crgame report` does.
+
+    :param runs: runs, or their folders.
+    :return: the file.
+    :raises InputError: if a run cannot be read, there are too many, or the file cannot be written.
+    """
+    from crgame_ros.analysis.report.report_file import (
+        check_report_path,
+        check_report_runs,
+        write_report,
+    )
+    file = as_path(path, 'path')
+    check_report_path(file)
+    several = _several(runs)
+    check_report_runs(len(several))
+    write_report([each.reported(f'run{number}') for number, each in enumerate(several, 1)], file)
+    return file
+
+
+def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
+           to: str = 'parquet', scores: bool = True) -> Path:
+    """
+    Write the tables of runs and their data dictionary into a folder, as `crgame export` does.
+
+    :param runs: runs, or their folders; ids in the tables are told apart.
+    :param to: format of the tables, `parquet` or `csv`.
+    :param scores: whether vehicles are scored, which takes most of the time.
+    :return: the folder.
+    :raises InputError: if a run cannot be read, or the folder not be written.
+    """
+    from crgame_ros.analysis.tables.recorded_run import own_id
+    from crgame_ros.analysis.tables.run_tables import write_tables
+    from crgame_ros.analysis.tables.table_writer import FORMATS
+    out = as_path(folder, 'folder')
+    file_format = next((name for name in FORMATS if name == to), None)
+    if file_format is None:
+        raise InputError(f'is "{to}"', 'to', f'give one of {", ".join(FORMATS)}')
+    tabulated, ids = [], set[str]()
+    for each in _several(runs):
+        found = each.tabulated(scores)
+        name = own_id(found.id, ids)
+        ids.add(name)
+        tabulated.append(replace(found, id=name))
+    write_tables(tabulated, out, file_format)
+    return out
+
+
+def _several(runs: Run | FileName | Sequence[Run | FileName]) -> list[Run]:
+    if isinstance(runs, list | tuple):
+        if not runs:
+            raise InputError('there is none', 'runs', 'give one run or more')
+        return [as_run(each) for each in runs]
+    return [as_run(runs)]  # type: ignore[arg-type]

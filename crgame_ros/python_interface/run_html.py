@@ -1,0 +1,76 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A run, or a comparison, as a notebook shows it."""
+
+from collections.abc import Iterator, Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+from crgame_ros.analysis.counterfactual import Alternative
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.pictures.critical_moments import critical_moments, Touch
+from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.replay_rows import HEAD, replay_rows
+from crgame_ros.analysis.report.moment_image import moment_image
+from crgame_ros.analysis.report.report_text import free, NOTHING, number, share, table
+from crgame_ros.vehicle.state import StateColumn
+
+if TYPE_CHECKING:
+    from crgame_ros.python_interface.finished_run import Run
+
+_HEAD = ('', 'driven by', 'greatest speed [m/s]', 'least TTC [s]', 'least distance [m]',
+         'contacts', 'plans accepted')
+
+
+def run_html(run: 'Run') -> str:
+    """Show a run: its most critical moment from above, and a row for each driven vehicle."""
+    caption = (f'{free(run.name)}: {free(run.game.benchmark_id)}, {number(run.duration_s, 1)} s'
+               + (f', states {run.state_hash[:12]}…' if run.state_hash else ''))
+    return f'<div>{_picture(run)}{table(caption, _HEAD, _rows(run))}</div>'
+
+
+def replays_html(recorded: Criticality, alternatives: Sequence[Alternative]) -> str:
+    """Show runs of one human against several planners, below the recorded one."""
+    found = [{'planner': 'recorded', 'criticality': recorded.as_dict()},
+             *(each.as_dict() for each in alternatives)]
+    rows = [tuple(map(escape, row)) for row in replay_rows(found)]
+    return table('The same human against other planners', HEAD, rows)
+
+
+def _picture(run: 'Run') -> str:
+    if not run.vehicles:
+        return ''
+    touches = [Touch.of(item) for item in run.contacts or () if item['n'] is not None]
+    moments = critical_moments(run.record, run.usual_criticality, touches)
+    if not moments:
+        return ''
+    image = moment_image(FrameScene(run.log), moments[0], run.vehicles)
+    return (f'<figure>{image}<figcaption>{number(moments[0].time_s, 1)} s: '
+            f'{free(moments[0].why)}</figcaption></figure>')
+
+
+def _rows(run: 'Run') -> Iterator[Sequence[str]]:
+    drivers = {item.id: item.driver for item in run.game.humans}
+    drivers |= {item.id: item.planner for item in run.game.avs}
+    for place, (name, found) in enumerate(run.criticality().items()):
+        worst = [found.worst.get(key) for key in ('ttc', 'min_distance')]
+        touched = None if run.contacts is None else sum(
+            name in (item['vehicle'], item['with']) for item in run.contacts)
+        answers = run.answers.get(name)
+        yield (free(name), free(drivers[name]),
+               number(float(run.log.vehicle_states[:, place, StateColumn.SPEED].max()), 1),
+               *(number(None if each is None else each.value) for each in worst),
+               NOTHING if touched is None else str(touched),
+               NOTHING if answers is None else share(answers.accepted_share, 1.0))

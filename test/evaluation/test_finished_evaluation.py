@@ -1,0 +1,54 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Evaluations from Python: the same cells as runs of their own."""
+
+from pathlib import Path
+
+import crgame_ros
+import pytest
+
+GAME = crgame_ros.scenarios_directory() / 'cut_in.yaml'
+PLAN = {'games': [str(GAME)], 'planners': ['constant-velocity'], 'seeds': 2, 'duration': 0.5}
+
+
+def test_cells_are_runs_and_have_scores(tmp_path: Path) -> None:
+    """States are those of `crgame_ros.run`; what is finished is not computed again."""
+    found = crgame_ros.evaluate(PLAN, tmp_path / 'out', computing=crgame_ros.Computing())
+    assert (found.tally.done, found.tally.failed) == (2, 0)
+    cells = {row['seed']: row for row in found.table('cells').to_pylist()}
+    own = crgame_ros.run(GAME, planner='constant-velocity', seed=1, duration_s=0.5)
+    assert cells[1]['state_hash'] == own.state_hash
+    vehicle = next(row for row in found.table('vehicles').to_pylist()
+                   if row['seed'] == 1 and row['vehicle'] == 'av0')
+    scores = own.scores()['av0']
+    assert scores.nuplan is not None and vehicle['score_nuplan'] == scores.nuplan.score
+    assert vehicle['score_accepted_share'] == own.answers['av0'].accepted_share
+    assert vehicle['requests'] == own.answers['av0'].counts['requests']
+    # CommonRoad's tools take too long for thousands of cells.
+    assert vehicle['score_sm1'] is None
+    again = crgame_ros.evaluate(PLAN, tmp_path / 'out', computing=crgame_ros.Computing())
+    assert (again.tally.before, again.tally.done) == (2, 0)
+    with pytest.raises(crgame_ros.InputError, match='give one of cells, vehicles, work'):
+        found.table('states')
+
+
+@pytest.mark.parametrize(('plan', 'said'), [
+    ({'planners': ['idm']}, 'names no games'), (3, 'plan: is 3'),
+    ('missing.yaml', 'missing.yaml')])
+def test_what_is_no_plan_is_an_input_error(plan: object, said: str, tmp_path: Path) -> None:
+    """Before anything is computed."""
+    with pytest.raises(crgame_ros.InputError, match=said):
+        crgame_ros.evaluate(plan, tmp_path / 'out')  # type: ignore[arg-type]
+    assert not (tmp_path / 'out').exists()
