@@ -53,8 +53,8 @@ class SourceSpec:
     A source as the game or the command line names it.
 
     :param kind: auto, cockpit, idle, evdev, keys, joy, replay or policy.
-    :param argument: device name, file or bag, or a policy's file and function; empty for `auto`, `idle`, the best evdev device
-        and the external joy node.
+    :param argument: device name, file or bag, or a policy's file and function; empty for `auto`,
+        `idle`, the best evdev device and the external joy node.
     """
 
     kind: str
@@ -121,6 +121,8 @@ class DriverSource(ABC):
     """
 
     problem: InputError | None = None
+    # Whether what it looks at comes between cycles, too, though it has no descriptor.
+    is_looking = False
 
     @property
     def connected(self) -> bool:
@@ -136,8 +138,8 @@ class DriverSource(ABC):
         :param dt_s: length of a cycle in simulation time [s].
         """
 
-    def see(self, n: int, vehicle_states: 'NDArray[np.float64]',
-            objects: 'ObjectStates | None') -> None:  # noqa: B027 - most sources are blind
+    def see(self, n: int, vehicle_states: 'NDArray[np.float64]',  # noqa: B027 - most are blind
+            objects: 'ObjectStates | None') -> None:
         """
         Look at the world before the command of cycle n is asked for.
 

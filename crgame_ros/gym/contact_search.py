@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Whom a driven vehicle has touched between two ticks: what the drivability monitor says, faster."""
+"""Whom a driven vehicle has touched between two ticks: as the drivability monitor, but faster."""
 
 from collections.abc import Sequence
 

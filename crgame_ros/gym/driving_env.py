@@ -22,6 +22,7 @@ from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.episode_setups import SEEDS
 from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
 import gymnasium
+from gymnasium import spaces
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,7 +43,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
     :raises InputError: if one of them is wrong.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
         'render_modes': ['human', 'rgb_array'], 'render_fps': FRAMES_PER_S}
 
     def __init__(self, seat: str = 'av0', render_mode: str | None = None,
@@ -51,8 +52,10 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         self.experiment = make_experiment((seat,), **keywords)
         self.render_mode = render_mode
         self.agent = AgentGame(self.experiment)
-        self.observation_space = observation_space(self.experiment.observation)
-        self.action_space = action_space(self.experiment.action)
+        self.observation_space: spaces.Dict = observation_space(  # type: ignore[assignment]
+            self.experiment.observation)
+        self.action_space: spaces.Box = action_space(  # type: ignore[assignment]
+            self.experiment.action)
         self._painter: ScenePainter | None = None
         self._viewer: PageViewer | None = None
         self._begun = False
@@ -86,7 +89,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         return (self.agent.observed(0), outcome.reward, outcome.terminated, outcome.truncated,
                 outcome.info)
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Give a picture (H, W, 3) in the mode `rgb_array`; the page shows itself."""
         self._need_begun()
         if self.render_mode != 'rgb_array':

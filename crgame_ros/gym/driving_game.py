@@ -168,8 +168,9 @@ class DrivingGame:
             seat.pilot = None if seat.row < humans else AvPilot(
                 setup, seat.row - humans, self.simulation, seat.view)
             seat.hit, seat.refusal = (), None
-        self._perceiving = [item.perception for item in (*self._planners, *(
-            seat.pilot for seat in self.seats if seat.pilot)) if item.perception is not None]
+        perceptions = [planner.perception for planner in self._planners] + [
+            seat.pilot.perception for seat in self.seats if seat.pilot]
+        self._perceiving = [item for item in perceptions if item is not None]
         if self._perceiving:
             perceive(self.simulation, self._perceiving)
         states = stacked(self.simulation.states)

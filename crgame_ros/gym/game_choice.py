@@ -59,7 +59,7 @@ def chosen_game(game: Game | Path | str | None, scenario: Path | str | None,
         chosen = replace(chosen, avs=tuple(
             replace(av, planner=planners[av.id], options={}) if av.id in planners else av
             for av in chosen.avs))
-    known = {item.id for item in (*chosen.humans, *(chosen.avs or ()))}
+    known = {human.id for human in chosen.humans} | {av.id for av in chosen.avs or ()}
     for name in (*drivers, *planners):
         if name not in known:
             raise InputError(f'there is no "{name}" in the game', 'drivers or planners',

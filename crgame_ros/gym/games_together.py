@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Many games of one agent each, stepped together in one process: Gymnasium's vector environment."""
+"""Many games of one agent each, stepped in one process: Gymnasium's vector environment."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -47,7 +47,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     :raises InputError: if one of them is wrong.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
         'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
         'autoreset_mode': AutoresetMode.NEXT_STEP}
 
@@ -70,7 +70,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         self._over = np.zeros(num_envs, dtype=bool)
         self._painter: ScenePainter | None = None
 
-    def reset(self, *, seed: int | Sequence[int | None] | None = None,  # type: ignore[override]
+    def reset(self, *, seed: int | Sequence[int | None] | None = None,
               options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """
         Begin an episode in every game.
@@ -90,7 +90,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         self._over[:] = False
         return self._seen(), infos
 
-    def step(self, actions: NDArray[np.float32]) -> tuple[
+    def step(self, actions: NDArray[np.float32]) -> tuple[  # type: ignore[override]
             Seen, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Drive every game until its next decision; one that is over begins anew instead."""
         begun = self._over.copy()
@@ -112,7 +112,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         self._over = terminated | truncated
         return self._seen(), rewards, terminated, truncated, infos
 
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Give a picture of each game in the mode `rgb_array`."""
         if self.render_mode is None:
             return None
@@ -133,7 +133,8 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         seats = [self._games[index].seats[0] for index in going]
         off = road.are_off_road(np.concatenate([seat.centers for seat in seats]),
                                 seats[0].vehicle.vehicle.shape)
-        return dict(zip(going, off.reshape(len(going), -1).any(axis=1).tolist(), strict=True))
+        by_game = off.reshape(len(going), -1)
+        return {index: bool(row.any()) for index, row in zip(going, by_game, strict=True)}
 
     def _seen(self) -> Seen:
         return observe_together(self._observation, [game.seats[0] for game in self._games])

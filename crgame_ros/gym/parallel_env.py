@@ -47,7 +47,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
     :raises InputError: if one of them is wrong.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {
         'name': 'crgame_v0', 'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
         'is_parallelizable': True}
 

@@ -58,7 +58,8 @@ class Observation:
         self._bounds = spec.bounds()
         self._sizes = np.array([(item.shape.length, item.shape.width) for item in things]
                                ).reshape(-1, 2)
-        self._ahead = spec.route_spacing * np.arange(1, spec.route_points + 1)
+        self._ahead: Array = spec.route_spacing * np.arange(
+            1, spec.route_points + 1, dtype=np.float64)
         self._to_center = vehicle.rear_to_center
         if 'lidar' in spec.parts:
             self._lidar = create_sensor(SensorSpec(
@@ -78,7 +79,7 @@ class Observation:
         :return: by part, (B, …) as in `ObservationSpec.bounds`, within them.
         """
         own = np.array(states, dtype=np.float64)[:, :3]
-        made = {}
+        made: Observed = {}
         for part in self.spec.parts:
             if part == 'state':
                 values = _state(states, places)

@@ -72,6 +72,7 @@ class RouteGuide:
     def __init__(self, scenario: Scenario, problem: PlanningProblem | None, start: VehicleState,
                  vehicle: VehicleParameters) -> None:
         self._scenario, self._problem, self._vehicle = scenario, problem, vehicle
+        self._replanned = False
         self._plan(start)
 
     def restart(self, state: VehicleState) -> None:

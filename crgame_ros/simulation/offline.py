@@ -245,9 +245,10 @@ def perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
 
 def show(simulation: Simulation, result: StepResult, hands: Sequence[DriverSource]) -> None:
     """Let drivers look at the present state, and at everything else in it at a tick."""
-    if hands:
+    looking = [hand for hand in hands if type(hand).see is not DriverSource.see]
+    if looking:
         states = np.reshape(simulation.states, (-1, STATE_WIDTH))
-        for hand in hands:
+        for hand in looking:
             hand.see(simulation.n, states, result.objects)
 
 

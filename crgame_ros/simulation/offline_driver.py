@@ -14,8 +14,8 @@
 # limitations under the License.
 """Drivers that need no person: what the offline runner can put behind the wheel."""
 
-from crgame_ros.driver.source import DriverSource, IdleDriver, parse_source, ScriptedDriver
 from crgame_ros.drivability.monitor import road_transforms
+from crgame_ros.driver.source import DriverSource, IdleDriver, parse_source, ScriptedDriver
 from crgame_ros.errors import InputError
 from crgame_ros.simulation.setup import Setup
 
