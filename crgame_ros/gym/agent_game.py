@@ -20,18 +20,17 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from commonroad.scenario.state import KSState
 from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.analysis.scores.driven_states import is_reached
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game
 from crgame_ros.gym.driving_game import AgentSeat, DrivingGame
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
 from crgame_ros.gym.game_choice import chosen_game
+from crgame_ros.gym.goal_watch import GoalWatch
 from crgame_ros.gym.reward import Decision, Reward, USUAL_REWARD
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
 from crgame_ros.policy.observation import Observation, Observed
-from crgame_ros.policy.observation_spec import FAR, ObservationSpec
+from crgame_ros.policy.observation_spec import ObservationSpec
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.offline import DEFAULT_DURATION_S, observed_run
 from crgame_ros.simulation.setup import AvSetup
@@ -39,8 +38,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 ENDS = ('collision', 'off_road', 'goal')
-# Nobody is at a goal that is farther ahead along his route than this [m].
-_GOAL_NEAR = 200.0
 
 
 @dataclass(frozen=True)
@@ -128,6 +125,9 @@ class AgentGame:
         self._observations = [
             Observation(experiment.observation, seat.vehicle.vehicle, seat.view.things)
             for seat in self.game.seats]
+        self._goals = {seat.id: GoalWatch(
+            seat.vehicle.planning_problem if isinstance(seat.vehicle, AvSetup) else None,
+            seat.vehicle.vehicle.rear_to_center) for seat in self.game.seats}
         self._criticality: Criticality | None = None
 
     @property
@@ -150,14 +150,10 @@ class AgentGame:
         seen = observe_together(self._observations[number], [self.seats[number]])
         return {part: values[0] for part, values in seen.items()}
 
-    def outcomes(self, off_road: Sequence[bool] | None = None) -> list[Outcome]:
-        """
-        Judge the last decision of each agent.
-
-        :param off_road: of each seat, if it is known already.
-        """
-        left = self.game.off_road() if off_road is None else off_road
-        return [self._outcome(seat, off) for seat, off in zip(self.seats, left, strict=True)]
+    def outcomes(self) -> list[Outcome]:
+        """Judge the last decision of each agent."""
+        return [self._outcome(seat, off) for seat, off in zip(
+            self.seats, self.game.off_road(), strict=True)]
 
     def info(self) -> dict[str, Any]:
         """Tell of the episode's beginning."""
@@ -168,7 +164,8 @@ class AgentGame:
         scheduler = game.simulation.scheduler
         measures = None if self._criticality is None else next(
             tick for tick in self._criticality.latest if tick.subject == seat.row)
-        goal = self._at_goal(seat)
+        goal = self._goals[seat.id].is_met(
+            seat.state, scheduler.k(game.simulation.n))
         collision = bool(seat.hit)
         reward, terms = experiment.reward.of(Decision(
             experiment.ticks * scheduler.time_step_s, seat.before[0], seat.state, seat.place,
@@ -180,17 +177,6 @@ class AgentGame:
         if seat.refusal is not None:
             info['refusal'] = seat.refusal
         return Outcome(reward, terminated, time_s >= experiment.duration_s - 1e-9, info)
-
-    def _at_goal(self, seat: AgentSeat) -> bool:
-        """Tell whether an AV's centre, heading, speed and time meet its planning problem."""
-        away = seat.place.goal_distance
-        if not isinstance(seat.vehicle, AvSetup) or _GOAL_NEAR < away < FAR:
-            return False
-        state, scheduler = seat.state, self.game.simulation.scheduler
-        center = state.center(seat.vehicle.vehicle.rear_to_center)
-        return is_reached(seat.vehicle.planning_problem, KSState(
-            time_step=scheduler.k(self.game.simulation.n), position=np.array(center),
-            steering_angle=state.steering_angle, velocity=state.speed, orientation=state.yaw))
 
 
 def observe_together(observation: Observation, seats: Sequence[AgentSeat]) -> Observed:

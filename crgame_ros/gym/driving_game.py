@@ -133,8 +133,11 @@ class DrivingGame:
                 PedalInverse(vehicle.vehicle)))
         self._observers: Sequence[RunObserver] = ()
         self.setup = setup
-        self.road = setup.road if setup.game.drivability.road and setup.network.lanelet_ids \
-            else None
+        self.road = None
+        if setup.game.drivability.road and setup.network.lanelet_ids:
+            self.road = setup.road
+            self.road.prepare([seat.view.own(stacked([item.state for item in setup.vehicles]))[:2]
+                               for seat in self.seats])
 
     @property
     def objects(self) -> ObjectStates:
@@ -203,8 +206,8 @@ class DrivingGame:
         """Tell of each seat whether its vehicle was off the road since the last decision."""
         if self.road is None:
             return [False] * len(self.seats)
-        return [bool(self.road.are_off_road(seat.centers, seat.vehicle.vehicle.shape).any())
-                for seat in self.seats]
+        return [any(self.road.is_off_road(x, y, yaw, seat.vehicle.vehicle.shape)
+                    for x, y, yaw in seat.centers.tolist()) for seat in self.seats]
 
     def _tick(self) -> Array:
         """Drive one scenario step; give the vehicles' centres (T, V, 3) at its steps."""

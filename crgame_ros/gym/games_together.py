@@ -37,8 +37,8 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     """
     The same as so many `DrivingEnv` one after the other, to the last bit.
 
-    The engines move one by one; what all agents see, and who has left the road, is computed for
-    all games at once, and the scenario is loaded once.
+    The engines move one by one; what all agents see is computed for all games at once, and the
+    scenario is loaded once.
 
     :param num_envs: games.
     :param seat: id of the agent's vehicle in each.
@@ -94,11 +94,6 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
             Seen, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Drive every game until its next decision; one that is over begins anew instead."""
         begun = self._over.copy()
-        going = np.flatnonzero(~begun).tolist()
-        for index in going:
-            game = self._games[index]
-            game.act({game.seats[0].id: actions[index]})
-        off_road = self._off_road(going)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), dtype=bool)
         infos: dict[str, Any] = {}
@@ -106,7 +101,8 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
             if begun[index]:
                 infos = self._begin(index, infos)
                 continue
-            outcome = game.outcomes([off_road[index]])[0]
+            game.act({game.seats[0].id: actions[index]})
+            outcome = game.outcomes()[0]
             rewards[index], terminated[index], truncated[index] = outcome[:3]
             infos = self._add_info(infos, outcome.info, index)
         self._over = terminated | truncated
@@ -124,17 +120,6 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         game = self._games[index]
         game.begin(int(self._randoms[index].integers(SEEDS)))
         return self._add_info(infos, game.info(), index)
-
-    def _off_road(self, going: Sequence[int]) -> dict[int, bool]:
-        """Tell which of the games that were driven have an agent off the road."""
-        road = self._games[0].game.road
-        if road is None or not going:
-            return dict.fromkeys(going, False)
-        seats = [self._games[index].seats[0] for index in going]
-        off = road.are_off_road(np.concatenate([seat.centers for seat in seats]),
-                                seats[0].vehicle.vehicle.shape)
-        by_game = off.reshape(len(going), -1)
-        return {index: bool(row.any()) for index, row in zip(going, by_game, strict=True)}
 
     def _seen(self) -> Seen:
         return observe_together(self._observation, [game.seats[0] for game in self._games])
