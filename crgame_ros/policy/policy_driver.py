@@ -19,7 +19,6 @@ from dataclasses import dataclass
 
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.driver.source import DriverSource
-from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.policy.actions import checked_action, pedals, wanted_motion
@@ -28,7 +27,6 @@ from crgame_ros.policy.pedal_inverse import PedalInverse
 from crgame_ros.policy.policy_file import Policy
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.policy.seat_view import SeatView
-from crgame_ros.registry import POLICY
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -76,9 +74,7 @@ class PolicyDriver(DriverSource):
     """
 
     def __init__(self, policy: Policy, seat: DrivenSeat) -> None:
-        if policy.action == 'plan':
-            raise InputError('its actions are plans', f'{seat.id}: driver {POLICY}…',
-                             "name it as an AV's planner, or train it with other actions")
+        policy.check_pedals(seat.id)
         self._policy, self._seat = policy, seat
         self._view = SeatView(seat.row, seat.driven, seat.others, seat.transform)
         self._observation = Observation(policy.spec, seat.vehicle, self._view.things)

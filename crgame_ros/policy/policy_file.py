@@ -51,6 +51,17 @@ class Policy:
     ticks: int = 1
     begin: Callable[[], object] = lambda: None
 
+    def check_pedals(self, seat: str) -> None:
+        """
+        Refuse to drive a human's seat by plans.
+
+        :raises InputError: naming the seat.
+        """
+        if self.action == 'plan':
+            raise InputError('its actions are plans, which no pedals can drive',
+                             f'{seat}: driver {POLICY}…',
+                             "name it as an AV's planner, or train it with other actions")
+
     @property
     def spec(self) -> ObservationSpec:
         """Give what it is told."""
