@@ -136,7 +136,8 @@ def beside(environment: Path, steps: int) -> list[str]:
 
 def together(steps: int) -> list[str]:
     """Measure games one by one and together in one process; a table."""
-    lines = ['| game | one by one [steps/s] | 16 together [steps/s] | ratio |', '|---|---|---|---|']
+    lines = ['| game | one by one [steps/s] | 16 together [steps/s] | ratio |',
+             '|---|---|---|---|']
     for name in ('cut_in', 'merge', 'dense_merge'):
         one = DrivingEnv(game=name, worlds=1)
         many = GamesTogether(GAMES, game=name, worlds=1)

@@ -40,9 +40,9 @@ AT_THE_TOP = {'cli', 'doctor', 'replay_command', 'requirements', 'schema_command
 FOLDERS = (
     LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints', 'occupancy',
     'scripted', 'messages', 'driver', 'timing', 'drivability', 'control', 'planner', 'perception',
-    'traffic', 'simulation', 'recording', 'analysis/criticality', 'analysis/behaviour',
+    'policy', 'traffic', 'simulation', 'recording', 'analysis/criticality', 'analysis/behaviour',
     'analysis/scores', 'analysis/tables', 'analysis/pictures', 'analysis/report', 'analysis',
-    'cockpit', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher',
+    'cockpit', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher',
     'analysis/reproduction', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].

@@ -52,6 +52,8 @@ THIRD_PARTY = {
     'yaml': ('pyyaml', 'python3-yaml'),
     'zstandard': ('zstandard', None),
 }
+# Of extras, and imported only where they are used: the extra, and the pip package.
+OPTIONAL = {'gymnasium': ('gym', 'gymnasium'), 'pettingzoo': ('gym', 'pettingzoo')}
 # Of ROS: each is a package of its own in package.xml; from pip they come together.
 ROS = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy|launch')
 ROS_FROM_PIP = {'ros-jazzy-common-interfaces', 'ros-jazzy-rclpy'}
@@ -77,7 +79,8 @@ def _imported() -> Iterator[str]:
 @pytest.fixture(scope='module')
 def imported() -> set[str]:
     """Give what is imported beyond Python and the package itself."""
-    return set(_imported()) - sys.stdlib_module_names - {'crgame_ros', 'ros_wheels_bootstrapper'}
+    return set(_imported()) - sys.stdlib_module_names - {'crgame_ros', 'ros_wheels_bootstrapper'} \
+        - OPTIONAL.keys()
 
 
 def _strings(node: ast.expr, names: dict[str, str]) -> str:
@@ -85,7 +88,7 @@ def _strings(node: ast.expr, names: dict[str, str]) -> str:
     return str(eval(compile(ast.Expression(node), 'setup.py', 'eval'), {}, names))
 
 
-def _setup(keyword: str) -> list[str]:
+def _setup(keyword: str, extra: str = 'test') -> list[str]:
     """Read a list of requirements from setup.py without running it."""
     tree = ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8'))
     names = {target.id: node.value.value for node in tree.body
@@ -95,7 +98,9 @@ def _setup(keyword: str) -> list[str]:
                 and isinstance(node.value, ast.Call)
                 and ast.unparse(node.value.func) == 'setup')
     value = next(item.value for item in call.keywords if item.arg == keyword)
-    found = value.values[0] if isinstance(value, ast.Dict) else value
+    found = value if isinstance(value, ast.List) else next(
+        item for key, item in zip(value.keys, value.values, strict=True)
+        if ast.literal_eval(key) == extra)
     assert isinstance(found, ast.List)
     return [_strings(item, names) for item in found.elts]
 
@@ -125,6 +130,14 @@ def test_manifest_names_what_is_imported(imported: set[str]) -> None:
     assert listed == {pip for pip, key in THIRD_PARTY.values() if key is None}
     extra = {canonicalize_name(Requirement(line).name) for line in _setup('extras_require')}
     assert of_tests <= extra
+
+
+def test_extras_name_what_is_imported_where_they_are_used() -> None:
+    """Each optional package is imported somewhere, and its extra brings it."""
+    assert OPTIONAL.keys() <= set(_imported())
+    for extra, pip in OPTIONAL.values():
+        assert pip in {canonicalize_name(Requirement(line).name)
+                       for line in _setup('extras_require', extra)}
 
 
 def test_messages_come_with_the_wheels(imported: set[str]) -> None:

@@ -96,7 +96,7 @@ def make_experiment(
         DEFAULT_DURATION_S if math.isinf(chosen.duration) else chosen.duration)
 
 
-class Outcome(NamedTuple):
+class AgentOutcome(NamedTuple):
     """
     What an agent is told of a decision besides what it sees.
 
@@ -150,7 +150,7 @@ class AgentGame:
         seen = observe_together(self._observations[number], [self.seats[number]])
         return {part: values[0] for part, values in seen.items()}
 
-    def outcomes(self) -> list[Outcome]:
+    def outcomes(self) -> list[AgentOutcome]:
         """Judge the last decision of each agent."""
         return [self._outcome(seat, off) for seat, off in zip(
             self.seats, self.game.off_road(), strict=True)]
@@ -159,7 +159,7 @@ class AgentGame:
         """Tell of the episode's beginning."""
         return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed}
 
-    def _outcome(self, seat: AgentSeat, off_road: bool) -> Outcome:
+    def _outcome(self, seat: AgentSeat, off_road: bool) -> AgentOutcome:
         game, experiment = self.game, self.experiment
         scheduler = game.simulation.scheduler
         measures = None if self._criticality is None else next(
@@ -176,7 +176,7 @@ class AgentGame:
         info = {'time_s': time_s, **happened, 'hit': ','.join(seat.hit), 'terms': terms}
         if seat.refusal is not None:
             info['refusal'] = seat.refusal
-        return Outcome(reward, terminated, time_s >= experiment.duration_s - 1e-9, info)
+        return AgentOutcome(reward, terminated, time_s >= experiment.duration_s - 1e-9, info)
 
 
 def observe_together(observation: Observation, seats: Sequence[AgentSeat]) -> Observed:

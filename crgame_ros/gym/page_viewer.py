@@ -124,6 +124,9 @@ class PageViewer:
         scene = scene_document(setup.loaded, setup.descriptions, document)
         self._status.begin(setup.vehicle_ids)
         self._status.take(Status('sim_node: run', 0, 'running', {}), 0.0)
+        for seat in game.seats:
+            # Not who the game says.
+            scene['drivers' if seat.pilot is None else 'planners'][seat.id] = 'agent'
         self._tell(lambda hub: hub.set_document('scene', scene))
         self._tell(lambda hub: hub.set_document('events', {'fired': []}))
         self._tell(lambda hub: hub.set_document('seats', {'seats': {}}))

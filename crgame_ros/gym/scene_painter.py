@@ -32,7 +32,7 @@ SCALE = 6.0
 # Colours as in the figures: humans warm, AVs cold.
 GROUND, ROAD, LINE = (208, 214, 205), (235, 235, 235), (160, 160, 160)
 AGENT, HUMAN, AV, OBJECT = (0, 158, 115), (213, 94, 0), (0, 114, 178), (140, 140, 140)
-ROUTE = (0, 158, 115)
+ROUTE = (140, 205, 180)
 # Of the route that is shown [m].
 _AHEAD, _STEP = 80.0, 2.0
 

@@ -16,7 +16,6 @@
 
 from collections.abc import Iterator
 import json
-from pathlib import Path
 import shutil
 import subprocess
 import sys
