@@ -17,11 +17,11 @@
 import math
 from typing import NamedTuple
 
-from commonroad.geometry.shape import Shape, ShapeGroup
+from commonroad.geometry.shape import Shape
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.state import KSState
 from crgame_ros.analysis.scores.driven_states import is_reached
-from crgame_ros.scenario.loading import group_outline
+from crgame_ros.policy.route_guide import goal_area
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
@@ -74,5 +74,4 @@ def _gate(goal: object) -> _Gate:
     last = math.inf if time is None else float(getattr(time, 'end', time))
     if not isinstance(position, Shape):
         return _Gate(first, last, -math.inf, -math.inf, math.inf, math.inf)
-    group = position if isinstance(position, ShapeGroup) else ShapeGroup([position])
-    return _Gate(first, last, *group_outline(group).bounds)
+    return _Gate(first, last, *goal_area(position).bounds)

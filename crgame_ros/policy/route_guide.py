@@ -17,6 +17,7 @@
 import math
 from typing import NamedTuple
 
+from commonroad.geometry.shape import Shape, ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.geometry.angles import wrap_pi
@@ -24,9 +25,11 @@ from crgame_ros.planner.reference_path import DrivingPath, plan_driving_path
 from crgame_ros.planner.speed_profile import default_speed, desired_speeds, SLOWEST_DESIRED
 from crgame_ros.policy.observation_spec import FAR
 from crgame_ros.roads.route import goal_lanelets
+from crgame_ros.scenario.loading import group_outline
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
+import shapely
 
 # A path that goes on is planned anew when so little of it is left [m].
 RESERVE = 300.0
@@ -116,17 +119,24 @@ class RouteGuide:
 
 
 def _goal(driving: DrivingPath, problem: PlanningProblem | None) -> float:
-    """Give the arc length at which the goal's lanelet is left at the latest; inf without one."""
+    """Give the arc length at which the route comes to its goal; inf without one."""
     if problem is None or not driving.reaches_goal:
         return math.inf
-    goals = goal_lanelets(driving.roads, problem)
-    spans = [span for lanelet, span in zip(
-        driving.lanelets, driving.lanelet_spans.tolist(), strict=True) if lanelet in goals]
-    if not spans:
-        return math.inf
+    path = driving.path
+    ahead = path.s >= driving.start_s
     for state in problem.goal.state_list:
-        center = getattr(getattr(state, 'position', None), 'center', None)
-        if center is not None:
-            s, _ = driving.path.project(np.array([center[:2]], dtype=np.float64), *spans[0])
-            return float(s[0])
-    return float(spans[0][1])
+        position = getattr(state, 'position', None)
+        if isinstance(position, Shape):
+            inside = shapely.intersects_xy(goal_area(position), *path.points.T)
+            found = np.flatnonzero(ahead & inside)
+            if len(found):
+                return float(path.s[found[0]])
+    goals = goal_lanelets(driving.roads, problem)
+    return min((first for lanelet, (first, _) in zip(
+        driving.lanelets, driving.lanelet_spans.tolist(), strict=True) if lanelet in goals),
+        default=math.inf)
+
+
+def goal_area(position: Shape) -> shapely.Geometry:
+    """Give the area of a goal's position."""
+    return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))

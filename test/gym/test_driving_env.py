@@ -152,20 +152,22 @@ def test_an_episode_ends_by_contact_road_and_time_as_gymnasium_means_it() -> Non
 
 
 def test_the_goal_of_the_planning_problem_ends_an_episode() -> None:
-    # The first planning problem of the crossing ends where its goal's lanelet does.
-    env = DrivingEnv(game='t_junction', duration=60.0, drivers={'hv0': 'idle'},
-                     ends=['goal'])
-    setup = env.agent.game.setup
-    goal = setup.avs[0].planning_problem.goal.state_list[0]
+    env = DrivingEnv(game='t_junction', drivers={'hv0': 'idle'}, reward={'goal': 5.0})
     seen, _ = env.reset(seed=0)
-    for _ in range(600):
-        seen, _, terminated, truncated, info = env.step(follow_lane(seen))
+    distances = []
+    for _ in range(150):
+        distances.append(float(seen['state'][8]))
+        seen, reward, terminated, truncated, info = env.step(follow_lane(seen))
         if terminated or truncated:
             break
-    k = env.agent.game.simulation.scheduler.k(env.agent.game.simulation.n)
-    if goal.time_step.start <= k <= goal.time_step.end:
-        assert info['goal']
-    assert terminated == info['goal']
+    assert (terminated, truncated, info['goal'], reward) == (True, False, True, 5.0)
+    # The vehicle's centre has come into the goal's area; the rear axle is 1.4 m behind it.
+    assert float(seen['state'][8]) < 1.5
+    assert (np.diff(distances) < 0.0).all()
+    position = env.agent.game.setup.avs[0].planning_problem.goal.state_list[0].position
+    state = env.agent.seats[0].state
+    assert position.contains_point(np.array(state.center(1.4227)))
+    assert not position.contains_point(np.array(env.agent.seats[0].before[0].center(1.4227)))
 
 
 def test_rewards_are_what_the_states_say() -> None:
