@@ -85,7 +85,8 @@ def motorway(vehicles: int, rate: int) -> Game:
     # As many come as leave.
     return replace(game, humans=(), duration=20.0,
                    timing=replace(game.timing, rate=float(rate)),
-                   traffic=TrafficSpec(agents=vehicles - 1, flow=22.0 * vehicles))
+                   traffic=TrafficSpec(agents=vehicles - 1, flow=2000.0,
+                                       capacity=vehicles - 1))
 
 
 class Ours:

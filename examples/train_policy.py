@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 WEIGHTS = Path(__file__).with_name('trained_policy.npz')
 OBSERVATION = {'parts': ['state', 'objects'], 'objects': 4}
 REWARD = {'progress': 0.05, 'offset': -0.1, 'heading': -0.5, 'speeding': -0.1, 'jerk': -0.0003,
-          'acceleration': -0.003, 'min_distance': -0.3, 'collision': -30.0, 'off_road': -30.0}
+          'acceleration': -0.003, 'collision': -30.0, 'off_road': -30.0}
 # How the start of the AV varies, so that the drive is not learned by heart.
 VARY = {'speed': 3.0, 'along': 10.0}
 PEDAL, STEERING = 7, 5
@@ -77,7 +77,7 @@ def features(seen: Mapping[str, NDArray[np.float32]]) -> tuple[Array, Array]:
 
 
 def actions(weights: Array, seen: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
-    """Give the actions (B, 2) of policies with weights (B, 12)."""
+    """Let policies with weights (B, 12) decide: (B, 2)."""
     pedal, steering = features(seen)
     chosen = np.stack((np.einsum('...i,...i->...', weights[..., :PEDAL], pedal),
                        np.einsum('...i,...i->...', weights[..., PEDAL:], steering)), axis=-1)

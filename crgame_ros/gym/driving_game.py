@@ -146,7 +146,7 @@ class DrivingGame:
 
     @property
     def time_s(self) -> float:
-        """Simulated time since the start [s]."""
+        """Time of the simulation since the start [s]."""
         return self.simulation.n * self.simulation.scheduler.dt_s
 
     def begin(self, seed: int, observers: Sequence[RunObserver] = ()) -> None:

@@ -91,7 +91,7 @@ class Observation:
                 values = self._ranges(states, poses)
             low, high = self._bounds[part]
             # Rounded last: what is cut must be a bound of the space to the last bit.
-            made[part] = np.clip(values.astype(np.float32), low, high)
+            made[part] = np.minimum(np.maximum(values.astype(np.float32), low), high)
         return made
 
     def _route(self, own: Array, places: Sequence[RoutePlace],

@@ -15,6 +15,7 @@
 """The example: it trains a policy, which then drives in a run of the game."""
 
 from dataclasses import replace
+import os
 from pathlib import Path
 import shutil
 import subprocess
@@ -32,14 +33,14 @@ def test_a_few_generations_drive_better_and_then_drive_the_av(tmp_path: Path) ->
     example = tmp_path / 'train_policy.py'
     shutil.copy(ROOT / 'examples' / 'train_policy.py', example)
     done = subprocess.run(
-        [sys.executable, example, '--generations', '4', '--population', '10'], cwd=ROOT,
-        capture_output=True, text=True)
+        [sys.executable, example, '--generations', '3', '--population', '8'],
+        env=os.environ | {'PYTHONPATH': str(ROOT)}, capture_output=True, text=True)
     # Exit code 1 says that a drive from a new start ended badly, as it may after so little.
     assert done.returncode in (0, 1), done.stderr
     means = [float(line.rpartition(' ')[2]) for line in done.stdout.splitlines()
              if line.startswith('generation')]
-    assert len(means) == 4
-    assert max(means[2:]) > means[0]
+    assert len(means) == 3
+    assert max(means[1:]) > means[0]
     assert np.load(tmp_path / 'trained_policy.npz')['weights'].shape == (12,)
     game = load_game(ROOT / 'scenarios' / 'cut_in.yaml')
     assert game.avs is not None

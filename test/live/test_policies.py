@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -43,8 +44,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Launcher]:
     folder = tmp_path_factory.mktemp('policy')
     example = folder / 'train_policy.py'
     shutil.copy(ROOT / 'examples' / 'train_policy.py', example)
-    subprocess.run([sys.executable, example, '--generations', '2', '--population', '6'],
-                   cwd=ROOT, capture_output=True)
+    subprocess.run([sys.executable, example, '--generations', '1', '--population', '4'],
+                   env=os.environ | {'PYTHONPATH': str(ROOT)}, capture_output=True)
     (folder / 'driver.py').write_text(DRIVER)
     # One line in a game file each.
     game = CUT_IN.read_text().replace('planner: idm', 'planner: policy:train_policy.py:load') \
