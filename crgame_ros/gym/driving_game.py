@@ -25,6 +25,7 @@ from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.gym.av_pilot import AvPilot, stacked
 from crgame_ros.gym.contact_search import ContactSearch
 from crgame_ros.gym.episode_setups import EpisodeSetups
+from crgame_ros.planner.road_limit import TOLERANCE
 from crgame_ros.policy.actions import (
     ActionKind,
     checked_action,
@@ -35,6 +36,7 @@ from crgame_ros.policy.actions import (
 from crgame_ros.policy.pedal_inverse import PedalInverse
 from crgame_ros.policy.route_guide import RouteGuide, RoutePlace
 from crgame_ros.policy.seat_view import SeatView, Surrounded
+from crgame_ros.roads.road_boundary import RoadBoundary
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import RunObserver
 from crgame_ros.simulation.offline import perceive, PlannerSeat, show
@@ -68,6 +70,7 @@ class AgentSeat:
     :param centers: (T, 3) of its footprint on the road at the steps since the last decision
     :param hit: ids of whom it has touched since then.
     :param refusal: why the engine has refused its plan; None if it has not.
+    :param overhang: how far it began off the road, while it has not been on it [m]
     """
 
     id: str  # noqa: A003
@@ -84,6 +87,7 @@ class AgentSeat:
     centers: Array = field(init=False)
     hit: tuple[str, ...] = ()
     refusal: str | None = None
+    overhang: float = 0.0
 
     @property
     def state(self) -> VehicleState:
@@ -133,7 +137,7 @@ class DrivingGame:
                 PedalInverse(vehicle.vehicle)))
         self._observers: Sequence[RunObserver] = ()
         self.setup = setup
-        self.road = None
+        self.road: RoadBoundary | None = None
         if setup.game.drivability.road and setup.network.lanelet_ids:
             self.road = setup.road
             self.road.prepare([seat.view.own(stacked([item.state for item in setup.vehicles]))[:2]
@@ -183,6 +187,10 @@ class DrivingGame:
         for seat in self.seats:
             seat.place = seat.guide.follow(seat.state)
             seat.before = seat.state, seat.place
+            if self.road is not None:
+                state, vehicle = seat.view.own(states), seat.vehicle.vehicle
+                seat.overhang = self.road.overhang(
+                    *state.center(vehicle.rear_to_center), state.yaw, vehicle.shape)
 
     def act(self, actions: Mapping[str, Array]) -> None:
         """
@@ -203,11 +211,21 @@ class DrivingGame:
             seat.place = seat.guide.follow(seat.state)
 
     def off_road(self) -> list[bool]:
-        """Tell of each seat whether its vehicle was off the road since the last decision."""
-        if self.road is None:
-            return [False] * len(self.seats)
-        return [any(self.road.is_off_road(x, y, yaw, seat.vehicle.vehicle.shape)
-                    for x, y, yaw in seat.centers.tolist()) for seat in self.seats]
+        """
+        Tell of each seat whether its vehicle was off the road since the last decision.
+
+        One that began off the road leaves it when it comes further off, until it was on it.
+        """
+        return [self.road is not None and self._is_off(self.road, seat) for seat in self.seats]
+
+    def _is_off(self, road: RoadBoundary, seat: AgentSeat) -> bool:
+        shape, centers = seat.vehicle.vehicle.shape, seat.centers.tolist()
+        off = [road.is_off_road(*center, shape) for center in centers]
+        if seat.overhang and not all(off):
+            seat.overhang, off = 0.0, off[off.index(False):]
+        if seat.overhang:
+            return road.overhang(*centers[-1], shape) > seat.overhang + TOLERANCE
+        return any(off)
 
     def _tick(self) -> Array:
         """Drive one scenario step; give the vehicles' centres (T, V, 3) at its steps."""

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from crgame_ros.drivability.monitor import DrivabilityMonitor
 from crgame_ros.errors import CrgameError
+from crgame_ros.game.game import LaneletSpawn
 from crgame_ros.game.game_file import load_game
 from crgame_ros.gym.driving_env import DrivingEnv
 from crgame_ros.gym.driving_game import DrivingGame
@@ -149,6 +150,25 @@ def test_an_episode_ends_by_contact_road_and_time_as_gymnasium_means_it() -> Non
         if terminated:
             break
     assert (terminated, info['off_road'], reward) == (True, True, -1.0)
+
+
+def test_who_begins_off_the_road_leaves_it_when_he_comes_further_off() -> None:
+    game = load_game(SCENARIOS / 'cut_in.yaml')
+    # Half a car beside the road's left edge.
+    beside = replace(game.humans[0], driver='idle', spawn=LaneletSpawn(13, 234.0, 2.0, 15.0))
+    env = DrivingEnv(seat='hv0', game=replace(game, humans=(beside,)))
+    env.reset(seed=0)
+    for _ in range(5):
+        assert not env.step(np.zeros(2, np.float32))[2]
+    # Back onto the road, and then off it again: now it counts at once.
+    for turn in (*[-0.5] * 4, *[0.0] * 8, *[0.5] * 4):
+        assert not env.step(np.array((0.0, turn), np.float32))[2]
+    assert env.agent.seats[0].overhang == 0.0
+    over = [env.step(np.array((0.0, 0.4), np.float32))[2] for _ in range(30)]
+    assert True in over
+    env.reset(seed=0)
+    over = [env.step(np.array((0.0, 0.4), np.float32))[2] for _ in range(30)]
+    assert True in over
 
 
 def test_the_goal_of_the_planning_problem_ends_an_episode() -> None:
