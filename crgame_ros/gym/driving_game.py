@@ -220,11 +220,12 @@ class DrivingGame:
 
     def _is_off(self, road: RoadBoundary, seat: AgentSeat) -> bool:
         shape, centers = seat.vehicle.vehicle.shape, seat.centers.tolist()
-        off = [road.is_off_road(*center, shape) for center in centers]
+        off = [road.is_off_road(x, y, yaw, shape) for x, y, yaw in centers]
         if seat.overhang and not all(off):
             seat.overhang, off = 0.0, off[off.index(False):]
         if seat.overhang:
-            return road.overhang(*centers[-1], shape) > seat.overhang + TOLERANCE
+            x, y, yaw = centers[-1]
+            return road.overhang(x, y, yaw, shape) > seat.overhang + TOLERANCE
         return any(off)
 
     def _tick(self) -> Array:
