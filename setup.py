@@ -85,7 +85,7 @@ setup(
     python_requires='>=3.11,<3.13',
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={PACKAGE: ['py.typed', 'cockpit/page/*', 'cockpit/page/**/*',
-                            'analysis/report/page/*']},
+                            'analysis/report/page/*', 'evaluation/summary/page/*']},
     data_files=data_files(),
     zip_safe=False,
     # What is imported, at the versions of requirements.txt. Those that other packages need in turn
@@ -120,14 +120,16 @@ setup(
         'evaluate': ['distributed>=2026.8,<2027'],
         'gym': ['gymnasium>=1.4,<2', 'pettingzoo>=1.27,<2'],
         'test': [
-        'commonroad-vehicle-models==3.0.2',
-        'flake8-blind-except', 'flake8-builtins', 'flake8-class-newline', 'flake8-comprehensions',
-        'flake8-deprecated', 'flake8-docstrings', 'flake8-import-order', 'flake8-quotes',
-        'jsonschema>=4.26,<5', 'mcap-ros2-support>=0.6,<1', 'mypy>=2.4,<3', 'polars>=2.1,<3',
-        'pytest>=7.4,<8', 'pytest-xdist>=3.8,<4', 'ros-ament-flake8==0.17.3',
-        'ros-ament-pep257==0.17.3', 'ruff>=0.17.5,<0.18', 'selenium>=4.51,<5',
-        'types-PyYAML>=6.0.12,<7',
-    ]},
+            'commonroad-vehicle-models==3.0.2', 'distributed>=2026.8,<2027',
+            'flake8-blind-except', 'flake8-builtins', 'flake8-class-newline',
+            'flake8-comprehensions', 'flake8-deprecated', 'flake8-docstrings',
+            'flake8-import-order', 'flake8-quotes', 'gymnasium>=1.4,<2', 'jsonschema>=4.26,<5',
+            'mcap-ros2-support>=0.6,<1', 'mypy>=2.4,<3', 'pettingzoo>=1.27,<2',
+            'polars>=2.1,<3', 'psutil>=7,<8', 'pytest>=7.4,<8', 'pytest-xdist>=3.8,<4',
+            'ros-ament-flake8==0.17.3', 'ros-ament-pep257==0.17.3', 'ruff>=0.17.5,<0.18',
+            'selenium>=4.51,<5', 'types-PyYAML>=6.0.12,<7',
+        ],
+    },
     entry_points={
         'console_scripts': [
             *(f'{name} = {PACKAGE}.nodes.{name}:main' for name in NODES),

@@ -63,6 +63,8 @@ TOOLS = (
     _Tool('replay', 'the recorded human against other planners', 'crgame_ros.replay_command'),
     _Tool('reproduce', "a paper's evaluation again, beside its numbers",
           'crgame_ros.analysis.reproduction.reproduce_command'),
+    _Tool('evaluate', 'planners x scenarios x recorded humans x seeds, into tables',
+          'crgame_ros.evaluation.evaluate_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',
           'crgame_ros.analysis.validate_command'),
     _Tool('rasterize', 'draw curbs and obstacles of a scenario as an occupancy map',

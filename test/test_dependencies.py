@@ -52,8 +52,10 @@ THIRD_PARTY = {
     'yaml': ('pyyaml', 'python3-yaml'),
     'zstandard': ('zstandard', None),
 }
-# Of extras, and imported only where they are used: the extra, and the pip package.
-OPTIONAL = {'gymnasium': ('gym', 'gymnasium'), 'pettingzoo': ('gym', 'pettingzoo')}
+# What a user asks for by an extra of its own; nothing else of the package imports it.
+EXTRAS = {'evaluate': {'dask', 'distributed'}, 'gym': {'gymnasium', 'pettingzoo'}}
+# Dask's configuration comes with its scheduler.
+OF_EXTRAS = {'dask'}
 # Of ROS: each is a package of its own in package.xml; from pip they come together.
 ROS = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy|launch')
 ROS_FROM_PIP = {'ros-jazzy-common-interfaces', 'ros-jazzy-rclpy'}
@@ -79,8 +81,7 @@ def _imported() -> Iterator[str]:
 @pytest.fixture(scope='module')
 def imported() -> set[str]:
     """Give what is imported beyond Python and the package itself."""
-    return set(_imported()) - sys.stdlib_module_names - {'crgame_ros', 'ros_wheels_bootstrapper'} \
-        - OPTIONAL.keys()
+    return set(_imported()) - sys.stdlib_module_names - {'crgame_ros', 'ros_wheels_bootstrapper'}
 
 
 def _strings(node: ast.expr, names: dict[str, str]) -> str:
@@ -89,7 +90,7 @@ def _strings(node: ast.expr, names: dict[str, str]) -> str:
 
 
 def _setup(keyword: str, extra: str = 'test') -> list[str]:
-    """Read a list of requirements from setup.py without running it."""
+    """Read a list of requirements from setup.py without running it; of extras a chosen one."""
     tree = ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8'))
     names = {target.id: node.value.value for node in tree.body
              if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
@@ -98,9 +99,9 @@ def _setup(keyword: str, extra: str = 'test') -> list[str]:
                 and isinstance(node.value, ast.Call)
                 and ast.unparse(node.value.func) == 'setup')
     value = next(item.value for item in call.keywords if item.arg == keyword)
-    found = value if isinstance(value, ast.List) else next(
-        item for key, item in zip(value.keys, value.values, strict=True)
-        if ast.literal_eval(key) == extra)
+    if isinstance(value, ast.Dict):
+        value = value.values[[_strings(key, names) for key in value.keys].index(extra)]
+    found = value
     assert isinstance(found, ast.List)
     return [_strings(item, names) for item in found.elts]
 
@@ -111,10 +112,24 @@ def _manifest() -> 'etree._Element':
 
 def test_setup_names_what_is_imported(imported: set[str]) -> None:
     """One line for each third-party import, and none that nobody imports."""
-    third_party = {name for name in imported if not ROS.fullmatch(name)}
+    third_party = {name for name in imported if not ROS.fullmatch(name)}.difference(
+        *EXTRAS.values())
     assert third_party == set(THIRD_PARTY)
     named = {canonicalize_name(Requirement(line).name) for line in _setup('install_requires')}
     assert named == {pip for pip, _ in THIRD_PARTY.values()} | ROS_FROM_PIP
+
+
+def test_extras_name_what_they_are_for(imported: set[str]) -> None:
+    """Each extra brings what its part imports, and the base imports none of it by itself."""
+    for extra, names in EXTRAS.items():
+        assert names <= imported
+        assert {Requirement(line).name for line in _setup('extras_require', extra)} \
+            == names - OF_EXTRAS
+    text = (ROOT / 'package.xml').read_text(encoding='utf-8')
+    found = re.search(r'Optional, from pip: (.*?)\. -->', text, re.DOTALL)
+    assert found is not None
+    assert {name.strip() for name in found[1].split(',')} == {
+        name for names in EXTRAS.values() for name in names - OF_EXTRAS}
 
 
 def test_manifest_names_what_is_imported(imported: set[str]) -> None:
@@ -130,14 +145,6 @@ def test_manifest_names_what_is_imported(imported: set[str]) -> None:
     assert listed == {pip for pip, key in THIRD_PARTY.values() if key is None}
     extra = {canonicalize_name(Requirement(line).name) for line in _setup('extras_require')}
     assert of_tests <= extra
-
-
-def test_extras_name_what_is_imported_where_they_are_used() -> None:
-    """Each optional package is imported somewhere, and its extra brings it."""
-    assert OPTIONAL.keys() <= set(_imported())
-    for extra, pip in OPTIONAL.values():
-        assert pip in {canonicalize_name(Requirement(line).name)
-                       for line in _setup('extras_require', extra)}
 
 
 def test_messages_come_with_the_wheels(imported: set[str]) -> None:

@@ -21,10 +21,12 @@ exact on maps whose coordinates are large.
 """
 
 from collections.abc import Sequence
+import math
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.footprint import Footprint, Primitive
+from crgame_ros.geometry.rigid_transform import Pose
 from crgame_ros.geometry.shape import Shape
 import numpy as np
 
@@ -70,10 +72,11 @@ class CollisionDetector:
 
     def move(self, seconds_since_tick: float) -> None:
         """Carry the other objects on from the tick at their velocities [s]."""
-        np.multiply(self._velocities, seconds_since_tick, out=self._moved)
-        self._moved += self._poses
+        if self._others:
+            np.multiply(self._velocities, seconds_since_tick, out=self._moved)
+            self._moved += self._poses
 
-    def hits(self, centers: Sequence[tuple[float, float, float]]
+    def hits(self, centers: Sequence[Pose]
              ) -> tuple[list[list[int]], list[list[int]]]:
         """
         Find who touches whom; a pose with NaN is an absent vehicle and touches nobody.
@@ -84,39 +87,37 @@ class CollisionDetector:
         """
         among: list[list[int]] = [[] for _ in centers]
         with_others: list[list[int]] = []
-        for index, (x, y, yaw) in enumerate(centers):
-            own = self._driven[index]
-            placed: list[Primitive] = own.at(0.0, 0.0, yaw) if yaw == yaw else []
+        for index, center in enumerate(centers):
             for other in range(index + 1, len(centers)):
-                if self._touches(placed, own, centers[index], other, centers[other]):
+                if self._touches(index, center, other, centers[other]):
                     among[index].append(other)
                     among[other].append(index)
-            with_others.append(self._hit_objects(placed, index, x, y))
+            with_others.append(self._hit_objects(index, center) if self._others else [])
         return among, with_others
 
-    def _touches(self, placed: list[Primitive], own: Footprint,
-                 pose: tuple[float, float, float], index: int,
-                 other_pose: tuple[float, float, float]) -> bool:
+    def _touches(self, index: int, pose: Pose, other_index: int, other_pose: Pose) -> bool:
         dx, dy = other_pose[0] - pose[0], other_pose[1] - pose[1]
-        other = self._driven[index]
+        own, other = self._driven[index], self._driven[other_index]
         reach = own.radius + other.radius + CIRCLE_SLACK
         # Written so that NaN is far away.
-        return dx * dx + dy * dy <= reach * reach and other_pose[2] == other_pose[2] \
-            and _overlap(placed, other.at(dx, dy, other_pose[2]))
+        return dx * dx + dy * dy <= reach * reach and math.isfinite(pose[2] + other_pose[2]) \
+            and _overlap(own.at(0.0, 0.0, pose[2]), other.at(dx, dy, other_pose[2]))
 
-    def _hit_objects(self, placed: list[Primitive], index: int, x: float, y: float) -> list[int]:
+    def _hit_objects(self, index: int, center: Pose) -> list[int]:
+        x, y, yaw = center
         offset, distance = self._offset, self._distance
         np.subtract(self._moved[0], x, out=offset[0])
         np.subtract(self._moved[1], y, out=offset[1])
         np.multiply(offset, offset, out=offset)
         np.add(offset[0], offset[1], out=distance)
         np.less_equal(distance, self._reach[index], out=self._near)
-        if not self._near.any():
+        if not self._near.any() or yaw != yaw:
             return []
+        placed = self._driven[index].at(0.0, 0.0, yaw)
         hit = []
         for other in np.flatnonzero(self._near).tolist():
-            other_x, other_y, yaw = self._moved[:, other].tolist()
-            if _overlap(placed, self._others[other].at(other_x - x, other_y - y, yaw)):
+            other_x, other_y, other_yaw = self._moved[:, other].tolist()
+            if _overlap(placed, self._others[other].at(other_x - x, other_y - y, other_yaw)):
                 hit.append(other)
         return hit
 

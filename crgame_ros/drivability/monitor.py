@@ -21,8 +21,8 @@ moves, is looked at through the vehicle's (CRG 28).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.drivability.collision import CollisionDetector
@@ -34,13 +34,12 @@ from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
 from crgame_ros.occupancy.occupancy import OccupancyMap
 from crgame_ros.roads.road_boundary import RoadBoundary
-from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
+from crgame_ros.vehicle.state import STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleDrivability:
+class VehicleDrivability(NamedTuple):
     """
     The verdict on one driven vehicle.
 
@@ -184,7 +183,7 @@ class DrivabilityMonitor:
                              f'give one row of {STATE_WIDTH} columns each')
         centers = []
         for row, offset in zip(vehicle_states.tolist(), self._rear_to_center, strict=True):
-            x, y, yaw = row[StateColumn.X], row[StateColumn.Y], row[StateColumn.YAW]
+            x, y, yaw = row[:3]
             centers.append((*ahead(x, y, yaw, offset), yaw) if math.isfinite(x + y + yaw)
                            else (math.nan,) * 3)
         return centers
@@ -239,9 +238,10 @@ def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDri
     :param current: verdicts of this step.
     """
     known = {verdict.vehicle_id: verdict for verdict in previous}
-    return tuple(verdict for verdict in current
-                 if _finding(known.get(verdict.vehicle_id)) != _finding(verdict))
+    return tuple([verdict for verdict in current
+                  if _says_more(known.get(verdict.vehicle_id), verdict)])
 
 
-def _finding(verdict: VehicleDrivability | None) -> tuple[bool, bool, tuple[str, ...]] | None:
-    return (verdict.collision, verdict.off_road, verdict.hit) if verdict else None
+def _says_more(known: VehicleDrivability | None, verdict: VehicleDrivability) -> bool:
+    return known is None or known.collision != verdict.collision \
+        or known.off_road != verdict.off_road or known.hit != verdict.hit

@@ -15,8 +15,9 @@
 """Timeline files as they say it: read into timelines, and written from them."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.driver.timeline import (
     AxisName,
@@ -31,10 +32,12 @@ from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Called, Keyed, LeftOut, Listed, Within
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
-from crgame_ros.yaml_text import parse_yaml, read_yaml
+from crgame_ros.yaml_text import parse_yaml, read_text
 import yaml
 
 MAX_TIME_S = 1e6
+# Timelines that are kept: batches of runs read them many times.
+_KEPT = 32
 REMEDY = 'see docs/driving.md, section "Scripted drivers"'
 _FORM = Form(REMEDY)
 Time = Annotated[float, Within(0.0, MAX_TIME_S)]
@@ -150,9 +153,10 @@ def read_timeline(path: Path) -> Timeline:
 
     :raises InputError: if it cannot be read or is no timeline.
     """
-    return _timeline(read_yaml(path, 'timeline', REMEDY), str(path))
+    return parse_timeline(read_text(path, 'timeline', REMEDY), str(path))
 
 
+@lru_cache(_KEPT)
 def parse_timeline(text: str, where: str) -> Timeline:
     """
     Read the text of a timeline (YAML, or JSON, which is YAML too).
@@ -161,11 +165,7 @@ def parse_timeline(text: str, where: str) -> Timeline:
     :param where: the file's name, for messages.
     :raises InputError: naming the file and the entry of the timeline that is wrong.
     """
-    return _timeline(parse_yaml(text, where, REMEDY), where)
-
-
-def _timeline(values: Any, where: str) -> Timeline:
-    content = read(TimelineFile, values, where).content
+    content = read(TimelineFile, parse_yaml(text, where, REMEDY), where).content
     if isinstance(content, JoyEntry):
         return content.timeline()
     return KeyTimeline(tuple(
@@ -173,6 +173,7 @@ def _timeline(values: Any, where: str) -> Timeline:
         for entry in content))
 
 
+@lru_cache(_KEPT)
 def timeline_text(timeline: Timeline) -> str:
     """Give a timeline as the text of a file; `parse_timeline` reads the same again."""
     if isinstance(timeline, KeyTimeline):

@@ -14,7 +14,9 @@
 # limitations under the License.
 """A curve in the plane, and the curvilinear coordinates (s, d) along it (CRG 1)."""
 
+from bisect import bisect_right
 from functools import cached_property
+import math
 
 from crgame_ros.geometry.reference_point import beside, seen_from
 import numpy as np
@@ -24,6 +26,8 @@ FloatArray = NDArray[np.float64]
 
 # Points times segments handled at once, which bounds the memory of a projection.
 _CHUNK = 2_000_000
+# Up to so many points are refined one by one: calls of numpy take longer than their arithmetic.
+_FEW = 12
 
 
 class Curve:
@@ -75,6 +79,34 @@ class Curve:
     def _bends(self) -> FloatArray:
         """Give the curvature of segments, and of the straight parts at both ends, (n + 1)."""
         return np.concatenate(([0.0], np.diff(self.heading) / np.diff(self.s), [0.0]))
+
+    @cached_property
+    def _spans(self) -> tuple[list[float], list[tuple[float, ...]], list[float]]:
+        """
+        Give the arc lengths, the segments and `_bends` for what counts with numbers.
+
+        A segment is the x and y where it begins, its direction's, the heading and its slope.
+        """
+        slopes = np.diff(self.heading) / np.diff(self.s)
+        rows = np.column_stack((self.points[:-1], self.directions, self.heading[:-1], slopes))
+        return self.s.tolist(), [tuple(row) for row in rows.tolist()], self._bends.tolist()
+
+    def place(self, s: float) -> tuple[float, float, float, float, float]:
+        """
+        Give what `pose_at` does at one arc length [m], and the arc length itself.
+
+        :return: s, x [m], y [m], heading [rad] and curvature [1/m]
+        """
+        at, spans, bends = self._spans
+        after = bisect_right(at, s)
+        segment = 0 if after == 0 else after - 1 if after < len(at) else after - 2
+        x, y, along_x, along_y, heading, slope = spans[segment]
+        beyond = s - at[segment]
+        if after == len(at):
+            heading = float(self.heading[-1])
+        elif after:
+            heading = slope * beyond + heading
+        return s, x + beyond * along_x, y + beyond * along_y, heading, bends[after]
 
     def heading_at(self, s: FloatArray) -> FloatArray:
         """Give the headings at arc lengths of any shape, not wrapped [rad]."""
@@ -143,6 +175,8 @@ class Curve:
         :param exact: ends them earlier when all points are so near to their normals [m]
         :return: arc lengths s and offsets d to the left, both (N) [m]
         """
+        if len(points) <= _FEW:
+            return self._refine_few(points.tolist(), guess.tolist(), rounds, exact)
         s = np.asarray(guess, dtype=np.float64)
         aside = np.zeros_like(s)
         for left in range(rounds, -1, -1):
@@ -155,6 +189,25 @@ class Curve:
             stretch = np.maximum(1.0 - pose[:, 3] * aside, 0.3)
             s = s + along / (stretch if left or exact else 1.0)
         return s, aside
+
+    def _refine_few(self, points: list[list[float]], s: list[float], rounds: int,
+                    exact: float) -> tuple[FloatArray, FloatArray]:
+        """Do as `refine` does, to the last bit, with numbers."""
+        aside, steps, place = [0.0] * len(s), [0.0] * len(s), self.place
+        for left in range(rounds, -1, -1):
+            near = exact > 0.0
+            for i, (x, y) in enumerate(points):
+                s[i], here_x, here_y, heading, bend = place(s[i])
+                dx, dy, cos, sin = x - here_x, y - here_y, math.cos(heading), math.sin(heading)
+                along, d = dx * cos + dy * sin, dy * cos - dx * sin
+                near = near and abs(along) < exact
+                stretch = 1.0 - bend * d if left or exact else 1.0
+                aside[i], steps[i] = d, along / (stretch if not stretch < 0.3 else 0.3)
+            if near:
+                break
+            for i, step in enumerate(steps):
+                s[i] += step
+        return np.array(s), np.array(aside)
 
     def _within(self, s: FloatArray) -> FloatArray:
         """Give the arc lengths from which points beyond the ends are seen: their own."""
@@ -169,5 +222,10 @@ def arc_length(points: FloatArray) -> FloatArray:
 
 def nearest(points: FloatArray, samples: FloatArray) -> NDArray[np.intp]:
     """Give the row of the sample (M, 2) that is nearest to each of points (N, 2)."""
-    return np.argmin((points[:, :1] - samples[:, 0]) ** 2
-                     + (points[:, 1:] - samples[:, 1]) ** 2, axis=1)
+    dx, dy = points[:, :1] - samples[:, 0], points[:, 1:] - samples[:, 1]
+    # In place: fresh memory takes as long as the arithmetic.
+    dx *= dx
+    dy *= dy
+    dx += dy
+    rows: NDArray[np.intp] = dx.argmin(axis=1)
+    return rows

@@ -16,6 +16,7 @@
 
 import math
 
+from crgame_ros.geometry.reference_point import joined
 from crgame_ros.geometry.shape import Shape
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +57,8 @@ def placed(corners: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[
     yaw = poses[..., 2, None]
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = corners[..., 0], corners[..., 1]
-    return np.stack((poses[..., 0, None] + cos * x - sin * y,
-                     poses[..., 1, None] + sin * x + cos * y), axis=-1)
+    return joined(poses[..., 0, None] + cos * x - sin * y,
+                  poses[..., 1, None] + sin * x + cos * y)
 
 
 def placed_at(corners: NDArray[np.float64], x: float, y: float,

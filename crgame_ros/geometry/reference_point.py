@@ -32,6 +32,18 @@ def ahead(x: float, y: float, yaw: float, distance: float) -> tuple[float, float
     return x + distance * math.cos(yaw), y + distance * math.sin(yaw)
 
 
+def joined(*parts: Array) -> Array:
+    """
+    Give numbers as columns (..., n), in half of the time that `numpy.stack` takes.
+
+    :param parts: of the first one's shape (...), or those that are the same for all of it.
+    """
+    result = np.empty((*parts[0].shape, len(parts)))
+    for column, part in enumerate(parts):
+        result[..., column] = part
+    return result
+
+
 def shifted(poses: Array, distance: Array | float) -> Array:
     """
     Move poses along their headings.
@@ -41,8 +53,8 @@ def shifted(poses: Array, distance: Array | float) -> Array:
     :return: (..., 3), the yaw unchanged
     """
     yaw = poses[..., 2]
-    return np.stack((poses[..., 0] + distance * np.cos(yaw),
-                     poses[..., 1] + distance * np.sin(yaw), yaw), axis=-1)
+    return joined(poses[..., 0] + distance * np.cos(yaw),
+                  poses[..., 1] + distance * np.sin(yaw), yaw)
 
 
 def beside(poses: Array, d: Array) -> Array:
@@ -54,8 +66,7 @@ def beside(poses: Array, d: Array) -> Array:
     :return: (..., 3), the yaw unchanged
     """
     yaw = poses[..., 2]
-    return np.stack((poses[..., 0] - d * np.sin(yaw), poses[..., 1] + d * np.cos(yaw), yaw),
-                    axis=-1)
+    return joined(poses[..., 0] - d * np.sin(yaw), poses[..., 1] + d * np.cos(yaw), yaw)
 
 
 def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
@@ -81,5 +92,5 @@ def shifted_velocities(yaw: Array, velocities: Array, distance: Array | float) -
     :return: (..., 3)
     """
     rate = velocities[..., 2]
-    return np.stack((velocities[..., 0] - distance * np.sin(yaw) * rate,
-                     velocities[..., 1] + distance * np.cos(yaw) * rate, rate), axis=-1)
+    return joined(velocities[..., 0] - distance * np.sin(yaw) * rate,
+                  velocities[..., 1] + distance * np.cos(yaw) * rate, rate)

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import math
 
 from crgame_ros.errors import InputError
+from crgame_ros.geometry.reference_point import joined
 from crgame_ros.messages.plan import Plan
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
 import numpy as np
@@ -133,14 +134,12 @@ def plan_to_joints(plan: Plan, vehicle_id: str, time_step_ns: int) -> JointSerie
     cos, sin = np.cos(states[:, StateColumn.YAW]), np.sin(states[:, StateColumn.YAW])
     speed, yaw_rate = states[:, StateColumn.SPEED], states[:, StateColumn.YAW_RATE]
     acceleration = states[:, StateColumn.ACCELERATION]
-    nowhere = np.full(len(states), np.nan)
     positions = states[:, (StateColumn.X, StateColumn.Y, StateColumn.YAW,
                            StateColumn.STEERING_ANGLE)]
-    velocities = np.stack((speed * cos, speed * sin, yaw_rate,
-                           states[:, StateColumn.STEERING_RATE]), axis=1)
-    accelerations = np.stack((acceleration * cos - speed * yaw_rate * sin,
-                              acceleration * sin + speed * yaw_rate * cos, nowhere, nowhere),
-                             axis=1)
+    velocities = joined(speed * cos, speed * sin, yaw_rate, states[:, StateColumn.STEERING_RATE])
+    nowhere = np.array(np.nan)
+    accelerations = joined(acceleration * cos - speed * yaw_rate * sin,
+                           acceleration * sin + speed * yaw_rate * cos, nowhere, nowhere)
     times_ns = np.arange(len(states), dtype=np.int64) * time_step_ns
     return JointSeries(plan.stamp_ns, vehicle_joint_names(vehicle_id), times_ns,
                        positions, velocities, accelerations)

@@ -18,6 +18,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 import re
+import traceback
 
 from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.messages.plan import Plan, PlanRequest
@@ -39,12 +40,15 @@ class PlannerStatistics:
     :param fallbacks: braking plans given.
     :param reasons: how often each reason for braking occurred, numbers replaced by `#`.
     :param durations_s: duration of each call; empty without a clock [s]
+    :param failure: where the planner's code first failed, as Python tells it; empty if it never
+        did.
     """
 
     plans: int = 0
     fallbacks: int = 0
     reasons: Counter[str] = field(default_factory=Counter)
     durations_s: list[float] = field(default_factory=list)
+    failure: str = ''
 
 
 class PlannerAdapter:
@@ -85,6 +89,7 @@ class PlannerAdapter:
             self._limit = RoadLimit.of(context)
             self.planner.setup(context)
         except Exception as error:
+            self._keep_failure(error)
             self._setup_failure = self.last_reason = f'setup failed: {describe(error)}'
         return self._setup_failure
 
@@ -126,8 +131,13 @@ class PlannerAdapter:
             if reason is None:
                 reason = self._limit.refusal(plan.states)
         except Exception as error:
+            self._keep_failure(error)
             return None, describe(error)
         return (plan, None) if reason is None else (None, reason)
+
+    def _keep_failure(self, error: Exception) -> None:
+        if not self.statistics.failure and not isinstance(error, PlanningError):
+            self.statistics.failure = ''.join(traceback.format_exception(error))
 
 
 def describe(error: Exception) -> str:

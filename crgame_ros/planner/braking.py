@@ -46,7 +46,7 @@ def braking_plan(request: PlanRequest, last_plan: Plan | None, vehicle: VehicleP
     ego, dt_s = request.ego, request.time_step_s
     steps = math.ceil(abs(ego.speed) / (deceleration * dt_s)) + REST_STEPS
     distances, angles = _steering_over_distance(request, last_plan)
-    drive = Rollout(ego, steps, dt_s, vehicle.wheelbase)
+    drive = Rollout(ego, dt_s, vehicle.wheelbase)
     covered = 0.0
     for _ in range(steps):
         speed, rate = drive.speed, 0.0

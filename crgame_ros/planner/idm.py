@@ -220,11 +220,13 @@ class IdmPlanner(PathPlanner):
         # A standing obstacle is halted at with the gap s0, a line with LINE_GAP.
         halt = min(halts) + model.s0 - LINE_GAP
         follower = [False] * len(leaders)
+        desired, admissible, step = self._desired, self._admissible, self._driving.path.step
+        last = len(desired) - 1
 
         def acceleration(i: int, s: float, speed: float) -> float:
             if speed < 0.0:
                 return min(model.b, -speed / dt_s)
-            free = free_acceleration(speed, self._at(self._desired, s), model)
+            free = free_acceleration(speed, desired[min(max(int(s / step), 0), last)], model)
             wanted = free + interaction(speed, halt - s - front, 0.0, model)
             for number, leader in enumerate(leaders):
                 wanted = min(wanted, leader.let_in[i])
@@ -240,17 +242,14 @@ class IdmPlanner(PathPlanner):
                     limit = max(ANTICIPATION_LIMIT, _needed(speed, gap, leader.speed[i]))
                     wanted = min(wanted, max(-limit, free + interaction(
                         speed, gap, leader.speed[i], model)))
-            bound = (self._at(self._admissible, s + speed * dt_s) - speed) / dt_s
+            ahead = min(max(int((s + speed * dt_s) / step), 0), last)
+            bound = (admissible[ahead] - speed) / dt_s
             wanted = min(wanted, max(bound, -2.0 * model.b))
             if speed < STANDING and wanted < START_SHARE * model.a:
                 return -speed / dt_s
             return max(wanted, -model.b_max)
 
         return acceleration
-
-    def _at(self, row: list[float], s: float) -> float:
-        index = min(max(int(s / self._driving.path.step), 0), len(row) - 1)
-        return row[index]
 
 
 def _needed(speed: float, gap: float, other: float) -> float:

@@ -102,7 +102,7 @@ class PathFollower:
                 f'the vehicle faces away from its path by {start.heading_error:.2f} rad')
         length = self.correction_length(start, abs(ego.speed))
         gains = (60.0 / length ** 3, 36.0 / length ** 2, 9.0 / length)
-        driven = Rollout(ego, steps, dt_s, self._vehicle.wheelbase)
+        driven = Rollout(ego, dt_s, self._vehicle.wheelbase)
         position, moved = start, 0.0
         for i in range(steps):
             if i:

@@ -16,7 +16,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.game.objects import ObjectDescription
@@ -66,11 +68,12 @@ class Corridor:
 
     def bounds(self, path: ReferencePath, s: Array) -> tuple[Array, Array]:
         """Give the least and the greatest offset that the ego covers at arc lengths s [m]."""
-        u = np.clip((s - self.front - self.s) / max(self.return_length, 1.0), 0.0, 1.0)
+        u = (s - self.front - self.s) / max(self.return_length, 1.0)
+        u = np.minimum(np.maximum(u, 0.0), 1.0)
         offset = self.d + (self.target - self.d) * (u * u * (3.0 - 2.0 * u))
         # In a curve the front swings out of the rear axle's path.
-        swing = path.pose_at(s - 0.5 * self.front)[..., 3] * (0.5 * self.front ** 2)
-        swing = np.clip(swing, -1.0, 1.0)
+        swing = path.bends_at(s - 0.5 * self.front) * (0.5 * self.front ** 2)
+        swing = np.minimum(np.maximum(swing, -1.0), 1.0)
         return (offset - self.half_width - np.maximum(swing, 0.0),
                 offset + self.half_width - np.minimum(swing, 0.0))
 
@@ -145,8 +148,8 @@ class ObstacleProjector:
                 poses: Array) -> tuple[NDArray[np.intp], Array, Array]:
         """Choose the obstacles that may come near; their columns and centres (s, d), (S, K)."""
         near = self._near(path, corridor, poses)
-        anchors = np.unique(np.linspace(0, len(poses) - 1, ANCHORS).astype(np.intp))
-        found, aside = path.project(poses[anchors[:, None], near, :2],
+        anchors = _anchors(len(poses))
+        found, aside = path.project(poses[anchors.steps[:, None], near, :2],
                                     corridor.s - corridor.behind,
                                     corridor.s + corridor.ahead + 40.0)
         limit = self._radii[near] + corridor.half_width + corridor.aside + ASIDE
@@ -172,9 +175,10 @@ class ObstacleProjector:
         """Drop the obstacles that cannot reach the corridor: absent, or too far to the side."""
         present = np.isfinite(poses[..., 0])
         first = np.argmax(present, axis=0)
-        origin = np.take_along_axis(poses, first[None, :, None], axis=0)[0, :, :2]
-        moved = np.hypot(*np.moveaxis(poses[..., :2] - origin, -1, 0))
-        reach = np.nanmax(np.where(present, moved, 0.0), axis=0, initial=0.0)
+        origin = poses[first, np.arange(len(first)), :2]
+        way = poses[..., :2] - origin
+        # Passes over NaN: where it is absent.
+        reach = np.fmax.reduce(np.hypot(way[..., 0], way[..., 1]), axis=0, initial=0.0)
         low = max(0, int((corridor.s - corridor.behind) / path.step))
         line = path.points[low:int((corridor.s + corridor.ahead) / path.step) + 2:8]
         distance = np.hypot(origin[:, 0, None] - line[None, :, 0],
@@ -200,29 +204,53 @@ def prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
             np.concatenate((velocities, np.repeat(velocities[-1:], steps - given, axis=0))))
 
 
-def _project_tracks(path: ReferencePath, poses: Array, anchors: NDArray[np.intp],
+class _Anchors(NamedTuple):
+    """
+    The few steps at which centres are looked for along the whole path.
+
+    :param steps: (A) their numbers.
+    :param before: (S) for each step, the place among them of the last before it.
+    :param after: (S) and of the first behind it.
+    :param share: (S, 1) where it is between these, from 0 to 1.
+    """
+
+    steps: NDArray[np.intp]
+    before: NDArray[np.intp]
+    after: NDArray[np.intp]
+    share: Array
+
+
+@lru_cache(8)
+def _anchors(steps: int) -> _Anchors:
+    anchors = np.unique(np.linspace(0, steps - 1, ANCHORS).astype(np.intp))
+    position = np.interp(np.arange(steps), anchors, np.arange(len(anchors)))
+    before = np.minimum(position.astype(int), max(len(anchors) - 2, 0))
+    return _Anchors(anchors, before, np.minimum(before + 1, len(anchors) - 1),
+                    (position - before)[:, None])
+
+
+def _project_tracks(path: ReferencePath, poses: Array, anchors: _Anchors,
                     found: Array) -> tuple[Array, Array]:
     """Project centres (S, K, 3), whose arc lengths are known at a few steps."""
     steps, count = poses.shape[:2]
-    # Where an object is absent at an anchor, the neighbouring anchor serves to start from.
-    found = found.copy()
-    for here, there in [*pairwise(range(len(anchors)))] + [*pairwise(range(len(anchors))[::-1])]:
-        found[there] = np.where(np.isnan(found[there]), found[here], found[there])
-    found = np.nan_to_num(found)
-    position = np.interp(np.arange(steps), anchors, np.arange(len(anchors)))
-    index = np.minimum(position.astype(int), max(len(anchors) - 2, 0))
-    fraction = (position - index)[:, None]
-    after = np.minimum(index + 1, len(anchors) - 1)
-    guess = found[index] * (1.0 - fraction) + found[after] * fraction
+    if not np.isfinite(found).all():
+        # Where an object is absent at an anchor, the neighbouring anchor serves to start from.
+        found = found.copy()
+        rows = range(len(anchors.steps))
+        for here, there in [*pairwise(rows)] + [*pairwise(rows[::-1])]:
+            found[there] = np.where(np.isnan(found[there]), found[here], found[there])
+        found = np.nan_to_num(found)
+    guess = found[anchors.before] * (1.0 - anchors.share) + found[anchors.after] * anchors.share
     s, d = path.refine(poses[..., :2].reshape(-1, 2), guess.reshape(-1), 1)
     return s.reshape(steps, count), d.reshape(steps, count)
 
 
-def _extents(path: ReferencePath, poses: Array, s: Array, outlines: Array) -> Array:
-    """Project footprints: least and greatest s, least and greatest d, (4, S, K)."""
+def _extents(path: ReferencePath, poses: Array, s: Array,
+             outlines: Array) -> tuple[Array, Array, Array, Array]:
+    """Project footprints: least and greatest s, least and greatest d, each (S, K)."""
     corners = placed(outlines, poses)
     shape = corners.shape[:-1]
     guess = np.broadcast_to(np.nan_to_num(s)[..., None], shape)
     along, across = path.refine(corners.reshape(-1, 2), guess.ravel(), 2)
     along, across = along.reshape(shape), across.reshape(shape)
-    return np.stack((along.min(-1), along.max(-1), across.min(-1), across.max(-1)))
+    return along.min(-1), along.max(-1), across.min(-1), across.max(-1)

@@ -15,7 +15,6 @@
 """The contacts of a recorded run, named as those of an offline run are."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
@@ -47,7 +46,7 @@ def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleD
                     if name in known and (verdict.vehicle_id, name) not in told)
         if new:
             told.update((verdict.vehicle_id, name) for name in new)
-            touching.append(replace(verdict, hit=new))
+            touching.append(verdict._replace(hit=new))
     if not touching:
         return ()
     motions = _read_motions(reader, run)

@@ -16,6 +16,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 
 from commonroad.scenario.lanelet import LaneletNetwork
@@ -34,6 +35,8 @@ import shapely
 
 # Building time grows with the number, and with the bends: 10 to 80 ms for 150 polygons.
 TILE_POLYGONS = 150
+# Surfaces and tiles that are kept: batches of runs build those of their roads many times.
+_KEPT_SURFACES, _KEPT_TILES = 8, 32
 # How far the boundary object reaches beyond the road [m]; nothing is detected beyond.
 BOUNDARY_MARGIN = 2000.0
 # Smaller pieces make more triangles to build, larger ones more to check [m].
@@ -84,10 +87,8 @@ class RoadBoundary:
         lanelets = lanelet_network.lanelets
         x, y = lanelets[0].left_vertices[0][:2].tolist() if lanelets else (0.0, 0.0)
         self._origin = (x, y)
-        polygons = lanelet_polygons(lanelets, self._origin)
-        patches = seam_patches(shapely.union_all(polygons))
-        self._pieces = np.array([*polygons, *patches], dtype=object)
-        self._surface = road_surface(polygons, patches)
+        self._polygons = tuple(shapely.to_wkb(lanelet_polygons(lanelets, self._origin)).tolist())
+        self._surface = _united(self._polygons)[1]
         self._tiles: list[_Tile] = []
         self._footprints: dict[Shape, Footprint] = {}
 
@@ -102,7 +103,7 @@ class RoadBoundary:
             if math.isfinite(x + y) and not any(
                     tile.covers(x, y, 0.5 * tile.radius if tile.radius < math.inf else 0.0)
                     for tile in self._tiles):
-                self._tiles.append(self._build(x, y))
+                self._tiles.append(_tile_at(self._polygons, x, y))
 
     def is_off_road(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> bool:
         """
@@ -159,7 +160,7 @@ class RoadBoundary:
         It is the distance from the road to the footprint's farthest corner, also of one that is
         off the road as a whole; infinite where there is no road. Parameters as in `is_off_road`.
         """
-        if not len(self._pieces):
+        if not self._polygons:
             return math.inf
         # Between the corners nothing is farther from the road: a gap narrower than the footprint
         # is crossed, not left.
@@ -173,16 +174,26 @@ class RoadBoundary:
             footprint = self._footprints.setdefault(shape, Footprint(shape))
         return footprint
 
-    def _build(self, x: float, y: float) -> _Tile:
-        distances = shapely.distance(self._pieces, shapely.Point(x, y))
-        order = np.argsort(distances, kind='stable')
-        chosen = shapely.transform(self._pieces[order[:TILE_POLYGONS]],
-                                   lambda points: points - (x, y))
-        radius = float(distances[order[TILE_POLYGONS]]) if len(order) > TILE_POLYGONS \
-            else math.inf
-        bounds = shapely.total_bounds(chosen).tolist() if len(chosen) else [math.inf] * 4
-        return _Tile(x, y, radius, (bounds[0], bounds[1], bounds[2], bounds[3]),
-                     _triangulated_outside(chosen.tolist()))
+
+# Only what lanelets and place decide is shared: a check never depends on other runs.
+@lru_cache(_KEPT_SURFACES)
+def _united(polygons: tuple[bytes, ...]) -> tuple[NDArray[np.object_], shapely.Geometry]:
+    """Give the pieces of road, polygons (WKB) and what mends their seams, and their union."""
+    lanelets = shapely.from_wkb(polygons).tolist() if polygons else []
+    patches = seam_patches(shapely.union_all(lanelets))
+    return np.array([*lanelets, *patches], dtype=object), road_surface(lanelets, patches)
+
+
+@lru_cache(_KEPT_TILES)
+def _tile_at(polygons: tuple[bytes, ...], x: float, y: float) -> _Tile:
+    pieces, _ = _united(polygons)
+    distances = shapely.distance(pieces, shapely.Point(x, y))
+    order = np.argsort(distances, kind='stable')
+    chosen = shapely.transform(pieces[order[:TILE_POLYGONS]], lambda points: points - (x, y))
+    radius = float(distances[order[TILE_POLYGONS]]) if len(order) > TILE_POLYGONS else math.inf
+    bounds = shapely.total_bounds(chosen).tolist() if len(chosen) else [math.inf] * 4
+    return _Tile(x, y, radius, (bounds[0], bounds[1], bounds[2], bounds[3]),
+                 _triangulated_outside(chosen.tolist()))
 
 
 def _is_off(tile: _Tile, footprint: Footprint, x: float, y: float, yaw: float) -> bool:
@@ -191,7 +202,10 @@ def _is_off(tile: _Tile, footprint: Footprint, x: float, y: float, yaw: float) -
     # The centre beyond the road decides alone, so that no margin is too small.
     if not (x_min <= x <= x_max and y_min <= y <= y_max):
         return True
-    return any(tile.boundary.collide(part) for part in footprint.at(x, y, yaw))
+    for part in footprint.at(x, y, yaw):
+        if tile.boundary.collide(part):
+            return True
+    return False
 
 
 def _triangulated_outside(pieces: list[shapely.Polygon]) -> pycrcc.ShapeGroup:

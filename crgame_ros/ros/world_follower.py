@@ -31,8 +31,9 @@ from numpy.typing import NDArray
 from trajectory_msgs.msg import JointTrajectory
 
 FloatArray = NDArray[np.float64]
-# Kept while their other half is on its way; both are published within a millisecond.
-MAX_WAITING = 50
+# Kept while their other half is on its way; both are published within a millisecond. States are
+# those of some seconds: who was held up by a busy machine misses none of them.
+MAX_WAITING, MAX_STATES = 50, 1000
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class WorldFollower:
         self._states = endpoints.polled(states)
         self._objects = endpoints.polled('/traffic/objects', depth=MAX_WAITING)
         self._scenario: ScenarioSet | None = None
-        self._waiting: deque[JointTrajectory] = deque(maxlen=MAX_WAITING)
+        self._waiting: deque[JointTrajectory] = deque(maxlen=MAX_STATES)
         self._objects_by_n: dict[int, ObjectStates] = {}
         self._latest: ObjectStates | None = None
 

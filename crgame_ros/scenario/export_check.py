@@ -15,6 +15,7 @@
 """Whether a run in a scenario can be written, looked at before its first step."""
 
 from collections.abc import Sequence
+import pickle
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
@@ -25,6 +26,9 @@ from crgame_ros.scenario.export_network import framed, schema_errors, used_ids, 
 from crgame_ros.scenario.loading import LoadedScenario
 from lxml import etree
 
+# Runs that were found to be writable, by what decides on it, the oldest first; and how many.
+_writable: dict[tuple[object, ...], None] = {}
+_KEPT = 64
 _ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -37,18 +41,24 @@ def refuse_unwritable(loaded: LoadedScenario, objects: Sequence[ObjectDescriptio
     :param problems: ids of the planning problems that are driven.
     :raises InputError: if the run could not be exported.
     """
+    shapes = tuple(dict.fromkeys(item.shape for item in objects))
+    known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    decides = (loaded.sha256, shapes, pickle.dumps([known[number] for number in problems]))
+    if decides in _writable:
+        return
     roads = write_roads(loaded, 0, [])
     frame = framed(roads.elements)
     ids = IdPool(used_ids([frame]), [])
-    text = {item.shape: static_obstacle(ids.fresh(), 'unknown', item.shape, _ORIGIN[:3])
-            for item in objects}
-    known = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
+    text = [static_obstacle(ids.fresh(), 'unknown', shape, _ORIGIN[:3]) for shape in shapes]
     written = [planning_problem(ids.fresh(), _ORIGIN, goals_of(
         known[number], str(number), 0, 1, roads.lanelets, [])) for number in problems]
     last = frame[-1]
-    for element in map(etree.fromstring, text.values()):
+    for element in map(etree.fromstring, text):
         last.addprevious(element)
     frame.extend(map(etree.fromstring, written))
     if errors := schema_errors(frame):
         raise InputError(f'a run in it could not be exported ({errors[0]})', loaded.source,
                          'correct the scenario')
+    _writable[decides] = None
+    if len(_writable) > _KEPT:
+        del _writable[next(iter(_writable))]

@@ -18,10 +18,11 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 import hashlib
 import logging
 from pathlib import Path
+import pickle
 import warnings
 from xml.etree import ElementTree
 
@@ -45,6 +46,8 @@ import shapely
 
 # Lanes are tabulated along their length: one of a million kilometres would fill the memory [m].
 _MAX_LANELET_LENGTH = 1e5
+# Texts of which what was read is kept: batches of runs, and tables of one, load them many times.
+_KEPT = 8
 # The surface of a lanelet whose bounds cross is mended in cubic time: 500 points took 4 s.
 _MOST_TANGLED = 200
 
@@ -94,10 +97,23 @@ def parse_scenario(xml_text: str, source: str) -> LoadedScenario:
     """
     Load a CommonRoad scenario from its text.
 
+    Who loads a text again gets a copy of his own of what was read then: nobody else sees what is
+    changed in it.
+
     :param xml_text: the content of a scenario file
     :param source: file name or topic for messages
     :raises InputError: naming file, element and remedy, if it cannot be used.
     """
+    loaded: LoadedScenario = pickle.loads(_pickled(xml_text, source))
+    return loaded
+
+
+@lru_cache(_KEPT)
+def _pickled(xml_text: str, source: str) -> bytes:
+    return pickle.dumps(_parsed(xml_text, source), pickle.HIGHEST_PROTOCOL)
+
+
+def _parsed(xml_text: str, source: str) -> LoadedScenario:
     root = guard.parse_hardened(xml_text, source)
     notices = upgrade(root)
     guard.refuse_malformed(root, source)

@@ -26,7 +26,7 @@ from typing import Protocol
 from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.reference_point import beside
+from crgame_ros.geometry.reference_point import beside, joined
 from crgame_ros.roads.lane_lookup import LaneLookup
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles
@@ -71,12 +71,11 @@ def predict_constant_steering(states: FloatArray, wheelbases: FloatArray, steps:
     # no singularity for straight driving.
     chord = speed * time * np.sinc(half_turn / np.pi)
     heading = yaw + 2.0 * half_turn
-    poses = np.stack((states[:, StateColumn.X] + chord * np.cos(yaw + half_turn),
-                      states[:, StateColumn.Y] + chord * np.sin(yaw + half_turn),
-                      wrap_pi_array(heading)), axis=-1)
+    poses = joined(states[:, StateColumn.X] + chord * np.cos(yaw + half_turn),
+                   states[:, StateColumn.Y] + chord * np.sin(yaw + half_turn),
+                   wrap_pi_array(heading))
     poses[0, :, 2] = yaw
-    velocities = np.stack((speed * np.cos(heading), speed * np.sin(heading),
-                           np.broadcast_to(yaw_rate, heading.shape)), axis=-1)
+    velocities = joined(speed * np.cos(heading), speed * np.sin(heading), yaw_rate)
     return poses, velocities
 
 

@@ -15,8 +15,11 @@
 """The simulation engine that both runners drive (CRG algorithms 1 and 2)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import hashlib
+from itertools import chain
+from struct import Struct
+from typing import NamedTuple
 
 from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
@@ -39,14 +42,13 @@ from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 from crgame_ros.vehicle.traced_vehicle import TracedVehicle
 import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclass(frozen=True)
-class StepResult:
+class StepResult(NamedTuple):
     """
     What one step brought about.
 
@@ -113,8 +115,10 @@ class Simulation:
         self._world = World(setup, self._events, feed)
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
+        self._driven = (*self.humans, *self.avs)
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
+        self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
 
     @property
     def objects(self) -> ObjectStates:
@@ -124,7 +128,7 @@ class Simulation:
     @property
     def states(self) -> list[VehicleState]:
         """States of the driven vehicles at n: humans, then AVs; simulation coordinates."""
-        return [*(human.state for human in self.humans), *(av.state for av in self.avs)]
+        return [driven.state for driven in self._driven]
 
     def begin(self) -> StepResult:
         """Give the requests and objects of step 0, before anything has moved."""
@@ -247,8 +251,9 @@ class Simulation:
 
     def _add_to_hash(self) -> None:
         # Of traffic alone there is nothing but where it is.
-        rows = self.states or self.objects.poses
-        self._hash.update(np.array(rows, dtype=np.float64).tobytes())
+        states = self.states
+        self._hash.update(self._packed(*chain.from_iterable(states)) if states else
+                          np.array(self.objects.poses, dtype=np.float64).tobytes())
 
     def state_hash(self) -> str:
         """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""

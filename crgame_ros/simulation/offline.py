@@ -306,7 +306,8 @@ class _Trace:
         for index, command in enumerate(simulation.commands):
             if command is not None:
                 self.intervals_s[n, index] = effective_s
-        self.vehicles[n] = np.reshape(simulation.states, (-1, STATE_WIDTH))
+        if states := simulation.states:
+            self.vehicles[n] = states
         for index in range(self.commands.shape[1]):
             self.commands[n, index] = simulation.commands[index] or RELEASED
         for index, command in enumerate(simulation.commands[self.commands.shape[1]:]):

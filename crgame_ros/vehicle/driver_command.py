@@ -14,9 +14,8 @@
 # limitations under the License.
 """The normalised command of a driver, the same from whatever device (CRG III-C1)."""
 
+from struct import Struct
 from typing import NamedTuple
-
-import numpy as np
 
 
 class DriverCommand(NamedTuple):
@@ -47,9 +46,11 @@ class DriverCommand(NamedTuple):
 
 
 RELEASED = DriverCommand()
+_FLOAT32 = Struct('f')
 
 
 def _clip_float32(value: float, lower: float) -> float:
     if not value == value:
         return 0.0
-    return float(np.float32(min(1.0, max(lower, value))))
+    value = min(1.0, max(lower, value))
+    return float(_FLOAT32.unpack(_FLOAT32.pack(value))[0])

@@ -14,9 +14,11 @@
 # limitations under the License.
 """Curves against shapely's polylines and the closed forms of straight lines and circles."""
 
+from collections.abc import Callable
 import math
 
 from crgame_ros.geometry.curve import Curve, nearest
+from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.geometry.reference_point import beside, seen_from
 import numpy as np
 from numpy.typing import NDArray
@@ -147,6 +149,25 @@ def test_many_points_are_projected_as_few(monkeypatch: pytest.MonkeyPatch) -> No
     whole = curve.project(points)
     monkeypatch.setattr('crgame_ros.geometry.curve._CHUNK', 7 * len(curve.steps))
     assert np.array_equal(curve.project(points), whole)
+
+
+@pytest.mark.parametrize(('rounds', 'exact'), [(3, 0.0), (1, 0.0), (19, 1e-11)])
+@pytest.mark.parametrize('make', [Curve.from_polyline, ReferencePath.from_polyline])
+def test_few_points_are_refined_to_the_last_bit_as_many(
+        make: Callable[[Array], Curve], rounds: int, exact: float) -> None:
+    """The same points again and again are many; on the line, far off it, beyond it, nowhere."""
+    random = np.random.default_rng(11)
+    for _ in range(100):
+        line = make(np.cumsum(random.normal((1.0, 0.0), 1.0, (20, 2)), axis=0))
+        points = line.points[random.integers(0, len(line.points), 4)] \
+            + random.normal(0.0, random.choice((0.0, 0.1, 20.0)), (4, 2))
+        guess = random.uniform(-9.0, line.length + 9.0, 4)
+        guess[0], guess[1] = line.s[random.integers(0, len(line.s))], line.length
+        points[3, 0] = math.nan if random.random() < 0.1 else points[3, 0]
+        few = line.refine(points, guess, rounds, exact)
+        many = line.refine(np.tile(points, (10, 1)), np.tile(guess, 10), rounds, exact)
+        for one, other in zip(few, many, strict=True):
+            np.testing.assert_array_equal(one, other[:4])
 
 
 def test_the_frame_of_a_pose_is_turned_and_moved() -> None:

@@ -184,3 +184,16 @@ def test_missing_orientation_does_not_become_nan() -> None:
                  '</position><time><exact>0</exact></time></initialState></staticObstacle>')
     state = parse_scenario(text, 'x').scenario.obstacle_by_id(7).initial_state
     assert math.isfinite(state.orientation)
+
+
+def test_who_loads_a_text_again_has_a_scenario_of_his_own() -> None:
+    """What one changes in it is not seen by the next, whose scenario is as the text has it."""
+    first = parse_scenario(write(), 'a file')
+    first.scenario.lanelet_network.find_lanelet_by_id(1).left_vertices[:] += 100.0
+    first.scenario.remove_lanelet([first.scenario.lanelet_network.find_lanelet_by_id(2)])
+    again = parse_scenario(write(), 'a file')
+    lanelets = again.scenario.lanelet_network.lanelets
+    assert [lanelet.lanelet_id for lanelet in lanelets] == [1, 2]
+    assert lanelets[0].left_vertices.tolist() == [[0.0, 2.0], [50.0, 2.0]]
+    assert again.notices == first.notices
+    assert parse_scenario(write(), 'b').source == 'b'

@@ -55,7 +55,7 @@ def test_ends_where_the_human_first_violates(name: str, steps: int,
                  if item.vehicle_id == 'hv0' and not item.is_valid)
     assert free.stop is None and len(free.vehicle_states) == 701
     assert first.n == steps
-    assert ended.stop == replace(first, stop_requested=True)
+    assert ended.stop == first._replace(stop_requested=True)
     assert np.array_equal(ended.vehicle_states, free.vehicle_states[:steps + 1])
     assert np.array_equal(ended.commands, free.commands[:steps + 1])
     assert len(ended.object_poses) == len(ended.object_velocities) == steps // 10 + 1

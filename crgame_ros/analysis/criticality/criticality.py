@@ -31,12 +31,11 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     time_to_collision_accelerating,
 )
 from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
-from crgame_ros.analysis.criticality.footprint_approach import distance, time_to_contact
 from crgame_ros.analysis.criticality.leader import find_leader
+from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, Scene
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
@@ -44,14 +43,10 @@ from crgame_ros.simulation.observer import ObservedRun
 from crgame_ros.vehicle.state import pose_rates, StateColumn
 import numpy as np
 from numpy.typing import NDArray
-import shapely
 
 FloatArray = NDArray[np.float64]
 
 # Who is farther away is not near [m].
-NEAR = 100.0
-# A circle's footprint is a polygon around it of so many corners.
-CIRCLE_CORNERS = 32
 
 
 class Measure(NamedTuple):
@@ -180,19 +175,12 @@ class Criticality:
         self._scheduler = run.scheduler
         self._transforms = run.road_transforms
         self._rear_to_center = np.array([item.rear_to_center for item in run.vehicles])
-        outlines = [_convex(outline(item.shape, CIRCLE_CORNERS)) for item in everybody]
-        self._radii = np.array([np.hypot(*corners.T).max() for corners in outlines])
-        # In one array, shorter ones filled up; and who has as many corners, to compute no more.
-        most = max(map(len, outlines), default=1)
-        self._outlines = np.array([
-            np.concatenate((corners, np.repeat(corners[-1:], most - len(corners), axis=0)))
-            for corners in outlines]).reshape(-1, most, 2)
-        self._corners = np.array([len(corners) for corners in outlines], dtype=np.int64)
+        self._footprints = NearbyFootprints(everybody)
         roads = RoadNetwork(run.loaded.scenario.lanelet_network)
         self._paths = OwnPaths(roads, [
             frozenset() if problem is None else goal_lanelets(roads, problem)
             for problem in run.problems or (None,) * self.vehicles])
-        self._crossings = CrossedWays(self.vehicles, self._radii)
+        self._crossings = CrossedWays(self.vehicles, self._footprints.radii)
         self._before: tuple[float, FloatArray] | None = None
         self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, []) for item in run.vehicles]
         self.n = -1
@@ -211,12 +199,10 @@ class Criticality:
         poses = np.concatenate((centers, objects.poses))
         moves = np.concatenate((velocities, objects.velocities[:, :2]))
         accelerations = self._accelerations(time_s, vehicle_states, poses, moves)
-        placed_outlines = placed(self._outlines, poses)
-        self.latest = tuple(
-            self._measure(subject, poses, moves, accelerations, placed_outlines)
-            for subject in range(self.vehicles) if math.isfinite(poses[subject, 0]))
+        scene = self._footprints.scene(poses, moves, accelerations)
+        self.latest = self._measure(scene)
         self.new_crossings = tuple(self._crossings.observe(
-            time_s, placed_outlines, poses[:, :2]))
+            time_s, scene.outlines, poses[:, :2]))
         self._sum_up(time_s)
 
     def report(self) -> tuple[VehicleCriticality, ...]:
@@ -252,44 +238,42 @@ class Criticality:
         self._before = (time_s, moves)
         return result
 
-    def _measure(self, subject: int, poses: FloatArray, moves: FloatArray,
-                 accelerations: FloatArray, outlines: FloatArray) -> TickMeasures:
-        transform = self._transforms[subject]
-        if not transform.is_identity:
-            # Where the road is.
-            poses = transform.to_scenario(poses)
-            moves, accelerations = (transform.turn_to_scenario(vectors)
-                                    for vectors in (moves, accelerations))
-            outlines = placed(self._outlines, poses)
-        away = np.hypot(*(poses[:, :2] - poses[subject, :2]).T)
-        away[subject] = np.nan
-        others = np.flatnonzero(away - self._radii - self._radii[subject] < NEAR)
-        values = np.empty((len(others), len(MEASURES)))
-        values[:, :_OF_LEADER] = WITHOUT_LEADER
-        self._approach(subject, others, moves, outlines, values)
-        path = self._paths.at(subject, *poses[subject].tolist())
-        leader = find_leader(path, outlines[subject], poses[subject, :2], outlines[others],
-                             poses[others, :2], self._radii[others],
-                             values[:, COLUMN['min_distance']] == 0.0)
-        if leader is not None:
-            other = int(others[leader.number])
-            here, there = (np.array((math.cos(yaw), math.sin(yaw)))
-                           for yaw in (leader.own_heading, leader.heading))
-            values[leader.number, :_OF_LEADER] = _of_leader(
-                leader.gap, float(moves[subject] @ here), float(moves[other] @ there),
-                float(accelerations[subject] @ here), float(accelerations[other] @ there))
-        return TickMeasures(subject, others, values)
+    def _measure(self, scene: Scene) -> tuple[TickMeasures, ...]:
+        """Measure what each vehicle that is there has left to everybody near it."""
+        footprints = self._footprints
+        subjects = [subject for subject in range(self.vehicles)
+                    if math.isfinite(scene.poses[subject, 0])]
+        if not subjects:
+            return ()
+        scenes = [footprints.on_road(scene, self._transforms[subject]) for subject in subjects]
+        near = [footprints.near(*place) for place in zip(subjects, scenes, strict=True)]
+        found = []
+        for subject, others, place, pairs in zip(
+                subjects, near, scenes, footprints.approach(subjects, near, scenes), strict=True):
+            values = np.empty((len(others), len(MEASURES)))
+            values[:, :_OF_LEADER], values[:, _OF_LEADER:] = WITHOUT_LEADER, pairs
+            self._follow(subject, others, place, values)
+            found.append(TickMeasures(subject, others, values))
+        return tuple(found)
 
-    def _approach(self, subject: int, others: NDArray[np.int64], moves: FloatArray,
-                  outlines: FloatArray, values: FloatArray) -> None:
-        own = outlines[subject, :self._corners[subject]]
-        corners = self._corners[others]
-        for count in np.unique(corners):
-            rows = np.flatnonzero(corners == count)
-            theirs = outlines[others[rows], :count]
-            contact = time_to_contact(own, theirs, moves[subject], moves[others[rows]])
-            values[rows, COLUMN['ttc_2d']] = contact
-            values[rows, COLUMN['min_distance']] = distance(own, theirs, contact == 0.0)
+    def _follow(self, subject: int, others: NDArray[np.int64], scene: Scene,
+                values: FloatArray) -> None:
+        """Fill in the measures of car following, of the one that leads the vehicle."""
+        if not len(others):
+            return
+        poses, outlines = scene.poses, scene.outlines
+        seen = self._paths.at(subject, float(poses[subject, 2]), np.concatenate((
+            poses[subject, None, :2], outlines[subject], poses[others, :2])))
+        leader = find_leader(seen, outlines[others], self._footprints.radii[others],
+                             values[:, COLUMN['min_distance']] == 0.0)
+        if leader is None:
+            return
+        other, moves, accelerations = int(others[leader.number]), scene.moves, scene.accelerations
+        here, there = (np.array((math.cos(yaw), math.sin(yaw)))
+                       for yaw in (leader.own_heading, leader.heading))
+        values[leader.number, :_OF_LEADER] = _of_leader(
+            leader.gap, float(moves[subject] @ here), float(moves[other] @ there),
+            float(accelerations[subject] @ here), float(accelerations[other] @ there))
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s
@@ -320,12 +304,6 @@ def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: floa
                                            leader_acceleration),
             deceleration_to_avoid_crash(gap, speed, leader_speed),
             required_acceleration(gap, speed, leader_speed, leader_acceleration))
-
-
-def _convex(corners: FloatArray) -> FloatArray:
-    """Give the corners of the smallest convex footprint around one."""
-    hull = shapely.convex_hull(shapely.multipoints(corners))
-    return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
 # Of who leads nobody.

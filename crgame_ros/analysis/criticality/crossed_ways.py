@@ -78,6 +78,13 @@ class CrossedWays:
         self._watched = watched
         self._radii = radii
         self._past: deque[_Moment] = deque()
+        # How they moved from each moment to the next (T, N, 2), how far (T, N), and whence.
+        count = len(radii)
+        self._moves, self._lengths = np.empty((0, count, 2)), np.empty((0, count))
+        self._begins = np.empty((0, count, 2))
+        everybody = np.arange(count)
+        self._unwatched = everybody[watched:]
+        self._others = [np.delete(everybody, i) for i in range(watched)]
         self._inside: set[tuple[int, int]] = set()
 
     def observe(self, time_s: float, outlines: FloatArray,
@@ -91,49 +98,59 @@ class CrossedWays:
         """
         now = _Moment(time_s, outlines, centers)
         found = []
-        if len(self._past) > 1:
-            entering = self._candidates(now)
-            # Who has come out of an area may enter it anew.
-            self._inside &= entering.keys()
-            for pair, segments in entering.items():
-                crossing = self._enters(*pair, segments, now)
-                if crossing is not None:
-                    found.append(crossing)
+        if self._past:
+            before = self._past[-1].centers
+            ways = centers - before
+            lengths = np.hypot(ways[:, 0], ways[:, 1])
+            if len(self._past) > 1:
+                entering = self._candidates(before, ways, lengths)
+                # Who has come out of an area may enter it anew.
+                self._inside &= entering.keys()
+                for pair, segments in entering.items():
+                    crossing = self._enters(*pair, segments, now)
+                    if crossing is not None:
+                        found.append(crossing)
+            self._begins = np.concatenate((self._begins, before[None]))
+            self._moves = np.concatenate((self._moves, ways[None]))
+            self._lengths = np.concatenate((self._lengths, lengths[None]))
         self._past.append(now)
         while self._past[0].time_s < time_s - MEMORY_S:
             self._past.popleft()
+            self._begins, self._moves, self._lengths = (
+                each[1:] for each in (self._begins, self._moves, self._lengths))
         return found
 
-    def _candidates(self, now: _Moment) -> dict[tuple[int, int], list[int]]:
-        """List by (first, second) the steps of the first that the second's way may cross now."""
-        been = np.stack([moment.centers for moment in self._past])
-        moves = np.diff(been, axis=0)
-        ways = now.centers - been[-1]
-        steps, lengths = np.hypot(moves[..., 0], moves[..., 1]), np.hypot(ways[:, 0], ways[:, 1])
+    def _candidates(self, here: FloatArray, ways: FloatArray,
+                    lengths: FloatArray) -> dict[tuple[int, int], list[int]]:
+        """
+        List by (first, second) the steps of the first that the second's way may cross now.
+
+        :param here: (N, 2) where everybody was before this step [m]
+        :param ways: (N, 2) of this step [m]
+        :param lengths: (N) of these [m]
+        """
         pairs: dict[tuple[int, int], list[int]] = {}
-        everybody = np.arange(len(ways))
-        unwatched = everybody[self._watched:]
-        for i in range(self._watched):
-            others = np.delete(everybody, i)
-            near = _within(been[-1, i] - been[:-1, others],
-                           self._radii[i] + self._radii[others] + steps[:, others] + lengths[i])
+        unwatched = self._unwatched
+        for i, others in enumerate(self._others):
+            near = _within(here[i] - self._begins[:, others], self._radii[i]
+                           + self._radii[others] + self._lengths[:, others] + lengths[i])
             rows, columns = np.nonzero(near)
-            seconds = np.full(len(rows), i)
-            self._add(pairs, rows, others[columns], seconds, moves, ways)
+            self._add(pairs, rows, others[columns], np.full(len(rows), i), ways)
             # Those that are watched have their turn as the second one.
-            near = _within(been[-1, unwatched] - been[:-1, None, i],
-                           self._radii[i] + self._radii[unwatched] + steps[:, i, None]
-                           + lengths[unwatched])
-            rows, columns = np.nonzero(near)
-            self._add(pairs, rows, np.full(len(rows), i), unwatched[columns], moves, ways)
+            if len(unwatched):
+                near = _within(here[unwatched] - self._begins[:, None, i], self._radii[i]
+                               + self._radii[unwatched] + self._lengths[:, i, None]
+                               + lengths[unwatched])
+                rows, columns = np.nonzero(near)
+                self._add(pairs, rows, np.full(len(rows), i), unwatched[columns], ways)
         return pairs
 
-    @staticmethod
-    def _add(pairs: dict[tuple[int, int], list[int]], steps: NDArray[np.int64],
-             firsts: NDArray[np.int64], seconds: NDArray[np.int64], moves: FloatArray,
-             ways: FloatArray) -> None:
+    def _add(self, pairs: dict[tuple[int, int], list[int]], steps: NDArray[np.int64],
+             firsts: NDArray[np.int64], seconds: NDArray[np.int64], ways: FloatArray) -> None:
         """Note those whose ways cross, by their angle."""
-        (ax, ay), (bx, by) = moves[steps, firsts].T, ways[seconds].T
+        if not len(steps):
+            return
+        (ax, ay), (bx, by) = self._moves[steps, firsts].T, ways[seconds].T
         lengths, others = np.hypot(ax, ay), np.hypot(bx, by)
         crosses = (lengths > STANDING) & (others > STANDING) & (
             np.abs(ax * by - ay * bx) > math.sin(LEAST_ANGLE) * lengths * others)

@@ -16,7 +16,7 @@
 
 from typing import NamedTuple
 
-from crgame_ros.analysis.criticality.own_path import OwnPath
+from crgame_ros.analysis.criticality.own_path import SeenPath
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,30 +45,29 @@ class Ahead(NamedTuple):
     heading: float
 
 
-def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: FloatArray,
-                centers: FloatArray, radii: FloatArray,
+def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
                 touching: NDArray[np.bool_]) -> Ahead | None:
     """
     Find the nearest one ahead whose footprint overlaps the corridor of a vehicle.
 
-    :param path: of the vehicle; the corridor keeps the offset that the vehicle has now.
-    :param own: (C, 2) corners of its footprint [m]
-    :param own_center: (2) [m]
+    :param seen: path of the vehicle, from its centre, its corners and the centres of the others;
+        the corridor keeps the offset that the vehicle has now.
     :param others: (N, D, 2) corners of the others [m]
-    :param centers: (N, 2) of the others; NaN where absent [m]
     :param radii: (N) of circles around their centres that hold their footprints [m]
     :param touching: (N) whether they touch it; of those beside it these alone lead
     """
-    s, d = path.project(np.concatenate((own_center[None], own)))
-    low, high, front = d[1:].min() - MARGIN, d[1:].max() + MARGIN, s[1:].max()
-    away, guess = path.near(np.nan_to_num(centers, nan=np.inf, posinf=1e9))
+    path, mine = seen.path, len(seen.positions) - len(others)
+    s, d = (each.tolist() for each in path.refined(seen.positions[:mine], seen.guess[:mine]))
+    low, high, front = min(d[1:]) - MARGIN, max(d[1:]) + MARGIN, max(s[1:])
+    centers, away, guess = seen.positions[mine:], seen.away[mine:], seen.guess[mine:]
     reach = max(abs(low), abs(high)) + radii + SLACK
     candidates = np.flatnonzero((away < reach) & (guess > s[0] - radii - SLACK))
     if not len(candidates):
         return None
     places = np.concatenate((centers[candidates, None], others[candidates]), axis=1)
+    positions = places.reshape(-1, 2)
     along, aside = (each.reshape(places.shape[:2])
-                    for each in path.project(places.reshape(-1, 2)))
+                    for each in path.refined(positions, path.near(positions)[1]))
     rears, right, left = (along[:, 1:].min(axis=1), aside[:, 1:].min(axis=1),
                           aside[:, 1:].max(axis=1))
     # Who is passed closely is not in the way.
@@ -78,5 +77,6 @@ def find_leader(path: OwnPath, own: FloatArray, own_center: FloatArray, others: 
         return None
     rear = np.where(ahead, rears, np.inf)
     nearest = int(np.argmin(rear))
-    headings = path.line.heading_at(np.array([s[0], along[nearest, 0]]))
-    return Ahead(int(candidates[nearest]), float(rear[nearest] - front), *headings.tolist())
+    own_heading, heading = (path.line.place(at)[3]
+                            for at in (s[0], float(along[nearest, 0])))
+    return Ahead(int(candidates[nearest]), float(rear[nearest] - front), own_heading, heading)

@@ -60,13 +60,30 @@ class OwnPath(NamedTuple):
         dx, dy = (positions - self.samples[row]).T
         return np.asarray(np.sqrt(dx ** 2 + dy ** 2)), scale * row.astype(np.float64)
 
-    def project(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def refined(self, positions: FloatArray, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
         Find arc lengths and offsets to the left (N), (N) of positions (N, 2) [m].
 
-        By Newton's method from the nearest sample: in the same coordinates as those of the line.
+        By Newton's method from the nearest samples: in the same coordinates as those of the line.
+
+        :param guess: (N) their arc lengths, as `near` gives them [m]
         """
-        return self.line.refine(positions, self.near(positions)[1], ROUNDS, EXACT)
+        return self.line.refine(positions, guess, ROUNDS, EXACT)
+
+
+class SeenPath(NamedTuple):
+    """
+    A path, and who is beside it.
+
+    :param positions: (N, 2), that of the vehicle whose path it is first [m]
+    :param away: (N) their distances to the path's nearest samples [m]
+    :param guess: (N) arc lengths of these [m]
+    """
+
+    path: OwnPath
+    positions: FloatArray
+    away: FloatArray
+    guess: FloatArray
 
 
 class OwnPaths:
@@ -84,21 +101,25 @@ class OwnPaths:
         self._goals = goals
         self._paths: dict[tuple[frozenset[int], int], OwnPath] = {}
 
-    def at(self, vehicle: int, x: float, y: float, yaw: float) -> OwnPath:
+    def at(self, vehicle: int, yaw: float, positions: FloatArray) -> SeenPath:
         """
-        Give the path of a vehicle whose centre is at a pose.
+        Give the path of a vehicle, as it is seen from some positions.
 
         :param vehicle: its number among the driven ones.
+        :param yaw: of the vehicle [rad]
+        :param positions: (N, 2) of its centre, then of whomever [m]
         """
+        x, y = positions[0].tolist()
         lanelet = self._roads.lanelet_at(x, y, yaw) if self._roads.lanelet_ids else None
         if lanelet is not None:
             path = self._on_lane(self._goals[vehicle], lanelet)
-            s = path.near(np.array([[x, y]]))[1]
-            heading = float(path.line.heading_at(s)[0])
+            away, guess = path.near(positions)
+            heading = path.line.place(float(guess[0]))[3]
             if abs(wrap_pi(yaw - heading)) <= MAX_ANGLE:
-                return path
+                return SeenPath(path, positions, away, guess)
         ahead = (x + REACH * math.cos(yaw), y + REACH * math.sin(yaw))
-        return OwnPath.along(np.array([(x, y), ahead]))
+        path = OwnPath.along(np.array([(x, y), ahead]))
+        return SeenPath(path, positions, *path.near(positions))
 
     def _on_lane(self, goals: frozenset[int], lanelet: int) -> OwnPath:
         path = self._paths.get((goals, lanelet))

@@ -14,11 +14,7 @@
 # limitations under the License.
 """The page of a report: one file that needs nothing but a browser."""
 
-import base64
 from collections.abc import Callable, Iterator, Sequence
-import hashlib
-from pathlib import Path
-import re
 
 from crgame_ros.analysis.report.comparison import (
     accepted,
@@ -31,23 +27,18 @@ from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.motion_section import input_section, motion_section
 from crgame_ros.analysis.report.outcome_section import contacts_of_report, outcome_section
 from crgame_ros.analysis.report.plot_series import columns_for, encoded, script_json
+from crgame_ros.analysis.report.report_document import plotted_document
 from crgame_ros.analysis.report.report_run import ReportRun
 from crgame_ros.analysis.report.report_section import Plot, Section
-from crgame_ros.analysis.report.report_text import free, NOTHING, number, plain
+from crgame_ros.analysis.report.report_text import free, NOTHING, number
 from crgame_ros.analysis.report.run_section import began, run_section, title_of
 from crgame_ros.analysis.report.story_section import story_section
 from crgame_ros.analysis.report.timing_section import plan_section, timing_section
-from crgame_ros.paths import plotly_script
 
-PAGE = Path(__file__).resolve().parent / 'page'
 # The parts of a run's report, in their order: whoever has more to tell adds one.
 SECTIONS: tuple[Callable[[ReportRun], Section | None], ...] = (
     story_section, criticality_section, outcome_section, driving_section, input_section,
     motion_section, plan_section, timing_section, run_section)
-# Plotly makes an empty `<style>` whose rules it then adds by script.
-_EMPTY = ''
-# Of maps, which no report has, it adds a style as soon as it is loaded, unless somebody has.
-_STYLE_OF_MAPS = re.compile(r'getElementById\("([0-9a-f]{64})"\)')
 
 
 def report_html(runs: Sequence[ReportRun], software: str = '') -> str:
@@ -77,33 +68,7 @@ def report_html(runs: Sequence[ReportRun], software: str = '') -> str:
         body.append('</article>' if several else '')
     body.append(f'</main><footer>{software}</footer>')
     data = script_json({key: encoded(plot, columns) for key, plot in plots})
-    return _document(title, '\n'.join(body), data)
-
-
-def _document(title: str, body: str, data: str) -> str:
-    style, script = ((PAGE / name).read_text(encoding='utf-8')
-                     for name in ('report.css', 'report.js'))
-    plotly = plotly_script().read_text(encoding='utf-8')
-    policy = '; '.join((
-        "default-src 'none'", f'script-src {_hash(plotly)} {_hash(script)}',
-        f'style-src {_hash(style)} {_hash(_EMPTY)}', 'img-src data:', "base-uri 'none'",
-        "form-action 'none'"))
-    done = ''.join(f'<template id="{found}"></template>'
-                   for found in dict.fromkeys(_STYLE_OF_MAPS.findall(plotly)))
-    return '\n'.join((
-        '<!DOCTYPE html>', '<html lang="en">', '<head>', '<meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        '<meta name="referrer" content="no-referrer">',
-        f'<title>{plain(title)} – report</title>', '<link rel="icon" href="data:,">',
-        f'<style>{style}</style>{done}', '</head>', '<body>', body,
-        f'<script id="plots" type="application/json">{data}</script>',
-        f'<script>{plotly}</script>', f'<script>{script}</script>', '</body>', '</html>', ''))
-
-
-def _hash(text: str) -> str:
-    digest = hashlib.sha256(text.encode()).digest()
-    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
+    return plotted_document(title, '\n'.join(body), data)
 
 
 def _header(runs: Sequence[ReportRun], title: str) -> str:

@@ -21,9 +21,9 @@ from crgame_ros.analysis.criticality.criticality import (
     COLUMN,
     Criticality,
     MEASURES,
-    NEAR,
     WITHOUT_LEADER,
 )
+from crgame_ros.analysis.criticality.nearby_footprints import NEAR
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.analysis.tables.column import (
     Column,

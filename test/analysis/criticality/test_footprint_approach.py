@@ -14,7 +14,11 @@
 # limitations under the License.
 """Footprints that approach each other, against a search by shapely in small steps."""
 
-from crgame_ros.analysis.criticality.footprint_approach import distance, time_to_contact
+from crgame_ros.analysis.criticality.footprint_approach import (
+    approach,
+    distance,
+    time_to_contact,
+)
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -100,3 +104,18 @@ def test_side_by_side_never_touch() -> None:
     along = np.array([10.0, 0.0])
     beside = np.stack((square + (0.0, 2.5), square + (0.0, 1.5)))
     np.testing.assert_array_equal(time_to_contact(square, beside, along, along), [np.inf, 0.0])
+
+
+def test_two_footprints_are_measured_to_the_last_bit_as_many() -> None:
+    """With numbers as with arrays: touching, passing, side by side at rest to each other."""
+    random = np.random.default_rng(17)
+    for case in range(600):
+        first, second = (_placed(random, int(random.choice((3, 4, 4, 7)))) for _ in range(2))
+        if case % 3 == 0:
+            # Along each other's edges, or one over the other.
+            first, second = np.round(first - first[0]), np.round(second - second[0])
+        velocity, other = random.uniform(-20.0, 20.0, (2, 2))
+        velocity[case % 2] = other[case % 2] if case % 4 < 2 else velocity[case % 2]
+        contact = time_to_contact(first, second, velocity, other)
+        assert approach(first.tolist(), second.tolist(), (other - velocity).tolist()) == (
+            contact, distance(first, second, contact == 0.0))

@@ -1,0 +1,133 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Everybody's footprint at a tick: who is near a vehicle, how far away and how soon there."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from crgame_ros.analysis.criticality.footprint_approach import (
+    approach,
+    distance,
+    time_to_contact,
+)
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.rigid_transform import RigidTransform
+import numpy as np
+from numpy.typing import NDArray
+import shapely
+
+FloatArray = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+NEAR = 100.0
+CIRCLE_CORNERS = 32
+# Pairs that have no more corners than this together are measured one by one.
+FEW_CORNERS = 16
+
+
+class Scene(NamedTuple):
+    """
+    Where everybody (N) is at a tick, driven vehicles first.
+
+    :param poses: (N, 3) of the centres.
+    :param moves: (N, 2) their velocities.
+    :param accelerations: (N, 2)
+    :param outlines: (N, C, 2) corners of the footprints; who has fewer repeats the last.
+    """
+
+    poses: FloatArray
+    moves: FloatArray
+    accelerations: FloatArray
+    outlines: FloatArray
+
+
+class NearbyFootprints:
+    """
+    The footprints of everybody in a run, as the smallest convex ones around them.
+
+    :param everybody: (N) driven vehicles, then all others.
+    :ivar radii: (N) of circles around the centres that hold the footprints [m]
+    """
+
+    def __init__(self, everybody: Sequence[ObjectDescription]) -> None:
+        outlines = [_convex(outline(item.shape, CIRCLE_CORNERS)) for item in everybody]
+        self.radii = np.array([np.hypot(*corners.T).max() for corners in outlines])
+        # In one array, shorter ones filled up; and who has as many corners, to compute no more.
+        self._most = max(map(len, outlines), default=1)
+        self._outlines = np.array([
+            np.concatenate((corners, np.repeat(corners[-1:], self._most - len(corners), axis=0)))
+            for corners in outlines]).reshape(-1, self._most, 2)
+        self._corners = np.array([len(corners) for corners in outlines], dtype=np.int64)
+
+    def scene(self, poses: FloatArray, moves: FloatArray, accelerations: FloatArray) -> Scene:
+        """Give where everybody is; parameters as of `Scene`."""
+        return Scene(poses, moves, accelerations, placed(self._outlines, poses))
+
+    def on_road(self, scene: Scene, transform: RigidTransform) -> Scene:
+        """Give a scene where the road of a vehicle is."""
+        if transform.is_identity:
+            return scene
+        return self.scene(transform.to_scenario(scene.poses),
+                          transform.turn_to_scenario(scene.moves),
+                          transform.turn_to_scenario(scene.accelerations))
+
+    def near(self, subject: int, scene: Scene) -> Numbers:
+        """List by number who is near a vehicle."""
+        x, y = (scene.poses[:, :2] - scene.poses[subject, :2]).T
+        away = np.hypot(x, y)
+        away[subject] = np.nan
+        return np.flatnonzero(away - self.radii - self.radii[subject] < NEAR)
+
+    def approach(self, subjects: Sequence[int], near: Sequence[Numbers],
+                 scenes: Sequence[Scene]) -> list[FloatArray]:
+        """
+        Give ttc_2d [s] and min_distance [m] of vehicles to those near them, (P, 2) each.
+
+        :param subjects: numbers of the vehicles, one at least.
+        :param near: who is near each.
+        :param scenes: where the road of each is.
+        """
+        counts = [len(others) for others in near]
+        if sum(counts) * self._most <= FEW_CORNERS:
+            return [self._approach_few(subject, others.tolist(), scene)
+                    for subject, others, scene in zip(subjects, near, scenes, strict=True)]
+        rows, others = np.repeat(np.arange(len(subjects)), counts), np.concatenate(near)
+        own = np.repeat(subjects, counts)
+        outlines = np.stack([scene.outlines for scene in scenes])
+        moves = np.stack([scene.moves for scene in scenes])
+        corners = np.maximum(self._corners[own], self._corners[others])
+        result = np.empty((len(others), 2))
+        for count in set(corners.tolist()):
+            pairs = np.flatnonzero(corners == count)
+            row, first, second = rows[pairs], own[pairs], others[pairs]
+            footprints = outlines[row, first, :count], outlines[row, second, :count]
+            contact = time_to_contact(*footprints, moves[row, first], moves[row, second])
+            result[pairs, 0] = contact
+            result[pairs, 1] = distance(*footprints, contact == 0.0)
+        return np.split(result, np.cumsum(counts)[:-1])
+
+    def _approach_few(self, subject: int, others: list[int], scene: Scene) -> FloatArray:
+        own = scene.outlines[subject, :self._corners[subject]].tolist()
+        return np.array([approach(
+            own, scene.outlines[other, :self._corners[other]].tolist(),
+            (scene.moves[other] - scene.moves[subject]).tolist()) for other in others]
+        ).reshape(-1, 2)
+
+
+def _convex(corners: FloatArray) -> FloatArray:
+    """Give the corners of the smallest convex footprint around one."""
+    hull = shapely.convex_hull(shapely.multipoints(corners))
+    return np.asarray(shapely.get_coordinates(hull)[:-1])

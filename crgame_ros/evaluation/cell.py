@@ -1,0 +1,101 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One run of an evaluation, and the key that names everything it depends on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+import hashlib
+import json
+from typing import Any
+
+from crgame_ros.evaluation.content import digests_in
+
+KEY_DIGITS = 32
+# Columns that tell cells apart, in every table.
+FACTORS = ('scenario', 'game', 'human', 'planner', 'perception', 'traffic', 'seed')
+
+
+@dataclass(frozen=True)
+class Cell:
+    """
+    A run to compute, whole: who has this and its contents needs nothing else.
+
+    :param scenario: benchmark id.
+    :param game: name of the game's file, or empty.
+    :param human: name of the recorded run whose humans drive, or empty.
+    :param planner: label of who drives the AVs.
+    :param perception: label of how they perceive.
+    :param traffic: label of the traffic.
+    :param seed: of everything random.
+    :param values: of the game; files are references to contents.
+    :param inputs: digest of what recorded humans did, or empty.
+    :param planner_choice: `planner` and `options` of all AVs; None leaves the game's.
+    :param perception_values: of all AVs, as a game has them; None is perfect, `own` the game's.
+    :param traffic_values: likewise.
+    :param duration_s: simulated; None as the game says [s]
+    :param latency_steps: simulation steps between a request and its plan.
+    :param code: digests of the engine's and the planners' code.
+    """
+
+    scenario: str
+    game: str
+    human: str
+    planner: str
+    perception: str
+    traffic: str
+    seed: int
+    values: Mapping[str, Any]
+    inputs: str
+    planner_choice: Mapping[str, Any] | None
+    perception_values: Any
+    traffic_values: Any
+    duration_s: float | None
+    latency_steps: int
+    code: tuple[str, ...]
+
+    @cached_property
+    def text(self) -> str:
+        """Give all of it as JSON, the same for equal cells."""
+        return json.dumps({item.name: getattr(self, item.name) for item in fields(self)},
+                          sort_keys=True, separators=(',', ':'), allow_nan=True)
+
+    @cached_property
+    def key(self) -> str:
+        """Name it by a hash of everything that its results depend on."""
+        return hashlib.sha256(self.text.encode()).hexdigest()[:KEY_DIGITS]
+
+    @property
+    def contents(self) -> set[str]:
+        """Name the contents that it needs."""
+        return digests_in(self.text) | ({self.inputs} if self.inputs else set())
+
+    @property
+    def factors(self) -> dict[str, Any]:
+        """Give what tells it apart."""
+        return {name: getattr(self, name) for name in FACTORS}
+
+    @property
+    def label(self) -> str:
+        """Name it for people."""
+        place = self.human or self.game or self.scenario
+        more = [text for text in (self.perception, self.traffic) if text != 'own']
+        return ' · '.join((place, self.planner, *more, f'seed {self.seed}'))
+
+
+def cell_of(text: str) -> Cell:
+    """Give the cell of its JSON."""
+    values = json.loads(text)
+    return Cell(**values | {'code': tuple(values['code'])})

@@ -1,0 +1,155 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""All cells of an evaluation, one after the other, none held."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any, Self
+
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell import Cell
+from crgame_ros.evaluation.cell_scene import (
+    files_of,
+    GAME_SUFFIXES,
+    runs_of,
+    SCENARIO_SUFFIXES,
+    Scene,
+    scene_of_game,
+    scene_of_run,
+    scene_of_scenario,
+    with_contents,
+)
+from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.evaluation_plan import EvaluationPlan, OWN
+from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
+from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
+from crgame_ros.schema.writing import write
+
+
+@dataclass(frozen=True)
+class GridPlanner:
+    """
+    Who drives all AVs.
+
+    :param label: by which tables name it.
+    :param choice: its name and options; None leaves each game's own planners.
+    :param digest: of its code.
+    """
+
+    label: str
+    choice: dict[str, Any] | None
+    digest: str
+
+
+@dataclass(frozen=True)
+class CellGrid:
+    """
+    Scenes crossed with planners, perception, traffic and seeds.
+
+    :param scenes: their labels differ.
+    :param planners: who drives the AVs.
+    :param perception: values by label.
+    :param traffic: values by label.
+    :param seeds: of everything random.
+    :param duration_s: of each cell; None as games say [s]
+    :param latency_steps: between a request and its plan.
+    :param engine: digest of the engine's code.
+    """
+
+    scenes: tuple[Scene, ...]
+    planners: tuple[GridPlanner, ...]
+    perception: dict[str, Any]
+    traffic: dict[str, Any]
+    seeds: tuple[int, ...]
+    duration_s: float | None
+    latency_steps: int
+    engine: str
+
+    def __len__(self) -> int:
+        return len(self.scenes) * len(self.planners) * len(self.perception) \
+            * len(self.traffic) * len(self.seeds)
+
+    def __iter__(self) -> Iterator[Cell]:
+        for seed in self.seeds:
+            for scene in self.scenes:
+                for planner in self.planners:
+                    for perception, seen in self.perception.items():
+                        for traffic, flow in self.traffic.items():
+                            yield Cell(
+                                scene.scenario, scene.game, scene.human, planner.label,
+                                perception, traffic, seed, scene.values, scene.inputs,
+                                planner.choice, seen, flow, self.duration_s, self.latency_steps,
+                                (self.engine, *self._code(scene, planner)))
+
+    def _code(self, scene: Scene, planner: GridPlanner) -> tuple[str, ...]:
+        return (planner.digest,) if planner.choice is not None else scene.digests
+
+    def as_dict(self) -> dict[str, Any]:
+        """Say it as JSON has it."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """Give what `as_dict` told."""
+        return cls(**values | {
+            'scenes': tuple(Scene(**scene | {'digests': tuple(scene['digests'])})
+                            for scene in values['scenes']),
+            'planners': tuple(GridPlanner(**planner) for planner in values['planners']),
+            'seeds': tuple(values['seeds'])})
+
+
+def make_grid(plan: EvaluationPlan, store: ContentStore,
+              progress: Callable[[float], object] = lambda _: None) -> CellGrid:
+    """
+    Load and check everything that a plan names, and take its files into a store.
+
+    :param progress: is told how much is done, 0 to 1.
+    :raises InputError: if anything cannot be used.
+    """
+    planners = tuple(_planner(choice.planner, choice.name, choice.options, store)
+                     for choice in plan.planners)
+    perception = {label: value if value in (None, OWN) else with_contents(write(value), store)
+                  for label, value in plan.perceptions().items()}
+    traffic = {label: value if value in (None, OWN) else with_contents(write(value), store)
+               for label, value in plan.traffics().items()}
+    places = [
+        *((scene_of_game, path) for path in files_of(
+            plan.games, plan.base, GAME_SUFFIXES, 'game file')),
+        *((scene_of_scenario, path) for path in files_of(
+            plan.scenarios, plan.base, SCENARIO_SUFFIXES, 'CommonRoad file')),
+        *((scene_of_run, path) for path in runs_of(plan.humans, plan.base))]
+    scenes: list[Scene] = []
+    for number, (make, path) in enumerate(places):
+        scene = make(path, store)
+        if any(each.label == scene.label for each in scenes):
+            raise InputError(f'another one is called {scene.label}, too', str(path),
+                             'rename one of them, or evaluate them apart')
+        if not scene.digests:
+            raise InputError('no AV takes part', str(path), 'leave it out, or name AVs in a game')
+        scenes.append(scene)
+        progress((number + 1) / len(places))
+    return CellGrid(tuple(scenes), planners, perception, traffic, plan.seed_numbers(),
+                    plan.duration, plan.latency, engine_digest())
+
+
+def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore) -> GridPlanner:
+    if name == OWN:
+        return GridPlanner(label, None, '')
+    if name == EXTERNAL:
+        raise InputError('an external planner answers live runs only', 'planners',
+                         'name another planner')
+    create_planner(name, options)
+    return GridPlanner(label, with_contents({'planner': name, 'options': options}, store),
+                       planner_digest(name))

@@ -1,0 +1,217 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A process of its own for cells: one that hangs, eats memory or dies takes nobody along."""
+
+from contextlib import suppress
+import json
+import os
+from pathlib import Path
+import resource
+import select
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import traceback
+from typing import Any, BinaryIO, NoReturn
+
+from crgame_ros.errors import CrgameError
+
+_LENGTH = struct.Struct('<Q')
+# Results do not depend on how many threads a library takes, and workers share the processors.
+_ONE_THREAD = dict.fromkeys((
+    'OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS'), '1')
+# Of what a cell printed, so much is told when it died.
+_TOLD_BYTES = 2000
+_STARTS_S, _ENDS_S = 120.0, 5.0
+
+
+class CellProcess:
+    """
+    Computes cells one after the other; a new process takes over from one that ended.
+
+    :param contents: folder of the store with what cells name.
+    :param memory_bytes: that the process may take for data.
+    """
+
+    def __init__(self, contents: Path, memory_bytes: int) -> None:
+        self._contents, self._memory_bytes = contents, memory_bytes
+        self._process: subprocess.Popen[bytes] | None = None
+        self._errors: BinaryIO | None = None
+
+    def compute(self, cell: str, timeout_s: float) -> dict[str, Any]:
+        """
+        Compute a cell.
+
+        :param cell: as JSON.
+        :param timeout_s: after which it is given up.
+        :return: its rows, as `cell_run.compute_cell` gives them; of a cell that failed the status
+            and the reason.
+        """
+        start_s = time.perf_counter()
+        rows = self._once(cell, timeout_s)
+        if rows['cell']['status'] == 'died' and signal.SIGKILL.name in rows['cell']['reason']:
+            # By somebody else: what it was computing may have nothing to do with it.
+            rows = self._once(cell, timeout_s)
+        rows.setdefault('work', {})['wall_s'] = time.perf_counter() - start_s
+        return rows
+
+    def _once(self, cell: str, timeout_s: float) -> dict[str, Any]:
+        process = self._started()
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            _write(process.stdin, cell.encode())
+            answer = _read(process.stdout, timeout_s)
+        except TimeoutError:
+            self.close()
+            rows = _failed('timeout', f'not done after {timeout_s:g} s of wall time')
+        except (OSError, EOFError):
+            rows = self._dead(process)
+        else:
+            rows = json.loads(answer)
+            if rows['cell']['status'] == 'memory':
+                # What is left of the memory is in pieces.
+                self.close()
+        return dict(rows)
+
+    def close(self) -> None:
+        """End the process."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+            for stream in (process.stdin, process.stdout, self._errors):
+                with suppress(OSError):
+                    if stream is not None:
+                        stream.close()
+
+    def _started(self) -> 'subprocess.Popen[bytes]':
+        if self._process is None or self._process.poll() is not None:
+            self.close()
+            self._errors = tempfile.TemporaryFile()
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', __spec__.name, str(self._contents),
+                 str(self._memory_bytes)],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
+                env=os.environ | _ONE_THREAD)
+            assert self._process.stdout is not None
+            with suppress(OSError, EOFError, TimeoutError):
+                # It says when it has loaded everything, so that no cell's time counts it.
+                _read(self._process.stdout, _STARTS_S)
+        return self._process
+
+    def _dead(self, process: 'subprocess.Popen[bytes]') -> dict[str, Any]:
+        try:
+            code = process.wait(_ENDS_S)
+        except subprocess.TimeoutExpired:
+            # It has closed its pipes, and goes on without them.
+            process.kill()
+            code = process.wait()
+        said = ''
+        if self._errors is not None:
+            with suppress(OSError):
+                self._errors.seek(0, os.SEEK_END)
+                self._errors.seek(max(0, self._errors.tell() - _TOLD_BYTES))
+                said = self._errors.read().decode(errors='replace').strip()
+        self.close()
+        how = f'exit code {code}' if code >= 0 else signal.Signals(-code).name
+        return _failed('died', f'its process ended with {how}', said)
+
+
+def _failed(status: str, reason: str, trace: str = '') -> dict[str, Any]:
+    return {'cell': {'status': status, 'reason': reason, 'traceback': trace}, 'vehicles': []}
+
+
+def _write(stream: Any, data: bytes) -> None:
+    stream.write(_LENGTH.pack(len(data)) + data)
+    stream.flush()
+
+
+def _read(stream: Any, timeout_s: float) -> bytes:
+    """
+    Read a message.
+
+    :raises TimeoutError: if it is not there in time.
+    :raises EOFError: if there will be none.
+    """
+    end_s = time.monotonic() + timeout_s
+    data, wanted = b'', _LENGTH.size
+    while len(data) < wanted:
+        if not select.select([stream], [], [], max(0.0, end_s - time.monotonic()))[0]:
+            raise TimeoutError
+        piece = os.read(stream.fileno(), min(wanted - len(data), 1 << 20))
+        if not piece:
+            raise EOFError
+        data += piece
+        if len(data) == _LENGTH.size:
+            wanted += _LENGTH.unpack(data)[0]
+    return data[_LENGTH.size:]
+
+
+def main() -> NoReturn:
+    """Compute cells that standard input names until it ends; answers go to standard output."""
+    contents, memory_bytes = Path(sys.argv[1]), int(sys.argv[2])
+    # Whoever started it is told to stop by a person; it ends when that one does.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), 'wb')
+    # What planners print is for nobody.
+    os.dup2(2, 1)
+    from crgame_ros.evaluation.cell import cell_of
+    from crgame_ros.evaluation.cell_run import compute_cell
+    from crgame_ros.evaluation.content import PREFIX
+    resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
+    _write(answers, b'')
+    for text in _messages():
+        with suppress(OSError):
+            os.ftruncate(2, 0)
+        try:
+            rows = compute_cell(cell_of(text), contents)
+        except MemoryError:
+            rows = _failed('memory', f'it wanted more than {memory_bytes / 1e9:g} GB',
+                           traceback.format_exc())
+        except CrgameError as error:
+            rows = _failed('error', str(error))
+        except Exception as error:
+            rows = _failed('error', f'{type(error).__name__}: {error}', traceback.format_exc())
+        # Where the files lie is another place on every machine.
+        here = json.dumps(f'{contents}/')[1:-1]
+        _write(answers, json.dumps(rows).replace(here, PREFIX).encode())
+    sys.exit(0)
+
+
+def _messages() -> Any:
+    """Give the texts of cells; when nobody is left who asks, the process ends at once."""
+    waiting: list[str] = []
+    there = threading.Semaphore(0)
+
+    def listen() -> None:
+        while True:
+            try:
+                waiting.append(_read(sys.stdin, threading.TIMEOUT_MAX).decode())
+            except (OSError, EOFError):
+                os._exit(0)
+            there.release()
+
+    threading.Thread(target=listen, daemon=True).start()
+    while True:
+        there.acquire()
+        yield waiting.pop(0)
+
+
+if __name__ == '__main__':
+    main()

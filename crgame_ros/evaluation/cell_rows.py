@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What is kept of a cell: its rows in the tables, and their declarations."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from crgame_ros.analysis.tables.column import (
+    Column,
+    FLAG,
+    INTEGER,
+    NUMBER,
+    TableDeclaration,
+    TEXT,
+)
+from crgame_ros.analysis.tables.table_part import part_rows
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS
+from crgame_ros.simulation.contacts import contacts_of
+from crgame_ros.simulation.offline import OfflineResult, PlannerRecord
+
+STATUSES = ('ok', 'error', 'timeout', 'memory', 'died')
+_KEY = Column('cell', TEXT, '', 'key of the cell: a hash of everything that it depends on')
+_FACTORS = (
+    Column('scenario', TEXT, '', 'benchmark id'),
+    Column('game', TEXT, '', "name of the game's file", empty='it is a scenario without a game'),
+    Column('human', TEXT, '', 'name of the recorded run whose humans drive',
+           empty='nobody recorded drives'),
+    Column('planner', TEXT, '', 'label of who drives the AVs'),
+    Column('perception', TEXT, '', 'label of how AVs perceive'),
+    Column('traffic', TEXT, '', 'label of the traffic'),
+    Column('seed', INTEGER, '1', 'of everything random'))
+FAILED = 'the cell failed'
+CELLS = TableDeclaration('cells', 'a cell', ('cell',), (
+    _KEY, *_FACTORS,
+    Column('status', TEXT, '', 'how it ended', values=STATUSES),
+    Column('reason', TEXT, '', 'why it failed, in a line', empty='it did not'),
+    Column('traceback', TEXT, '', 'where it failed', empty='it did not, or nobody knows'),
+    Column('simulated_s', NUMBER, 's', 'how long the run was', empty=FAILED),
+    Column('state_hash', TEXT, '', 'SHA-256 over all states of the driven vehicles',
+           empty=FAILED),
+    Column('contacts', INTEGER, '1', 'first contacts of driven vehicles with something',
+           empty=FAILED),
+    Column('stopped', FLAG, '', "whether a human's violation ended it", empty=FAILED)))
+_OUTCOME = (
+    Column('collided', FLAG, '', 'whether it touched anything'),
+    Column('left_road', FLAG, '', 'whether a part of its footprint was off the road'),
+    Column('accepted_ratio', NUMBER, '1', "share of its planner's answers that were accepted and "
+           'no fallback', empty='a human drives it'))
+_PARTS = tuple(column for part in VEHICLE_PARTS for column in part.columns
+               if column.name not in ('run', 'id'))
+VEHICLES_OF_CELLS = TableDeclaration('vehicles', 'a driven vehicle of a cell', (
+    'cell', 'vehicle'), (_KEY, *_FACTORS, Column('vehicle', TEXT, '', 'id of the vehicle'),
+                         *_OUTCOME, *_PARTS))
+WORK = TableDeclaration('work', 'the computing of a cell', ('cell',), (
+    _KEY, Column('worker', TEXT, '', 'address of who computed it'),
+    Column('wall_s', NUMBER, 's', 'time that it took'),
+    Column('computing_s', NUMBER, 's', 'processor time that it took', empty=FAILED),
+    Column('peak_bytes', INTEGER, '1', 'largest resident memory of the process so far',
+           empty=FAILED),
+    Column('plan_p50_s', NUMBER, 's', 'median time that planners took to plan', empty=FAILED),
+    Column('plan_max_s', NUMBER, 's', 'greatest such time', empty=FAILED)))
+TABLES_OF_CELLS = (CELLS, VEHICLES_OF_CELLS, WORK)
+
+
+def outcome_of(result: OfflineResult) -> dict[str, Any]:
+    """Give the columns of the cell's row that a run fills."""
+    steps = len(result.vehicle_states) - 1
+    return {'status': 'ok', 'simulated_s': steps * result.setup.scheduler.dt_s,
+            'state_hash': result.state_hash, 'contacts': len(contacts_of(result)),
+            'stopped': result.stop is not None}
+
+
+def vehicle_rows(run: TabulatedRun, result: OfflineResult) -> list[dict[str, Any]]:
+    """Give the rows of a run's driven vehicles."""
+    columns: dict[str, Sequence[Any]] = part_rows(VEHICLE_PARTS, run)
+    ids = columns.pop('id')
+    del columns['run']
+    rows = []
+    for place, vehicle in enumerate(ids):
+        verdicts = [item for item in result.violations if item.vehicle_id == vehicle]
+        record = result.planners.get(vehicle)
+        rows.append({
+            'vehicle': vehicle,
+            'collided': any(item.collision for item in verdicts),
+            'left_road': any(item.off_road for item in verdicts),
+            'accepted_ratio': None if record is None else record.accepted_ratio,
+            **{name: _plain(values[place]) for name, values in columns.items()}})
+    return rows
+
+
+def planner_counts(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
+    """Give what `timing.json` would say of the planners."""
+    return {name: {**{key: getattr(record.counters, key) for key in (
+        'requests', 'skipped', 'timed_out', 'accepted', 'refused', 'realigned',
+        'steps_without_plan')}, 'fallback': record.statistics.fallbacks}
+        for name, record in planners.items()}
+
+
+def _plain(value: Any) -> Any:
+    """Give a value as JSON has it."""
+    return value.item() if hasattr(value, 'item') else value

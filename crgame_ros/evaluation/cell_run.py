@@ -1,0 +1,161 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Computing one cell: an offline run, and its measures."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+import re
+import resource
+import time
+from typing import Any
+
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.evaluation.cell import Cell
+from crgame_ros.evaluation.cell_rows import outcome_of, planner_counts, vehicle_rows
+from crgame_ros.evaluation.cell_scene import INPUTS
+from crgame_ros.evaluation.content import resolved
+from crgame_ros.evaluation.evaluation_plan import OWN
+from crgame_ros.game.game import Game
+from crgame_ros.game.game_file import parse_game
+from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.recording.run_record import run_record_of
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.schema.reading import read
+from crgame_ros.simulation.cast import cast_avs
+from crgame_ros.simulation.offline import OfflineResult, PlannerRecord, run_offline
+from crgame_ros.simulation.setup import build_setup, Setup
+import numpy as np
+
+# How a planner's reason begins when its code failed: by the name of the exception.
+_CODE_FAILED = re.compile(r'(setup failed: )?(\w*(Error|Exception|Interrupt|Iteration))\b')
+
+
+def run_cell(cell: Cell, contents: Path) -> OfflineResult:
+    """
+    Run a cell offline.
+
+    :param contents: folder of the store that holds what it names.
+    :raises InputError: if something of it cannot be used.
+    """
+    setup = cell_setup(cell, contents)
+    inputs = _inputs(cell, contents)
+    return run_offline(setup, duration_s=cell.duration_s, latency_steps=cell.latency_steps,
+                       drivers=inputs.drivers, intervals_s=inputs.intervals_s,
+                       clock_s=time.perf_counter)
+
+
+def cell_setup(cell: Cell, contents: Path) -> Setup:
+    """
+    Load and place what a cell says.
+
+    :raises InputError: if something of it cannot be used.
+    """
+    game = parse_game(_resolved(cell.values, contents), cell.label, contents)
+    loaded = load_scenario(game.scenario)
+    return build_setup(_adapted(game, loaded, cell, contents), loaded)
+
+
+def _adapted(game: Game, loaded: LoadedScenario, cell: Cell, contents: Path) -> Game:
+    """Let a game's AVs and traffic be those of the cell."""
+    specs = [spec for spec, _ in cast_avs(game, loaded)[0]]
+    if cell.planner_choice is not None:
+        choice = _resolved(cell.planner_choice, contents)
+        specs = [replace(spec, planner=choice['planner'], options=choice['options'])
+                 for spec in specs]
+    if cell.perception_values != OWN:
+        perception = None if cell.perception_values is None else read(
+            PerceptionSpec, _resolved(cell.perception_values, contents), 'perception', contents)
+        specs = [replace(spec, perception=perception) for spec in specs]
+    if cell.traffic_values != OWN:
+        traffic = None if cell.traffic_values is None else read(
+            TrafficSpec, _resolved(cell.traffic_values, contents), 'traffic', contents)
+        game = replace(game, traffic=traffic)
+    return replace(game, avs=tuple(specs), seed=cell.seed)
+
+
+def _resolved(value: Any, contents: Path) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _resolved(item, contents) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_resolved(item, contents) for item in value]
+    return resolved(value, contents) if isinstance(value, str) else value
+
+
+def _inputs(cell: Cell, contents: Path) -> RecordedInputs:
+    if not cell.inputs:
+        return RecordedInputs({}, None)
+    with np.load(contents / cell.inputs / INPUTS, allow_pickle=False) as file:
+        return RecordedInputs(
+            {name.removeprefix('command_'): ReplayDriver(file[name]) for name in file.files
+             if name.startswith('command_')}, file['intervals_s'])
+
+
+def measured(cell: Cell, result: OfflineResult) -> TabulatedRun:
+    """Measure a run, as a run to tabulate."""
+    record = run_record_of(result)
+    run = TabulatedRun(cell.key, record, {'planners': planner_counts(result.planners)})
+    found = measure_log(record.log)
+    run.criticality.update({item.vehicle_id: item for item in found.report()})
+    return run
+
+
+def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
+    """
+    Run and measure a cell.
+
+    :return: its rows as JSON has them: `cell`, `vehicles`, `work`.
+    :raises InputError: if something of it cannot be used.
+    """
+    start_s, computed_s = time.perf_counter(), time.process_time()
+    result = run_cell(cell, contents)
+    vehicles = vehicle_rows(measured(cell, result), result)
+    durations_s = [time_s for record in result.planners.values()
+                   for time_s in record.statistics.durations_s]
+    return {
+        'cell': outcome_of(result) | _failure(result.planners),
+        'vehicles': vehicles,
+        'work': {
+            'wall_s': time.perf_counter() - start_s,
+            'computing_s': time.process_time() - computed_s,
+            'peak_bytes': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+            **({} if not durations_s else {'plan_p50_s': float(np.median(durations_s)),
+                                           'plan_max_s': max(durations_s)})}}
+
+
+def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
+    """Tell of planners whose code failed; the cell has failed where one never gave a plan."""
+    told: dict[str, Any] = {}
+    for vehicle, record in planners.items():
+        failures = _failures(record)
+        if not failures:
+            continue
+        count, plans = sum(number for _, number in failures), record.statistics.plans
+        first = max(failures, key=lambda item: item[1])[0]
+        if not told:
+            told = {'reason': f'{vehicle}: its planner failed in {count} of {plans} plans: '
+                              f'{first}', 'traceback': record.statistics.failure}
+        if count == plans:
+            told['status'] = 'memory' if 'MemoryError' in first else 'error'
+    return told
+
+
+def _failures(record: PlannerRecord) -> Sequence[tuple[str, int]]:
+    return [(reason, number) for reason, number in record.statistics.reasons.items()
+            if _CODE_FAILED.match(reason)]

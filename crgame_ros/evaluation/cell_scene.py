@@ -1,0 +1,221 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where a cell takes place: a game, with every file that it names, ready to travel."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+import io
+from pathlib import Path
+import re
+from typing import Any
+
+from crgame_ros.driver.source import parse_source
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.content import Content, ContentStore
+from crgame_ros.evaluation.source_digest import planner_digest
+from crgame_ros.game.game import Game
+from crgame_ros.game.game_file import load_game
+from crgame_ros.occupancy.occupancy_map_file import read_map_file
+from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.recorded_game import read_recorded_game
+from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.recording.run_cycles import replay_inputs
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.scenario import guard
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.schema.writing import write
+from crgame_ros.simulation.cast import cast_avs
+import numpy as np
+
+# What is for people alone may look like a file's name and is none.
+_FOR_PEOPLE = ('title', 'label', 'name')
+# Drivers of whom nobody is asked: without a page `auto` is nobody at the wheel.
+_DRIVES_ALONE = ('idle', 'auto')
+_FILE = re.compile(r'([a-z]+:)?(/[^\0]+?)(:[A-Za-z_]\w*)?')
+INPUTS = 'inputs.npz'
+SCENARIO_SUFFIXES, GAME_SUFFIXES = ('.xml',), ('.yaml', '.yml')
+
+
+@dataclass(frozen=True)
+class Scene:
+    """
+    A game whose files are in a store.
+
+    :param scenario: benchmark id.
+    :param game: name of the game's file; empty where there is none.
+    :param human: name of the recorded run whose humans drive; empty where there is none.
+    :param values: of the game, as its file would have them; files are references to contents.
+    :param inputs: digest of what the recorded humans did; empty where nobody is recorded.
+    :param digests: of the code of its AVs' planners.
+    """
+
+    scenario: str
+    game: str
+    human: str
+    values: dict[str, Any]
+    inputs: str
+    digests: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """Name it for people; no other scene of an evaluation is named so."""
+        return self.human or self.game or self.scenario
+
+
+def scene_of_game(path: Path, store: ContentStore) -> Scene:
+    """
+    Take a game with its files into a store.
+
+    :raises InputError: if the game or one of its files cannot be used.
+    """
+    game = load_game(path)
+    for human in game.humans:
+        source = parse_source(human.driver)
+        if source.kind not in _DRIVES_ALONE and not source.has_timeline:
+            raise InputError(f'driver "{human.driver}" needs a person or a recording',
+                             f'{path}: {human.id}', 'use keys:FILE, joy:FILE or idle, or name '
+                             'recorded runs under "humans"')
+    loaded = load_scenario(game.scenario)
+    return _scene(game, loaded, store, game_name=path.stem)
+
+
+def scene_of_scenario(path: Path, store: ContentStore) -> Scene:
+    """
+    Take a scenario into a store; nobody but its AVs is driven.
+
+    :raises InputError: if it cannot be used.
+    """
+    game = Game(path.resolve(), humans=())
+    return _scene(game, load_scenario(path), store)
+
+
+def scene_of_run(path: Path, store: ContentStore) -> Scene:
+    """
+    Take a recorded run into a store: its game, and what its humans did.
+
+    :param path: folder of the run, or its recording.
+    :raises InputError: if the recording cannot be repeated.
+    """
+    bag = recording_in(path)
+    recorded = read_recorded_game(bag, other_planners=True)
+    if not recorded.game.humans:
+        raise InputError('nobody drove in it', str(path), 'name its game or scenario instead')
+    inputs = replay_inputs(bag)
+    game = with_recorded_events(recorded.game, read_run_events(bag).fired)
+    humans = tuple(replace(human, driver='idle') for human in game.humans)
+    duration_s = len(inputs.dt_eff_s) / game.timing.rate
+    stream = io.BytesIO()
+    arrays: dict[str, Any] = {f'command_{name}': rows for name, rows in inputs.commands.items()}
+    np.savez_compressed(stream, intervals_s=inputs.dt_eff_s, **arrays)
+    digest = store.put(Content(INPUTS, {INPUTS: stream.getvalue()}))
+    return _scene(replace(game, humans=humans, duration=min(game.duration, duration_s)),
+                  recorded.loaded, store, human=_run_name(path), inputs=digest)
+
+
+def _run_name(path: Path) -> str:
+    whole = path.resolve()
+    return whole.parent.name if whole.name.startswith('bag') and whole.parent.name else whole.name
+
+
+def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name: str = '',
+           human: str = '', inputs: str = '') -> Scene:
+    parts, _ = cast_avs(game, loaded)
+    game = replace(game, avs=tuple(spec for spec, _ in parts))
+    values = write(game, game.base)
+    scenario = Content('scenario.xml', {'scenario.xml': guard.encode(loaded.xml_text)})
+    store.put(scenario)
+    values['scenario'] = scenario.reference
+    return Scene(loaded.benchmark_id, game_name, human, with_contents(values, store), inputs,
+                 tuple(planner_digest(spec.planner) for spec in game.avs or ()))
+
+
+def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:
+    """
+    Put the files that values name into a store.
+
+    :param value: mappings, lists and texts, their file names absolute.
+    :return: the same, with references instead of names of files.
+    :raises InputError: if a file cannot be read.
+    """
+    if isinstance(value, dict):
+        return {name: with_contents(item, store, str(name)) for name, item in value.items()}
+    if isinstance(value, list):
+        return [with_contents(item, store, key) for item in value]
+    if not isinstance(value, str) or key in _FOR_PEOPLE and '.py:' not in value:
+        return value
+    match = _FILE.fullmatch(value)
+    if match is None or not Path(match[2]).is_file():
+        return value
+    file = Path(match[2])
+    content = Content(file.name, dict(_files(file, key)))
+    store.put(content)
+    return f'{match[1] or ""}{content.reference}{match[3] or ""}'
+
+
+def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
+    """Give a file, and what stands beside it that it names."""
+    files = [file]
+    if key == 'occupancy':
+        image = read_map_file(file).image
+        if image.resolve().parent != file.resolve().parent:
+            raise InputError('its image is in another folder', str(file),
+                             'put it beside the map, so that both can travel')
+        files.append(image)
+    for each in files:
+        try:
+            yield each.name, each.read_bytes()
+        except OSError as error:
+            raise InputError(f'cannot be read ({error.strerror})', str(each),
+                             'check the path') from error
+
+
+def files_of(names: tuple[str, ...], base: Path, suffixes: tuple[str, ...],
+             what: str) -> list[Path]:
+    """
+    Find the files that a plan names.
+
+    :param names: of files, or of folders: all in them with such a suffix, in alphabetical order.
+    :raises InputError: if there is none.
+    """
+    found: list[Path] = []
+    for name in names:
+        path = base / Path(name).expanduser()
+        if path.is_dir():
+            inside = sorted(item for item in path.iterdir() if item.suffix in suffixes)
+            if not inside:
+                raise InputError(f'there is no {what} in it', str(path), 'name another folder')
+            found += inside
+        elif path.exists():
+            found.append(path)
+        else:
+            raise InputError('there is no such file or folder', str(path), 'check the path')
+    return list(dict.fromkeys(found))
+
+
+def runs_of(names: tuple[str, ...], base: Path) -> list[Path]:
+    """
+    Find the recorded runs that a plan names.
+
+    :param names: of runs' folders or recordings, or of folders of runs.
+    :raises InputError: if there is none.
+    """
+    found: list[Path] = []
+    for name in names:
+        path = base / Path(name).expanduser()
+        inside = sorted(item.parent for item in path.glob('*/bag'))
+        if not path.exists():
+            raise InputError('there is no such file or folder', str(path), 'check the path')
+        found += inside if inside and not (path / 'bag').exists() else [path]
+    return list(dict.fromkeys(found))

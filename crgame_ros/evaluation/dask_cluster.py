@@ -1,0 +1,110 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Dask: the cluster that computes, our own on this machine or somebody's elsewhere."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import logging
+import os
+from typing import Any
+
+from crgame_ros.errors import CrgameError, InputError
+
+INSTALL = "pip install 'crgame_ros[evaluate]'"
+# A cell whose worker was killed this often has something to do with it.
+ALLOWED_FAILURES = 5
+_CONNECT_S = 8.0
+# Our own workers load it as they start.
+PRELOAD = 'crgame_ros.evaluation.worker_task'
+
+
+def require_dask() -> None:
+    """
+    See that Dask is there.
+
+    :raises InputError: if it is not, with the line that installs it.
+    """
+    try:
+        import distributed  # noqa: F401
+    except ImportError as error:
+        raise InputError(f'needs Dask ({error})', 'crgame evaluate', INSTALL) from error
+
+
+@contextmanager
+def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> Iterator[Any]:
+    """
+    Connect to a scheduler, or start one with workers on this machine's loopback.
+
+    :param scheduler: address of somebody's; None starts one.
+    :param workers: processes of our own, each with one thread.
+    :param dashboard: port of Dask's page, on the loopback; None for no page.
+    :return: a `distributed.Client`.
+    :raises InputError: if the scheduler does not answer.
+    """
+    require_dask()
+    import dask
+    from distributed import Client, LocalCluster
+    # Of workers that end while others work, each line of log would be one of many.
+    for name in (*logging.root.manager.loggerDict, 'tornado.application', 'asyncio'):
+        if name.startswith(('distributed', 'tornado', 'asyncio')):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(f'no scheduler answers there ({error})', f'--scheduler {scheduler}',
+                             'start one with `dask scheduler`, and workers with `dask worker '
+                             'ADDRESS --nthreads 1`') from error
+        with client:
+            yield client
+        return
+    settings = {
+        'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
+        # Cells have processes and a limit of their own.
+        'distributed.worker.memory.terminate': False, 'distributed.worker.memory.pause': False,
+        'distributed.worker.memory.target': False, 'distributed.worker.memory.spill': False,
+        'distributed.worker.preload': [PRELOAD],
+        'distributed.admin.large-graph-warning-threshold': '1 GB'}
+    with dask.config.set(settings):
+        cluster = LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, host='127.0.0.1',
+            # Without a page, too, the scheduler serves its health: here alone, at any port.
+            dashboard_address=f'127.0.0.1:{dashboard or 0}', worker_dashboard_address=None,
+            scheduler_kwargs={'dashboard': dashboard is not None},
+            silence_logs=logging.CRITICAL, memory_limit=0)
+        with cluster, Client(cluster, set_as_default=False) as client:
+            yield client
+
+
+def default_workers() -> int:
+    """Give a process for each processor that this one may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def check_workers(client: Any) -> None:
+    """
+    See that workers can compute cells.
+
+    :raises CrgameError: if one lacks this package.
+    """
+    for address, answer in client.run(_version, on_error='return').items():
+        if isinstance(answer, BaseException):
+            raise CrgameError(f'worker {address} cannot import crgame_ros ({answer}): install '
+                              'the same version there')
+
+
+def _version() -> str:
+    from crgame_ros.evaluation.source_digest import engine_digest
+    return engine_digest()

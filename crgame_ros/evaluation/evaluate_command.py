@@ -1,0 +1,193 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""`crgame evaluate`: planner x scenario x human x seed, on this machine's cores or a cluster."""
+
+import argparse
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+import sys
+from typing import Any, TYPE_CHECKING
+
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.summary.summary_command import add_summary_arguments
+
+if TYPE_CHECKING:  # Other commands do not wait for it.
+    from crgame_ros.evaluation.evaluation import Computing
+    from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
+
+DESCRIPTION = """\
+Run every planner in every scenario, game and recorded drive, with every seed; measure each run,
+and keep a row of it. The same command goes on where it was stopped, and computes nothing twice.
+
+  crgame evaluate plan.yaml --out evaluations/first
+  crgame evaluate --scenarios ../scenarios --planners idm,reactive --seeds 5 --duration 10
+  crgame evaluate --humans runs/NAME --planners idm,my_planner.py:Mine
+  crgame evaluate evaluations/first                    go on with it
+  crgame evaluate evaluations/first --summary          means, differences, the worst cells
+  crgame evaluate evaluations/first --cell KEY         run one again, and write its report
+
+docs/evaluation.md tells of plans, tables and clusters."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    add = parser.add_argument
+    add('plan', nargs='?', type=Path, help='plan file (*.yaml), or the folder of an evaluation')
+    add('--out', type=Path, metavar='DIR',
+        help='folder of the evaluation (default: evaluations/<name of the plan>)')
+    add('--games', nargs='+', default=[], metavar='FILE', help='game files, or folders of them')
+    add('--scenarios', nargs='+', default=[], metavar='FILE',
+        help='CommonRoad files, or folders of them')
+    add('--humans', nargs='+', default=[], metavar='RUN',
+        help='recorded runs, whose humans drive again')
+    add('--planners', metavar='A,B', help='planners of all AVs')
+    add('--seeds', metavar='N', help='how many seeds, or which: 5, or 3,7')
+    add('--perception', nargs='+', default=[], metavar='FILE',
+        help='files with "perception" of all AVs; "own" is that of the games')
+    add('--traffic', nargs='+', default=[], metavar='FILE',
+        help='files with "traffic"; "own" is that of the games')
+    add('--duration', type=float, metavar='S', help='simulated seconds of each cell')
+    add('--latency', type=int, metavar='L', help='simulation steps between a request and its plan')
+    where = parser.add_argument_group('where it is computed')
+    where.add_argument('--workers', type=int, metavar='N',
+                       help='processes here (default: one for each processor)')
+    where.add_argument('--scheduler', metavar='ADDRESS',
+                       help='a Dask scheduler whose workers compute instead')
+    where.add_argument('--dashboard', type=int, nargs='?', const=8787, metavar='PORT',
+                       help="show Dask's page on this machine (default port: 8787)")
+    where.add_argument('--cell-timeout', type=float, default=300.0, metavar='S',
+                       help='give a cell up after so long (default: %(default)g)')
+    where.add_argument('--cell-memory', type=float, default=2.0, metavar='GB',
+                       help='that a cell may take (default: %(default)g)')
+    where.add_argument('--part-cells', type=int, default=256, metavar='N',
+                       help='cells of a part of the tables (default: %(default)d)')
+    where.add_argument('--retry', action='store_true', help='compute failed cells again')
+    after = parser.add_argument_group('of an evaluation, instead')
+    after.add_argument('--cell', metavar='KEY', help='run one cell again, and write its report')
+    after.add_argument('--summary', action='store_true', help='sum it up')
+    add_summary_arguments(after)
+    parser.set_defaults(command=run_command)
+
+
+def run_command(values: argparse.Namespace) -> int:
+    """Evaluate, or look at an evaluation."""
+    from crgame_ros.evaluation.dask_cluster import require_dask
+    from crgame_ros.evaluation.evaluation import evaluate
+    from crgame_ros.evaluation.evaluation_progress import EvaluationProgress
+    from crgame_ros.recording.progress import Progress
+    say = partial(print, file=sys.stderr, flush=True)
+    if values.cell or values.summary:
+        return _look(values)
+    require_dask()
+    plan, folder = _plan(values)
+    try:
+        tally = evaluate(plan, folder, _computing(values), EvaluationProgress(),
+                         Progress(say, 'loading what the plan names'))
+    except KeyboardInterrupt:
+        say('\nstopped: what was finished is kept; the same command goes on')
+        raise
+    if tally.put_away:
+        say(f'note: {tally.put_away} cells that were there are not of this plan, or of other '
+            f'code: they are in {folder / "earlier"}')
+    if tally.before == tally.total:
+        say(f'all {tally.total} cells were finished before')
+    print(folder)
+    return 0
+
+
+def _look(values: argparse.Namespace) -> int:
+    from crgame_ros.evaluation.cell_report import report_cell
+    from crgame_ros.evaluation.summary.summary_command import summarise_command
+    if values.plan is None or not values.plan.is_dir():
+        raise InputError('needs the folder of an evaluation',
+                         '--cell' if values.cell else '--summary',
+                         'give it first: crgame evaluate evaluations/NAME --summary')
+    if values.cell:
+        print(report_cell(values.plan, values.cell, partial(print, file=sys.stderr, flush=True)))
+        return 0
+    return summarise_command(values.plan, values)
+
+
+def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
+    """Give the plan that the command line asks for, and the folder of its evaluation."""
+    from crgame_ros.evaluation.evaluation_folder import EvaluationFolder
+    from crgame_ros.evaluation.evaluation_plan import parse_plan
+    from crgame_ros.yaml_text import read_yaml
+    given = _given(values)
+    if values.plan is None:
+        if not given:
+            raise InputError('nothing to evaluate', 'crgame evaluate',
+                             'name a plan file, or --games, --scenarios or --humans')
+        out = values.out or Path('evaluations') / f'{datetime.now():%Y%m%d-%H%M%S}'
+        return parse_plan(given, 'command line', Path.cwd()), out
+    if values.plan.is_dir():
+        if given:
+            raise InputError('an evaluation goes on as it was planned', f'--{next(iter(given))}',
+                             'change its plan file instead, or name another --out')
+        place = EvaluationFolder(values.plan)
+        return parse_plan(place.plan_values(), str(values.plan), place.base), values.plan
+    base = values.plan.parent
+    read = read_yaml(values.plan, 'plan')
+    if isinstance(read, dict):
+        here = {key: [str(Path(name).expanduser().resolve()) for name in given[key]]
+                for key in ('games', 'scenarios', 'humans') if key in given}
+        read = read | given | here
+    return parse_plan(read, str(values.plan), base), \
+        values.out or Path('evaluations') / values.plan.stem
+
+
+def _given(values: argparse.Namespace) -> dict[str, Any]:
+    """Give what of a plan the command line says."""
+    given: dict[str, Any] = {
+        name: getattr(values, name) for name in ('games', 'scenarios', 'humans')
+        if getattr(values, name)}
+    if values.planners:
+        given['planners'] = [name for name in values.planners.split(',') if name]
+    if values.seeds is not None:
+        given['seeds'] = _seeds(values.seeds)
+    for name in ('perception', 'traffic'):
+        files = getattr(values, name)
+        if files:
+            given[name] = {Path(file).stem: file if file == 'own' else
+                           str(Path(file).expanduser().resolve()) for file in files}
+    for name in ('duration', 'latency'):
+        if getattr(values, name) is not None:
+            given[name] = getattr(values, name)
+    return given
+
+
+def _seeds(text: str) -> int | list[int]:
+    try:
+        numbers = [int(word) for word in text.split(',')]
+    except ValueError:
+        raise InputError(f'is "{text[:60]}"', '--seeds', 'give 5, or 3,7') from None
+    return numbers if len(numbers) > 1 or ',' in text else numbers[0]
+
+
+def _computing(values: argparse.Namespace) -> 'Computing':
+    from crgame_ros.evaluation.dask_cluster import default_workers
+    from crgame_ros.evaluation.evaluation import Computing, GIGABYTE
+    workers = default_workers() if values.workers is None else values.workers
+    for name, value, least in (('workers', workers, 1),
+                               ('cell-timeout', values.cell_timeout, 1e-3),
+                               ('cell-memory', values.cell_memory, 0.5),
+                               ('part-cells', values.part_cells, 1)):
+        if not least <= value < 1e6:
+            raise InputError(f'is {value:g}', f'--{name}', f'give {least:g} or more')
+    return Computing(values.scheduler, workers, values.dashboard, values.cell_timeout,
+                     round(values.cell_memory * GIGABYTE), values.part_cells, values.retry)

@@ -1,0 +1,160 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What to evaluate, as a plan's file or the command line says it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Advice, Folder, Listed, Named, Within
+from crgame_ros.schema.reading import read
+from crgame_ros.yaml_text import read_yaml
+
+# The label of what a game says itself.
+OWN = 'own'
+MOST_SEEDS = 1_000_000
+_SEE = Form('see docs/evaluation.md for the keys')
+
+
+@dataclass(frozen=True)
+class PlannerChoice:
+    """
+    A planner that drives all AVs.
+
+    :param planner: registered name, `module:Class` or `FILE.py:Class`; `own` leaves each AV the
+        planner that its game names.
+    :param label: by which tables name it; the planner's name by default.
+    :param options: keyword arguments of the planner.
+    """
+
+    FORM: ClassVar[Form] = Form('name a planner', short='planner')
+
+    planner: Annotated[str, Named(), Advice('name a planner')]
+    label: str = ''
+    options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Give the label, or what stands for it."""
+        return self.label or self.planner.rpartition('/')[2]
+
+
+@dataclass(frozen=True)
+class EvaluationPlan:
+    """
+    A plan as its file says it: each scene with each of everything else.
+
+    :param games: game files, folders of them; their humans are driven by scripts or by nobody.
+    :param scenarios: CommonRoad files, folders of them; no human takes part.
+    :param humans: recorded runs, whose humans drive again as they did, in the recorded game.
+    :param planners: who drives the AVs.
+    :param seeds: how many, from 0 on, or which ones.
+    :param perception: by label how AVs perceive; `own` as their games say.
+    :param traffic: by label the traffic; `own` as the games say.
+    :param duration: simulated seconds of each cell; as the game or recording says where none is
+        given, and 20 s where nobody says.
+    :param latency: simulation steps between a request and its plan.
+    :param base: directory against which file names are resolved.
+    """
+
+    FORM: ClassVar[Form] = _SEE
+
+    games: Annotated[tuple[str, ...], Listed(noun='file')] = ()
+    scenarios: Annotated[tuple[str, ...], Listed(noun='file')] = ()
+    humans: Annotated[tuple[str, ...], Listed(noun='run')] = ()
+    planners: Annotated[tuple[PlannerChoice, ...], Listed(noun='planner')] = (
+        PlannerChoice(OWN),)
+    seeds: Any = 1
+    perception: dict[str, Any] = field(default_factory=dict)
+    traffic: dict[str, Any] = field(default_factory=dict)
+    duration: Annotated[float, Within(0.0, 86400.0)] | None = None
+    latency: Annotated[int, Within(0, 1_000_000)] = 0
+    base: Annotated[Path, Folder()] = Path('.')
+
+    def check(self) -> None:
+        """Refuse what cannot be a plan."""
+        if not (self.games or self.scenarios or self.humans):
+            raise InputError('names no games, scenarios or humans', '',
+                             'name files or folders of one of them')
+        names = [choice.name for choice in self.planners]
+        if len(set(names)) < len(names):
+            raise InputError('two planners have one label', '', 'give each a "label" of its own')
+        self.seed_numbers()
+
+    def seed_numbers(self) -> tuple[int, ...]:
+        """Give the seeds."""
+        given = self.seeds
+        if isinstance(given, int) and not isinstance(given, bool) and 1 <= given <= MOST_SEEDS:
+            return tuple(range(given))
+        if isinstance(given, list | tuple) and given and len(given) <= MOST_SEEDS and all(
+                isinstance(seed, int) and not isinstance(seed, bool) and 0 <= seed < 2**63
+                for seed in given) and len(set(given)) == len(given):
+            return tuple(given)
+        raise InputError('"seeds" is neither a number of seeds nor a list of different ones', '',
+                         'give seeds: 5, or seeds: [3, 7]')
+
+    def perceptions(self) -> dict[str, PerceptionSpec | str | None]:
+        """Give each kind of perception by its label; OWN is the games' own, None is perfect."""
+        return _choices(self.perception, PerceptionSpec, 'perception', self.base)
+
+    def traffics(self) -> dict[str, TrafficSpec | str | None]:
+        """Give each kind of traffic by its label; OWN is the games' own, None is none."""
+        return _choices(self.traffic, TrafficSpec, 'traffic', self.base)
+
+
+def _choices(given: Mapping[str, Any], kind: type[Any], what: str, base: Path) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for label, value in (given or {OWN: OWN}).items():
+        where = f'{what}: {label}'
+        if value is None or value == OWN:
+            found[str(label)] = value
+        elif isinstance(value, str):
+            file = base / Path(value).expanduser()
+            found[str(label)] = read(kind, read_yaml(file, what), str(file), file.parent)
+        else:
+            found[str(label)] = read(kind, value, where, base)
+    return found
+
+
+def load_plan(path: Path) -> EvaluationPlan:
+    """
+    Read a plan's file.
+
+    :raises InputError: naming the file, the key and the remedy.
+    """
+    return parse_plan(read_yaml(path, 'plan'), str(path), path.parent)
+
+
+def parse_plan(values: Any, where: str, base: Path) -> EvaluationPlan:
+    """
+    Check the content of a plan's file.
+
+    :param where: file name for messages.
+    :param base: directory against which its file names are resolved.
+    :raises InputError: naming the key and the remedy.
+    """
+    plan = read(EvaluationPlan, values, where, base)
+    try:
+        plan.perceptions()
+        plan.traffics()
+    except InputError as error:
+        raise InputError(error.what, f'{where}: {error.where}' if where not in error.where
+                         else error.where, error.remedy) from error
+    return plan

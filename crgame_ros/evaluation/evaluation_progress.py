@@ -1,0 +1,98 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How far an evaluation is, for people: a bar on a terminal, a line now and then elsewhere."""
+
+from collections.abc import Callable
+import sys
+import time
+from typing import Any, TextIO
+
+from crgame_ros.evaluation.cell import Cell
+from crgame_ros.evaluation.evaluation import EvaluationTally
+
+BAR = 24
+# So often a line is written where there is no terminal, and the bar where there is one [s].
+PERIOD_S, BAR_PERIOD_S = 10.0, 0.2
+# Of more failures than this only the number is told; the tables have them all.
+TOLD_FAILURES = 20
+
+
+class EvaluationProgress:
+    """
+    Tells of cells as they end.
+
+    :param stream: where.
+    :param clock: gives the time [s].
+    """
+
+    def __init__(self, stream: TextIO = sys.stderr,
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        self._stream, self._clock = stream, clock
+        self._bar = stream.isatty()
+        self._begin_s: float | None = None
+        self._told_s = 0.0
+        self._failures = 0
+
+    def __call__(self, tally: EvaluationTally, cell: Cell | None,
+                 row: dict[str, Any] | None) -> None:
+        """Take in how far it is; with a cell and its row when one has ended."""
+        now_s = self._clock()
+        if self._begin_s is None:
+            self._begin_s = self._told_s = now_s
+            self._say(f'{tally.total} cells' + (f', {tally.before} of them finished before'
+                                                if tally.before else ''))
+            if tally.dashboard:
+                self._say(f'Dask shows its work at {tally.dashboard}')
+        if cell is not None and row is not None and row['status'] != 'ok':
+            self._fail(cell, row)
+        last = tally.before + tally.done == tally.total
+        if last or now_s - self._told_s >= (BAR_PERIOD_S if self._bar else PERIOD_S):
+            self._told_s = now_s
+            self._write(_line(tally, now_s - self._begin_s, self._bar), last)
+
+    def _fail(self, cell: Cell, row: dict[str, Any]) -> None:
+        self._failures += 1
+        if self._failures <= TOLD_FAILURES:
+            self._say(f'{row["status"]}: {cell.label} ({cell.key[:8]}): {row["reason"]}')
+        elif self._failures == TOLD_FAILURES + 1:
+            self._say('further failures are in the tables only')
+
+    def _say(self, text: str) -> None:
+        clear = '\r\033[K' if self._bar else ''
+        print(f'{clear}{text}', file=self._stream, flush=True)
+
+    def _write(self, text: str, last: bool) -> None:
+        if self._bar:
+            print(f'\r\033[K{text}', end='\n' if last else '', file=self._stream, flush=True)
+        else:
+            print(text, file=self._stream, flush=True)
+
+
+def _line(tally: EvaluationTally, passed_s: float, bar: bool) -> str:
+    ended = tally.before + tally.done
+    share = ended / max(1, tally.total)
+    filled = round(share * BAR)
+    drawn = f'[{"#" * filled}{"." * (BAR - filled)}] ' if bar else ''
+    speed = tally.done / passed_s if passed_s > 0.0 else 0.0
+    left = f', {_duration((tally.total - ended) / speed)} left' if speed and ended < tally.total \
+        else ''
+    failed = f', {tally.failed} failed' if tally.failed else ''
+    return f'{drawn}{ended} of {tally.total} cells, {speed:.2f} cells/s{left}{failed}'
+
+
+def _duration(time_s: float) -> str:
+    if time_s < 90.0:
+        return f'{time_s:.0f} s'
+    return f'{time_s / 60.0:.0f} min' if time_s < 5400.0 else f'{time_s / 3600.0:.1f} h'

@@ -1,0 +1,187 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Some of the cells of an evaluation at a time, so that memory does not grow with their number."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, FACTORS, TEXT_FACTORS
+from crgame_ros.evaluation.summary.factor_labels import FactorLabels, mixed
+import numpy as np
+from numpy.typing import NDArray
+import pyarrow as pa
+import pyarrow.compute as pc
+
+IntArray = NDArray[np.int64]
+
+BLOCK_CELLS = 65_536
+# Of the reason why a cell failed [characters].
+_LONGEST_REASON = 200
+_OK = 'ok'
+_COLUMNS = {'cell': pa.string(), 'status': pa.string(), 'reason': pa.string(),
+            **{factor: pa.string() for factor in TEXT_FACTORS}, 'seed': pa.int64()}
+
+
+@dataclass(frozen=True)
+class CellBlock:
+    """
+    Some cells (N), each once, in the order of their keys.
+
+    :param number: of the block.
+    :param keys: of the cells.
+    :param labels: (N, 6) numbers of their labels, as `TEXT_FACTORS` has them.
+    :param seeds: (N)
+    :param pairs: (N) the same for cells that share all factors but the planner.
+    :param status: `ok`, or how it failed.
+    :param reasons: why it failed, cut where nobody reads on.
+    :param ok: (N) whether it ended well.
+    """
+
+    number: int
+    keys: pa.ChunkedArray
+    labels: NDArray[np.int32]
+    seeds: IntArray
+    pairs: NDArray[np.uint64]
+    status: pa.ChunkedArray
+    reasons: pa.ChunkedArray
+    ok: NDArray[np.bool_]
+
+
+class CellBlocks:
+    """
+    The cells in blocks: pairs are never parted, and it does not matter which part a cell is in.
+
+    Each block reads all parts and keeps its own rows. A cell that was run again counts once, as ok
+    if it ever ended well.
+
+    :param parts: of the evaluation.
+    :param block_cells: about so many cells are in a block.
+    :ivar labels: of each text factor.
+    :ivar count: of blocks.
+    """
+
+    def __init__(self, parts: EvaluatedParts, block_cells: int = BLOCK_CELLS) -> None:
+        self.labels = {factor: FactorLabels(texts) for factor, texts in _all_labels(parts).items()}
+        self.count = max(1, -(-parts.rows // block_cells))
+        self._parts = parts
+
+    def __iter__(self) -> Iterator[CellBlock]:
+        return map(self._read, range(self.count))
+
+    @property
+    def planners(self) -> list[str]:
+        """Name the planners, in the order of the alphabet."""
+        return [text for text in self.labels['planner'].texts if text]
+
+    def clusters(self, block: CellBlock) -> IntArray:
+        """Give the number of each cell's scenario (N), or its game's where it names none."""
+        scenarios, games = (block.labels[:, TEXT_FACTORS.index(name)].astype(np.int64)
+                            for name in ('scenario', 'game'))
+        # The empty label is the first. Games below zero: the two are counted each for itself.
+        return np.where(scenarios == 0, -1 - games, scenarios)
+
+    def factors(self, block: CellBlock, row: int) -> tuple[str, ...]:
+        """Give the labels and the seed of a cell, in the order of `FACTORS`."""
+        texts = (self.labels[factor].texts[number] for factor, number in zip(
+            TEXT_FACTORS, block.labels[row].tolist(), strict=True))
+        return (*texts, str(block.seeds[row]))
+
+    def _read(self, number: int) -> CellBlock:
+        tables, labels, seeds, pairs = [], [], [], []
+        for batch in self._parts.batches('cells', _COLUMNS):
+            numbers = np.column_stack([self.labels[factor].numbers(batch.rows[factor])
+                                       for factor in TEXT_FACTORS])
+            own_seeds = pc.fill_null(batch.rows['seed'], 0).to_numpy()
+            digests = self._pairs(numbers, own_seeds)
+            mine = digests % np.uint64(self.count) == number
+            tables.append(_told(batch.rows.filter(pa.array(mine))))
+            labels.append(numbers[mine])
+            seeds.append(own_seeds[mine])
+            pairs.append(digests[mine])
+        if not tables:
+            return _empty(number)
+        table = pa.Table.from_batches(tables).combine_chunks()
+        rows = _each_once(table)
+        table = table.take(pa.array(rows))
+        return CellBlock(number, table['cell'], np.concatenate(labels)[rows],
+                         np.concatenate(seeds)[rows], np.concatenate(pairs)[rows],
+                         table['status'], table['reason'], ~table['failed'].to_numpy())
+
+    def _pairs(self, numbers: NDArray[np.int32], seeds: IntArray) -> NDArray[np.uint64]:
+        digests = [self.labels[factor].digests(numbers[:, column])
+                   for column, factor in enumerate(TEXT_FACTORS) if factor != 'planner']
+        return reduce(mixed, (*digests, seeds.view(np.uint64)),
+                      np.full(len(seeds), len(FACTORS), np.uint64))
+
+
+def _all_labels(parts: EvaluatedParts) -> dict[str, set[str]]:
+    found: dict[str, set[str]] = {factor: {''} for factor in TEXT_FACTORS}
+    for batch in parts.batches('cells', {factor: pa.string() for factor in TEXT_FACTORS}):
+        for factor, texts in found.items():
+            texts.update(pc.unique(pc.fill_null(batch.rows[factor], '')).to_pylist())
+    return found
+
+
+def _told(rows: pa.RecordBatch) -> pa.RecordBatch:
+    status = pc.fill_null(rows['status'], '')
+    return pa.RecordBatch.from_arrays([
+        pc.fill_null(rows['cell'], ''), pc.not_equal(status, _OK), status,
+        pc.utf8_slice_codeunits(pc.fill_null(rows['reason'], ''), 0, _LONGEST_REASON)],
+        ['cell', 'failed', 'status', 'reason'])
+
+
+def _each_once(table: pa.Table) -> IntArray:
+    """Give the rows of a table of cells in the order of their keys, one of each."""
+    order = pc.sort_indices(table, [(name, 'ascending') for name in table.column_names])
+    keys = table['cell'].take(order)
+    first = np.ones(len(keys), bool)
+    first[1:] = pc.not_equal(keys.slice(1), keys.slice(0, max(len(keys) - 1, 0))).to_numpy()
+    return np.asarray(order.to_numpy()[first], np.int64)
+
+
+def _empty(number: int) -> CellBlock:
+    texts = pa.chunked_array([], pa.string())
+    return CellBlock(number, texts, np.empty((0, len(TEXT_FACTORS)), np.int32),
+                     np.empty(0, np.int64), np.empty(0, np.uint64), texts, texts,
+                     np.empty(0, bool))
+
+
+class CellGroups:
+    """
+    Cells that share the labels of some factors.
+
+    :param blocks: the cells.
+    :param by: the factors.
+    :ivar labels: of each group by its number, in the order in which they came.
+    """
+
+    def __init__(self, blocks: CellBlocks, by: Sequence[str]) -> None:
+        self._blocks, self._by = blocks, tuple(by)
+        self.labels: list[tuple[str, ...]] = []
+        self._numbers: dict[tuple[str, ...], int] = {}
+
+    def of(self, block: CellBlock) -> IntArray:
+        """Give the number of each cell's group (N)."""
+        columns = [TEXT_FACTORS.index(factor) for factor in self._by]
+        different, inverse = np.unique(block.labels[:, columns], axis=0, return_inverse=True)
+        own = []
+        for row in different.tolist():
+            labels = tuple(self._blocks.labels[factor].texts[number]
+                           for factor, number in zip(self._by, row, strict=True))
+            own.append(self._numbers.setdefault(labels, len(self._numbers)))
+            if own[-1] == len(self.labels):
+                self.labels.append(labels)
+        return np.array(own, np.int64)[inverse.reshape(-1)]

@@ -1,0 +1,123 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The parts of an evaluation's folder, read batch by batch."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+# What a cell is made of; cells that share all but the planner are a pair.
+TEXT_FACTORS = ('scenario', 'game', 'planner', 'human', 'perception', 'traffic')
+FACTORS = (*TEXT_FACTORS, 'seed')
+_REQUIRED = {'cells': ('cell', 'status'), 'vehicles': ('cell', 'vehicle', 'role')}
+
+
+class PartBatch(NamedTuple):
+    """
+    Some rows of parts with the same columns.
+
+    :param rows: with all columns that were asked for; those that the parts lack are empty.
+    :param columns: that the parts have.
+    """
+
+    rows: pa.RecordBatch
+    columns: frozenset[str]
+
+
+class EvaluatedParts:
+    """
+    The parts that were there when it was made: whatever is added later is not read.
+
+    :param folder: of the evaluation.
+    :ivar rows: how many the parts of `cells` have.
+    :ivar columns: all that any part of `vehicles` has.
+    :raises InputError: if there is none, or one cannot be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        if not folder.is_dir():
+            raise InputError('no such folder', str(folder), 'give the folder of an evaluation')
+        self._parts = {table: sorted((folder / table).glob('part-*.parquet'))
+                       for table in _REQUIRED}
+        if not self._parts['cells']:
+            raise InputError('no cell is finished', str(folder),
+                             'give the folder of an evaluation, or wait until its first cells are')
+        self.rows = sum(_look_at(path, 'cells').num_rows for path in self._parts['cells'])
+        self.columns = frozenset(name for path in self._parts['vehicles']
+                                 for name in _look_at(path, 'vehicles').schema.names)
+
+    def batches(self, table: str, columns: Mapping[str, pa.DataType],
+                batch_rows: int = 32_768) -> Iterator[PartBatch]:
+        """
+        Read some columns of all parts.
+
+        :param table: `cells` or `vehicles`.
+        :param columns: with the types that they are wanted in.
+        :param batch_rows: at most so many rows at a time.
+        :raises InputError: if a part is broken, or a column is of another kind.
+        """
+        kept: list[PartBatch] = []
+        for path in self._parts[table]:
+            try:
+                with pq.ParquetFile(path) as part:
+                    there = frozenset(part.schema_arrow.names)
+                    for batch in part.iter_batches(
+                            batch_rows, columns=list(there & columns.keys()), use_threads=False):
+                        found = PartBatch(_wanted(batch, columns), there)
+                        # Small parts together: each batch costs its reader the same.
+                        if kept and (kept[0].columns != there or batch_rows < sum(
+                                each.rows.num_rows for each in (*kept, found))):
+                            yield _together(kept)
+                            kept = []
+                        kept.append(found)
+            except (pa.ArrowException, OSError) as error:
+                raise _unreadable(path, error) from error
+        if kept:
+            yield _together(kept)
+
+
+def _together(batches: list[PartBatch]) -> PartBatch:
+    rows = pa.concat_batches([batch.rows for batch in batches])
+    return PartBatch(rows, batches[0].columns)
+
+
+def _wanted(batch: pa.RecordBatch, columns: Mapping[str, pa.DataType]) -> pa.RecordBatch:
+    """Give columns in the types in which they are wanted, empty where there are none."""
+    there = batch.schema.names
+    return pa.RecordBatch.from_arrays(
+        [batch[name].cast(kind) if name in there else pa.nulls(batch.num_rows, kind)
+         for name, kind in columns.items()], list(columns))
+
+
+def _look_at(path: Path, table: str) -> pq.FileMetaData:
+    try:
+        found = pq.read_metadata(path)
+    except (pa.ArrowException, OSError) as error:
+        raise _unreadable(path, error) from error
+    lacking = [name for name in _REQUIRED[table] if name not in found.schema.names]
+    if lacking:
+        raise InputError(f'has no column {", ".join(lacking)}', str(path),
+                         'give the folder of an evaluation')
+    return found
+
+
+def _unreadable(path: Path, error: Exception) -> InputError:
+    reason = str(error).partition('\n')[0]
+    return InputError(f'cannot be read ({reason})', str(path),
+                      'take it out of the folder: the cells in it are then missing')

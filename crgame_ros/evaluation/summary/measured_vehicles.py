@@ -1,0 +1,113 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What is known of the AVs of a block's cells."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from crgame_ros.evaluation.summary.cell_block import CellBlock, IntArray
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
+from crgame_ros.evaluation.summary.summary_measures import SummaryMeasure
+import numpy as np
+from numpy.typing import NDArray
+import pyarrow as pa
+import pyarrow.compute as pc
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MeasuredVehicles:
+    """
+    The AVs (V) of a block's cells that ended well, cell by cell.
+
+    :param cells: (V) row of each AV's cell in the block, rising.
+    :param ids: (V) of the AVs.
+    :param values: (V, measures) NaN where there is none.
+    """
+
+    cells: IntArray
+    ids: NDArray[np.object_]
+    values: FloatArray
+
+    def sums(self, block: CellBlock, measures: Sequence[SummaryMeasure]
+             ) -> tuple[FloatArray, FloatArray]:
+        """
+        Sum up cell by cell.
+
+        :return: (N, measures) sums of the values, and how many they are.
+        """
+        sums = np.zeros((len(block.ok), len(measures)))
+        counts = np.zeros_like(sums)
+        for column, measure in enumerate(measures):
+            if not measure.column:
+                sums[:, column], counts[:, column] = ~block.ok, 1.0
+                continue
+            values = self.values[:, column]
+            there = ~np.isnan(values)
+            sums[:, column], counts[:, column] = (
+                np.bincount(self.cells[there], weights, len(block.ok))
+                for weights in (values[there], None))
+        return sums, counts
+
+
+def measured_vehicles(parts: EvaluatedParts, block: CellBlock,
+                      measures: Sequence[SummaryMeasure]) -> MeasuredVehicles:
+    """
+    Read what is known of the AVs of a block.
+
+    :raises InputError: if a part cannot be read.
+    """
+    columns = {'cell': pa.string(), 'vehicle': pa.string(), 'role': pa.string(),
+               **{name: pa.float64() for measure in measures for name in measure.columns}}
+    keys = block.keys.combine_chunks()
+    cells, ids = [np.empty(0, np.int64)], [np.empty(0, object)]
+    values = [np.empty((0, len(measures)))]
+    for batch in parts.batches('vehicles', columns):
+        rows = batch.rows.filter(pc.equal(batch.rows['role'], 'autonomous'))
+        place = pc.fill_null(pc.index_in(rows['cell'], value_set=keys), -1).to_numpy()
+        mine = np.flatnonzero(place >= 0)
+        mine = mine[block.ok[place[mine]]]
+        rows = rows.take(pa.array(mine))
+        cells.append(place[mine].astype(np.int64))
+        ids.append(_texts(rows['vehicle']))
+        values.append(np.column_stack([
+            measure.values(*(rows[name].to_numpy(zero_copy_only=False)
+                             for name in measure.columns))
+            if measure.column and batch.columns.issuperset(measure.columns)
+            else np.full(len(mine), np.nan) for measure in measures]))
+    return _each_once(MeasuredVehicles(
+        np.concatenate(cells), np.concatenate(ids), np.concatenate(values)))
+
+
+def _texts(column: pa.Array) -> NDArray[np.object_]:
+    """Give a column of texts (N), equal ones as one object."""
+    encoded = pc.fill_null(column, '').dictionary_encode()
+    return np.array(encoded.dictionary.to_pylist(), object)[encoded.indices.to_numpy()]
+
+
+def _each_once(found: MeasuredVehicles) -> MeasuredVehicles:
+    """Sort by cell and vehicle, and keep one row of each: a cell may have been run again."""
+    if not len(found.cells):
+        return found
+    _, ranks = np.unique(found.ids, return_inverse=True)
+    order = np.lexsort((ranks, found.cells))
+    first = np.ones(len(order), bool)
+    first[1:] = (np.diff(found.cells[order]) != 0) | (np.diff(ranks[order]) != 0)
+    if not first.all():
+        # Whichever came first, the same row is kept.
+        order = np.lexsort((*found.values.T[::-1], ranks, found.cells))
+    order = order[first]
+    return MeasuredVehicles(found.cells[order], found.ids[order], found.values[order])

@@ -1,0 +1,169 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Sum up an evaluation: means, paired differences, the worst cells, failures.
+
+The cells are looked at in blocks, twice: first they are counted, then their measures are read.
+What is kept in between grows with planners, scenarios and measures, not with cells.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.evaluation.summary.cell_block import BLOCK_CELLS, CellBlocks
+from crgame_ros.evaluation.summary.cell_tally import CellTally, tally_cells
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, TEXT_FACTORS
+from crgame_ros.evaluation.summary.group_bootstrap import FloatArray, GroupBootstrap, IntArray
+from crgame_ros.evaluation.summary.measured_vehicles import measured_vehicles
+from crgame_ros.evaluation.summary.paired_cells import paired_cells
+from crgame_ros.evaluation.summary.summary import GroupMeans, PairedDifferences, Summary
+from crgame_ros.evaluation.summary.summary_measures import (
+    chosen_measures,
+    MEASURES,
+    SummaryMeasure,
+    WORST_FIRST,
+)
+from crgame_ros.evaluation.summary.worst_cells import WorstCells
+from crgame_ros.game.game import DEFAULT_PLANNER
+import numpy as np
+import pyarrow as pa
+
+RESAMPLES = 2000
+_FEWEST_RESAMPLES, _MOST_RESAMPLES = 100, 100_000
+# Numbers that resamples may take, 8 bytes each.
+_MOST_NUMBERS = 20_000_000
+
+
+@contextmanager
+def _frugal_memory() -> Iterator[None]:
+    """Let Arrow give memory back at once: its own pool keeps several times what is in use."""
+    before = pa.default_memory_pool()
+    pa.set_memory_pool(pa.system_memory_pool())
+    try:
+        yield
+    finally:
+        pa.set_memory_pool(before)
+
+
+@_frugal_memory()
+def summarise(folder: Path, *, measures: Sequence[str] | None = None,
+              by: Sequence[str] = ('planner',), baseline: str | None = None,
+              worst: Sequence[str] | None = None, resamples: int = RESAMPLES, seed: int = 0,
+              block_cells: int = BLOCK_CELLS) -> Summary:
+    """
+    Sum up the cells that are finished.
+
+    :param folder: of the evaluation.
+    :param measures: names of measures, or of numeric columns of the table `vehicles`; None for all
+        measures that there are.
+    :param by: factors; cells that have them alike are a group.
+    :param baseline: planner from which differences are told; None for the default planner of
+        games, or the first one where that is not among them.
+    :param worst: measures by which the worst cells are chosen; None for collisions, then TTC.
+    :param resamples: for the intervals.
+    :param seed: of these.
+    :param block_cells: about so many cells are in memory at a time.
+    :raises InputError: if something cannot be used, or a part cannot be read.
+    """
+    if not by or not set(by) <= set(TEXT_FACTORS):
+        raise InputError(f'{short(list(by))} cannot be told apart', '--by',
+                         f'name some of {", ".join(TEXT_FACTORS)}')
+    if not _FEWEST_RESAMPLES <= resamples <= _MOST_RESAMPLES:
+        raise InputError(f'is {resamples}', '--resamples',
+                         f'give {_FEWEST_RESAMPLES} to {_MOST_RESAMPLES}')
+    if not 0 <= seed < 2**63:
+        raise InputError(f'is {seed}', 'seed', 'give one from 0 to 2^63 - 1')
+    parts = EvaluatedParts(folder)
+    chosen = chosen_measures(measures, parts.columns)
+    worst_by = chosen_measures(worst, parts.columns) if worst else tuple(
+        MEASURES[name] for name in WORST_FIRST if MEASURES[name].column in parts.columns)
+    blocks = CellBlocks(parts, block_cells)
+    tally = tally_cells(blocks, by, _baseline(baseline, by, blocks))
+    drawn = len(tally.units) + len(tally.pairs)
+    if drawn * 2 * len(chosen) * resamples > _MOST_NUMBERS:
+        raise InputError(f'{len(tally.units)} groups and {len(chosen)} measures are too many',
+                         '--by', 'name fewer factors or measures, or take fewer resamples')
+    means, differences, found = _sum_up(parts, blocks, tally, chosen, worst_by, (resamples, seed))
+    return Summary(
+        folder, tuple(by), tally.baseline, chosen, len(tally.scenarios),
+        _groups(tally, means), _differences(tally, differences), worst_by, found.worst(),
+        tally.failures.told(parts, tally.groups.labels), resamples, seed)
+
+
+def _baseline(wanted: str | None, by: Sequence[str], blocks: CellBlocks) -> str:
+    planners = blocks.planners
+    if wanted is not None and 'planner' not in by:
+        raise InputError('there are no planners to compare', '--baseline',
+                         'name planner among --by')
+    if wanted is not None and wanted not in planners:
+        raise InputError(f'no planner {short(wanted)} here', '--baseline',
+                         f'there are {", ".join(planners)}')
+    if len(planners) < 2 or 'planner' not in by:
+        return ''
+    return wanted or (DEFAULT_PLANNER if DEFAULT_PLANNER in planners else planners[0])
+
+
+_Bootstraps = dict[int, GroupBootstrap]
+
+
+def _sum_up(parts: EvaluatedParts, blocks: CellBlocks, tally: CellTally,
+            chosen: Sequence[SummaryMeasure], worst_by: Sequence[SummaryMeasure],
+            draws: tuple[int, int]) -> tuple[_Bootstraps, _Bootstraps, WorstCells]:
+    """Read all measures, block by block; `draws` are how many, and their seed."""
+    columns = tuple(dict.fromkeys((*chosen, *worst_by)))
+    found = WorstCells(worst_by, [columns.index(measure) for measure in worst_by])
+    means, differences = ({group: GroupBootstrap(
+        '\0'.join((kind, *tally.groups.labels[group])), each, len(chosen), *draws)
+        for group, each in units.items()} for kind, units in (
+            ('means', tally.units), ('differences', tally.pairs)))
+    for block in blocks:
+        vehicles = measured_vehicles(parts, block, columns)
+        found.add(blocks, block, vehicles)
+        sums, counts = (each[:, :len(chosen)] for each in vehicles.sums(block, columns))
+        groups, clusters = tally.groups.of(block), blocks.clusters(block)
+        _add(means, block.number, groups, (sums, counts, clusters))
+        if tally.pairs:
+            pairs = paired_cells(block, tally.baseline_number)
+            _add(differences, block.number, groups[pairs.rows],
+                 (*pairs.differences(sums, counts), clusters[pairs.rows]))
+    return means, differences, found
+
+
+def _add(bootstraps: _Bootstraps, block: int, groups: IntArray,
+         values: tuple[FloatArray, FloatArray, IntArray]) -> None:
+    for group in np.unique(groups).tolist():
+        sums, counts, clusters = (each[groups == group] for each in values)
+        bootstraps[group].add(block, sums, counts, clusters)
+
+
+def _groups(tally: CellTally, means: _Bootstraps) -> tuple[GroupMeans, ...]:
+    return tuple(GroupMeans(
+        tally.groups.labels[group], sum(units.cells), tally.failed[group], len(units.clusters),
+        units.resampled, means[group].estimates())
+        for group, units in tally.in_order(tally.units))
+
+
+def _differences(tally: CellTally, differences: _Bootstraps) -> tuple[PairedDifferences, ...]:
+    found = []
+    for group, units in tally.in_order(tally.pairs):
+        # By whether its own cell ended well, and that of the baseline.
+        outcomes = tally.outcomes[group]
+        found.append(PairedDifferences(
+            tally.groups.labels[group], outcomes[True, True], outcomes[False, True],
+            outcomes[True, False], outcomes[False, False], tally.unpaired[group],
+            len(units.clusters), units.resampled, differences[group].estimates()))
+    return tuple(found)

@@ -1,0 +1,66 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What `crgame evaluate --summary` does with a folder."""
+
+import argparse
+import json
+from pathlib import Path
+import sys
+
+SUMMARY_FILE = 'summary.html'
+FORMATS = ('text', 'markdown', 'json')
+
+
+def add_summary_arguments(parser: 'argparse.ArgumentParser | argparse._ArgumentGroup') -> None:
+    """Declare the arguments of a summary."""
+    parser.add_argument('--format', choices=FORMATS, default='text',
+                        help='as what it is printed (default: text)')
+    parser.add_argument('--measure', action='append', metavar='NAME', help='what is summed up; '
+                        'may be given several times (default: all that docs/evaluation.md names)')
+    parser.add_argument('--by', action='append', metavar='FACTOR', help='what makes a group: '
+                        'planner, scenario, game, human, perception or traffic; may be given '
+                        'several times (default: planner)')
+    parser.add_argument('--baseline', metavar='PLANNER', help='from which differences are told '
+                        '(default: idm, or the first planner)')
+    parser.add_argument('--worst', action='append', metavar='NAME', help='measure by which the '
+                        'worst cells are chosen; may be given several times, the first one counts '
+                        'first (default: collision, then worst_ttc)')
+    parser.add_argument('--resamples', type=int, default=2000, metavar='N',
+                        help='of the bootstrap (default: 2000)')
+
+
+def summarise_command(folder: Path, values: argparse.Namespace) -> int:
+    """
+    Print the summary of an evaluation, and write its page into the folder.
+
+    :param folder: of the evaluation.
+    :param values: as `add_summary_arguments` declares them.
+    :raises InputError: if something cannot be used.
+    """
+    from crgame_ros.evaluation.summary.summarise import summarise
+    from crgame_ros.evaluation.summary.summary_markdown import summary_markdown
+    from crgame_ros.evaluation.summary.summary_page import write_summary_page
+    from crgame_ros.evaluation.summary.summary_text import summary_text
+    summary = summarise(folder, measures=values.measure, by=tuple(values.by or ('planner',)),
+                        baseline=values.baseline, worst=values.worst, resamples=values.resamples)
+    if values.format == 'json':
+        print(json.dumps(summary.as_dict(), indent=2, allow_nan=False, ensure_ascii=False))
+    else:
+        write = summary_markdown if values.format == 'markdown' else summary_text
+        print(write(summary), end='')
+    page = folder / SUMMARY_FILE
+    write_summary_page(summary, page)
+    print(page, file=sys.stderr)
+    return 0

@@ -1,0 +1,94 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The summary of an evaluation in a browser: from its file, without network."""
+
+from collections.abc import Iterator
+from pathlib import Path
+import re
+import sys
+
+from browser_support import Browser
+from crgame_ros.evaluation.summary.summarise import summarise
+from crgame_ros.evaluation.summary.summary_page import write_summary_page
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'evaluation' / 'summary'))
+
+from evaluation_rows import many  # noqa: E402, I100
+
+
+@pytest.fixture(scope='module')
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write the page of an evaluation, of which the worst cell has a report."""
+    rows = many(240, 12, ('idm', 'mine', 'a planner whose name is longer than its column'))
+    folder = rows.write(tmp_path_factory.mktemp('evaluation') / 'rows', 3)
+    summary = summarise(folder)
+    (folder / 'reports').mkdir()
+    (folder / 'reports' / f'{summary.worst[0].key}.html').write_text('<title>one cell</title>')
+    write_summary_page(summary, folder / 'summary.html')
+    return folder / 'summary.html'
+
+
+@pytest.fixture
+def offline(browser: Browser) -> Iterator[Browser]:
+    """Give a browser without network."""
+    browser.driver.execute_cdp_cmd('Network.enable', {})
+    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
+        'offline': True, 'latency': 0, 'downloadThroughput': 0, 'uploadThroughput': 0})
+    yield browser
+    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
+        'offline': False, 'latency': 0, 'downloadThroughput': -1, 'uploadThroughput': -1})
+    assert browser.console_errors() == []
+
+
+def test_it_fits_can_be_read_and_leads_to_reports(offline: Browser, page: Path) -> None:
+    """On wide and narrow screens, light and dark (WCAG AA: 4.5 to 1; 3 to 1 of pictures)."""
+    for width, scheme in ((1280, 'light'), (1280, 'dark'), (390, 'light'), (390, 'dark')):
+        offline.resize(width, 844)
+        offline.prefer(scheme)
+        offline.open(page.as_uri())
+        assert offline.run('return document.documentElement.scrollWidth') <= width
+        for selector, least in (('.note', 4.5), ('td small', 4.5), ('.better', 4.5),
+                                ('.commands', 4.5), ('.intervals text', 4.5),
+                                ('.intervals .tick', 4.5), ('.intervals circle.better', 3.0),
+                                ('.intervals circle.estimate', 3.0)):
+            assert _contrast(offline, selector) >= least, (scheme, selector)
+    assert offline.run('return performance.getEntriesByType("resource").length') == 0
+    link = offline.driver.find_element('css selector', '#worst a')
+    offline.run('arguments[0].scrollIntoView({ behavior: "instant", block: "center" })', link)
+    link.click()
+    offline.wait('document.title === "one cell"', 'the report of the worst cell')
+
+
+def _contrast(browser: Browser, selector: str) -> float:
+    """Give the ratio of an element's colour to that of its ground as WCAG 2 defines it."""
+    colours = browser.run("""
+        const node = document.querySelector(arguments[0]);
+        let ground = node;
+        while (getComputedStyle(ground).backgroundColor === 'rgba(0, 0, 0, 0)') {
+          ground = ground.parentElement;
+        }
+        const own = getComputedStyle(node);
+        return [node instanceof SVGElement ? own.fill : own.color,
+                getComputedStyle(ground).backgroundColor];""", selector)
+    low, high = sorted(map(_luminance, colours))
+    return (high + 0.05) / (low + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    parts = [int(part) / 255.0 for part in re.findall(r'\d+', colour)[:3]]
+    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
+                        for part in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

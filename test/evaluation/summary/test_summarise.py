@@ -1,0 +1,292 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Evaluations summed up, beside numbers that are got in another way."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.summary.cell_block import CellBlocks
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
+from crgame_ros.evaluation.summary.summarise import summarise
+from crgame_ros.evaluation.summary.summary import Estimate, Summary
+from evaluation_rows import Evaluation, many
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+
+def _of(summary: Summary, measure: str, *labels: str, difference: bool = False) -> Estimate:
+    place = [each.name for each in summary.measures].index(measure)
+    groups: Sequence = summary.differences if difference else summary.groups
+    return next(group.estimates[place] for group in groups if group.labels == labels)
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> Summary:
+    """Two planners in four scenarios with two seeds, three cells of which failed."""
+    found = Evaluation()
+    for number in range(8):
+        factors = {'scenario': f'ZAM_S-{number % 4}_1_T-1', 'seed': number // 4}
+        found.add(planner='idm', avs=[{'worst_ttc': 2.0, 'collided': False}],
+                  hv={'worst_ttc': 0.1, 'collided': True},
+                  status='died' if number == 7 else 'ok', reason='killed' if number == 7 else '',
+                  **factors)
+        if number == 6:
+            continue
+        ended = {0: 'error', 1: 'timeout'}.get(number, 'ok')
+        found.add(planner='mine', status=ended, reason='no path' if number == 0 else '',
+                  traceback='Traceback: no path' if number == 0 else '',
+                  avs=[{'worst_ttc': None if number == 2 else 2.0 + number,
+                        'collided': number == 3},
+                       {'worst_ttc': 4.0 + number, 'collided': False}], **factors)
+    found.add(planner='mine', scenario='ZAM_Other-1_1_T-1',
+              avs=[{'worst_ttc': 1.5, 'collided': True}])
+    return summarise(found.write(tmp_path / 'two', 3, 1), resamples=200)
+
+
+def test_means_are_those_of_avs_in_cells_that_ended_well(two: Summary) -> None:
+    # idm: cells 0 to 6. mine: cells 2, 3, 4, 5, 7 and the other one, two AVs each but the last.
+    assert (two.cells, two.failed, two.scenarios, two.baseline) == (16, 3, 5, 'idm')
+    assert [(group.labels, group.cells, group.failed) for group in two.groups] == [
+        (('idm',), 8, 1), (('mine',), 8, 2)]
+    assert _of(two, 'worst_ttc', 'idm').value == 2.0
+    assert _of(two, 'worst_ttc', 'idm').n == 7
+    firsts, seconds = [5.0, 6.0, 7.0, 9.0], [6.0, 7.0, 8.0, 9.0, 11.0]
+    mine = _of(two, 'worst_ttc', 'mine')
+    assert mine.n == 10 and mine.value == pytest.approx(np.mean([*firsts, *seconds, 1.5]))
+    # Collisions: cell 3 and the other one, of 11 AVs.
+    assert _of(two, 'collision', 'mine').value == pytest.approx(2.0 / 11.0)
+    assert _of(two, 'critical_ttc', 'mine').value == pytest.approx(1.0 / 11.0)
+    assert _of(two, 'critical_ttc', 'idm').value == 1.0
+    failed = _of(two, 'failed', 'mine')
+    assert (failed.value, failed.n) == (2.0 / 8.0, 8)
+
+
+def test_pairs_are_cells_alike_in_all_but_the_planner(two: Summary) -> None:
+    found, = two.differences
+    assert found.labels == ('mine',)
+    # Both ended well: 2, 3, 4, 5. Alone failed: 0 and 1, the baseline 7. Of the other: none.
+    assert (found.pairs, found.failed, found.baseline_failed, found.both_failed,
+            found.unpaired) == (4, 2, 1, 0, 1)
+    # Of cell 2 the mean is that of its second AV: 6; of 3, 4, 5 it is 3 + number.
+    ttc = _of(two, 'worst_ttc', 'mine', difference=True)
+    assert (ttc.value, ttc.n) == (pytest.approx(np.mean([6.0, 6.0, 7.0, 8.0]) - 2.0), 4)
+    # Cell 3: one of its two AVs touched somebody.
+    assert _of(two, 'collision', 'mine', difference=True).value == pytest.approx(0.5 / 4.0)
+    failed = _of(two, 'failed', 'mine', difference=True)
+    assert (failed.value, failed.n) == (pytest.approx((2 - 1) / 7), 7)
+
+
+def test_only_cells_that_are_alike_are_pairs(tmp_path: Path) -> None:
+    """Each factor for itself keeps cells apart, whichever comes first."""
+    rows = Evaluation()
+    rows.add(planner='idm', avs=[{'distance': 1.0}])
+    rows.add(planner='mine', avs=[{'distance': 3.0}])
+    for number in range(5):
+        for factor in ('scenario', 'game', 'human', 'perception', 'traffic'):
+            rows.add(planner='mine', avs=[{'distance': 99.0}], **{factor: f'other {number}'})
+        rows.add(planner='mine', avs=[{'distance': 99.0}], seed=1 + number)
+    found, = summarise(rows.write(tmp_path / 'rows'), resamples=100).differences
+    assert (found.pairs, found.unpaired) == (1, 30)
+    assert found.estimates[-1].value == 2.0
+
+
+def test_the_worst_cells_come_contacts_first(two: Summary) -> None:
+    assert [(cell.values, cell.factors[2], cell.vehicle) for cell in two.worst[:3]] == [
+        ((1.0, 1.5), 'mine', 'av0'), ((1.0, 5.0), 'mine', 'av0'), ((0.0, 2.0), 'idm', 'av0')]
+    assert len(two.worst) == 10 and len({cell.key for cell in two.worst}) == 10
+    # A cell that failed is none of them.
+    assert all(cell.values[1] == 2.0 for cell in two.worst[2:9])
+
+
+def test_failures_are_counted_by_their_reason(two: Summary) -> None:
+    told = {(each.status, each.reason): each for each in two.failures}
+    assert set(told) == {('error', 'no path'), ('timeout', ''), ('died', 'killed')}
+    error = told['error', 'no path']
+    assert error.cells == ((('mine',), 1),) and error.traceback == 'Traceback: no path'
+
+
+def test_few_scenarios_draw_cells_and_more_draw_scenarios(tmp_path: Path, two: Summary) -> None:
+    # idm is in four scenarios, mine in five, their pairs in four.
+    assert [group.resampled for group in two.groups] == ['cells', 'scenarios']
+    assert two.differences[0].resampled == 'cells'
+
+
+@pytest.mark.parametrize('scenarios', [3, 12])
+def test_neither_order_nor_parts_matter(tmp_path: Path, scenarios: int) -> None:
+    """Whatever part a row is in and wherever, not a bit of the summary differs."""
+    rows = many(240, scenarios)
+    found = [summarise(rows.write(tmp_path / str(seed), parts, seed), resamples=200,
+                       block_cells=60).as_dict() for seed, parts in ((1, 1), (2, 7), (3, 40))]
+    for each in found:
+        each.pop('folder')
+    assert found[0] == found[1] == found[2]
+
+
+def test_blocks_change_nothing_but_draws_of_cells(tmp_path: Path) -> None:
+    """Four blocks are as one: means to rounding, and all of it where scenarios are drawn."""
+    folder = many(240, 12).write(tmp_path / 'rows')
+    whole, parted = (summarise(folder, block_cells=cells) for cells in (1000, 60))
+    for one, other in zip((*whole.groups, *whole.differences),
+                          (*parted.groups, *parted.differences), strict=True):
+        for left, right in zip(one.estimates, other.estimates, strict=True):
+            assert vars(left) == pytest.approx(vars(right), rel=1e-12, nan_ok=True)
+    assert whole.worst == parted.worst and whole.failures == parted.failures
+
+
+def test_every_cell_is_in_one_block_and_pairs_are_together(tmp_path: Path) -> None:
+    parts = EvaluatedParts(many(240, 12).write(tmp_path / 'rows', 5, seed=1))
+    blocks = list(CellBlocks(parts, 60))
+    keys = [key for block in blocks for key in block.keys.to_pylist()]
+    assert len(keys) == len(set(keys)) == 240
+    # Half of each block is idm's, for each of its cells there is one of the other planner.
+    assert len(blocks) == 4 and all(30 <= len(block.keys) <= 90 for block in blocks)
+    for block in blocks:
+        assert set(np.unique(block.pairs, return_counts=True)[1].tolist()) == {2}
+
+
+def test_another_planner_does_not_change_the_others(tmp_path: Path) -> None:
+    rows = many(120, 3)
+    before = summarise(rows.write(tmp_path / 'before'), resamples=200)
+    rows.add(planner='a new one', scenario='ZAM_Made-0_1_T-1', avs=[{'worst_ttc': 1.0}])
+    after = summarise(rows.write(tmp_path / 'after'), resamples=200)
+    assert after.groups[1:] == before.groups
+
+
+def test_a_cell_that_was_run_again_counts_once(tmp_path: Path) -> None:
+    rows = Evaluation()
+    for _ in range(2):
+        rows.add(avs=[{'worst_ttc': 1.0}, {'worst_ttc': 3.0}], seed=1)
+    rows.add('timeout', 'too long', seed=2)
+    rows.add(avs=[{'worst_ttc': 5.0}], seed=2)
+    found = summarise(rows.write(tmp_path / 'rows', 4), resamples=100)
+    ttc = _of(found, 'worst_ttc', 'idm')
+    assert (found.cells, found.failed, ttc.n, ttc.value) == (2, 0, 3, 3.0)
+    assert not found.failures
+
+
+def test_groups_of_several_factors(tmp_path: Path) -> None:
+    found = summarise(many(80, 4).write(tmp_path / 'rows'), by=('human', 'planner'),
+                      measures=['failed', 'distance'], resamples=100, baseline='mine')
+    assert [group.labels for group in found.groups] == [
+        ('', 'idm'), ('', 'mine'), ('timid', 'idm'), ('timid', 'mine')]
+    assert [group.labels for group in found.differences] == [('', 'idm'), ('timid', 'idm')]
+    assert [measure.name for measure in found.measures] == ['failed', 'distance']
+
+
+def test_games_stand_for_scenarios_that_are_not_named(tmp_path: Path) -> None:
+    rows = Evaluation()
+    for number in range(6):
+        rows.add(scenario='', game=f'game {number}', avs=[{'distance': 1.0}])
+    found = summarise(rows.write(tmp_path / 'rows'), resamples=100)
+    assert found.scenarios == 6 and found.groups[0].resampled == 'scenarios'
+
+
+def test_parts_of_another_version_are_taken_for_what_they_have(tmp_path: Path) -> None:
+    """A column that a part lacks is unknown there: neither zero nor no collision."""
+    rows = Evaluation()
+    for seed in range(4):
+        rows.add(avs=[{'distance': 100.0, 'collided': True}], seed=seed)
+    folder = rows.write(tmp_path / 'rows', 2)
+    path = folder / 'vehicles' / 'part-000001.parquet'
+    part = pq.read_table(path).drop_columns(['collided', 'game'])
+    part = part.append_column('from the future', pa.array([[1], [2]]))
+    pq.write_table(part.set_column(part.schema.get_field_index('distance'), 'distance',
+                                   pa.array([40, 60], pa.int32())), path)
+    found = summarise(folder, resamples=100)
+    distance, collision = (_of(found, name, 'idm') for name in ('distance', 'collision'))
+    assert (distance.value, distance.n) == (75.0, 4)
+    assert (collision.value, collision.n) == (1.0, 2)
+
+
+def test_everything_failed(tmp_path: Path) -> None:
+    rows = Evaluation()
+    rows.add('error', 'no such planner')
+    found = summarise(rows.write(tmp_path / 'rows'), resamples=100)
+    assert [measure.name for measure in found.measures] == ['failed']
+    assert found.groups[0].estimates[0].value == 1.0
+    assert np.isnan(found.groups[0].estimates[0].low)
+    assert found.worst == () and found.differences == () and found.baseline == ''
+
+
+def test_what_is_added_meanwhile_is_not_read(tmp_path: Path) -> None:
+    folder = many(20, 2).write(tmp_path / 'rows', 2)
+    parts = EvaluatedParts(folder)
+    content = (folder / 'cells' / 'part-000000.parquet').read_bytes()
+    (folder / 'cells' / 'part-000002.parquet').write_bytes(content)
+    read = parts.batches('cells', {'cell': pa.string()})
+    assert sum(batch.rows.num_rows for batch in read) == parts.rows == 20
+
+
+def test_a_goal_is_not_missed_where_nobody_scored(tmp_path: Path) -> None:
+    """The time of reaching it is empty in both cases; only the scored ones count."""
+    rows = Evaluation()
+    for seed, (reached_s, valid) in enumerate((
+            (8.0, True), (None, False), (None, True), (None, None))):
+        rows.add(seed=seed, avs=[{'score_reached_s': reached_s, 'score_valid': valid}])
+    found = summarise(rows.write(tmp_path / 'rows'), resamples=100)
+    goal, valid = (_of(found, name, 'idm') for name in ('goal_reached', 'valid'))
+    assert (goal.value, goal.n) == (pytest.approx(1.0 / 3.0), 3)
+    assert (valid.value, valid.n) == (pytest.approx(2.0 / 3.0), 3)
+
+
+def test_any_column_of_vehicles_may_be_asked_for(tmp_path: Path) -> None:
+    rows = Evaluation()
+    for seed, ttc in enumerate((3.0, 1.0, 2.0)):
+        rows.add(seed=seed, avs=[{'worst_ttc_2d': ttc}])
+    found = summarise(rows.write(tmp_path / 'rows'), measures=['worst_ttc_2d'],
+                      worst=['worst_ttc_2d'], resamples=100)
+    assert found.measures[0].unit == 's' and found.groups[0].estimates[0].value == 2.0
+    assert [cell.values for cell in found.worst] == [(1.0,), (2.0,), (3.0,)]
+
+
+@pytest.mark.parametrize(('wanted', 'said'), [
+    ({'measures': ['speeed']}, "no measure 'speeed' here"),
+    ({'by': ('seed',)}, "--by: ['seed'] cannot be told apart"),
+    ({'baseline': 'theirs'}, "no planner 'theirs' here; there are idm, mine"),
+    ({'baseline': 'idm', 'by': ('human',)}, 'no planners to compare'),
+    ({'worst': ['distance']}, 'nothing tells a worse distance'),
+    ({'worst': ['failed']}, 'nothing tells a worse failed'),
+    ({'resamples': 1}, '--resamples: is 1'),
+    ({'seed': -1}, 'seed: is -1'),
+    ({'by': ('scenario',), 'resamples': 100_000}, 'are too many')])
+def test_what_cannot_be_done_is_told(tmp_path: Path, wanted: dict, said: str) -> None:
+    folder = many(60, 30).write(tmp_path / 'rows')
+    with pytest.raises(InputError) as told:
+        summarise(folder, **wanted)
+    assert said in str(told.value)
+
+
+def test_a_folder_that_is_no_evaluation_is_refused(tmp_path: Path) -> None:
+    for said in ('no such folder', 'no cell is finished'):
+        with pytest.raises(InputError, match=said):
+            summarise(tmp_path / 'rows')
+        (tmp_path / 'rows').mkdir(exist_ok=True)
+    folder = many(4, 2).write(tmp_path / 'whole')
+    part = folder / 'vehicles' / 'part-000000.parquet'
+    content = part.read_bytes()
+    part.write_bytes(content[:len(content) // 2])
+    with pytest.raises(InputError, match='part-000000.parquet: cannot be read'):
+        summarise(folder)
+    table = pa.table({'cell': ['a'], 'vehicle': ['av0'], 'role': ['autonomous'],
+                      'worst_ttc': ['short']})
+    pq.write_table(table, part)
+    with pytest.raises(InputError, match='part-000000.parquet: cannot be read'):
+        summarise(folder)
+    pq.write_table(table.drop_columns(['role']), part)
+    with pytest.raises(InputError, match='has no column role'):
+        summarise(folder)

@@ -1,0 +1,144 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Which cells there are, and what their keys depend on."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell import cell_of
+from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
+from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.evaluation_plan import load_plan, parse_plan
+from crgame_ros.paths import scenarios_directory
+import pytest
+
+PLANNER = """
+from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
+
+
+class Mine(ConstantVelocityPlanner):
+    pass
+"""
+GAME = scenarios_directory() / 'cut_in.yaml'
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> dict[str, Any]:
+    """Give a plan with a planner of somebody's own."""
+    (tmp_path / 'mine.py').write_text(PLANNER)
+    return {'games': [str(GAME)], 'planners': ['idm', 'mine.py:Mine'], 'seeds': 2}
+
+
+def grid(values: dict[str, Any], folder: Path) -> CellGrid:
+    """Make the cells of a plan in a folder."""
+    return make_grid(parse_plan(values, 'plan', folder), ContentStore(folder / 'files'))
+
+
+def keys(values: dict[str, Any], folder: Path) -> dict[tuple[str, int], str]:
+    """Give the keys of a plan's cells by planner and seed."""
+    return {(cell.planner, cell.seed): cell.key for cell in grid(values, folder)}
+
+
+def test_every_scene_meets_everything(plan: dict[str, Any], tmp_path: Path) -> None:
+    plan |= {'traffic': {'own': 'own', 'none': None}, 'perception': {
+        'blind': {'sensors': [{'name': 'front', 'horizon': 5.0}]}}}
+    found = grid(plan, tmp_path)
+    cells = list(found)
+    assert len(found) == len(cells) == len({cell.key for cell in cells}) == 8
+    assert {cell.label for cell in cells} >= {
+        'cut_in · idm · blind · seed 0', 'cut_in · mine.py:Mine · blind · none · seed 1'}
+    again = CellGrid.from_dict(json.loads(json.dumps(found.as_dict())))
+    assert [cell.key for cell in again] == [cell.key for cell in cells]
+    assert all(cell_of(cell.text) == cell for cell in again)
+
+
+def test_a_changed_planner_changes_its_own_cells_alone(plan: dict[str, Any],
+                                                       tmp_path: Path) -> None:
+    before = keys(plan, tmp_path)
+    (tmp_path / 'mine.py').write_text(PLANNER + '    horizon = 2.0\n')
+    after = keys(plan, tmp_path)
+    same = {name for name in before if before[name] == after[name]}
+    assert same == {('idm', 0), ('idm', 1)} and before.keys() == after.keys()
+
+
+def test_everything_else_changes_all(plan: dict[str, Any], tmp_path: Path) -> None:
+    game = tmp_path / 'cut_in.yaml'
+    text = GAME.read_text().replace('scenario: ', f'scenario: {GAME.parent}/').replace(
+        'keys:', f'keys:{GAME.parent}/')
+    game.write_text(text)
+    plan['games'] = [str(game)]
+    before = set(keys(plan, tmp_path).values())
+    for changed in ({'duration': 3.0}, {'latency': 5},
+                    {'planners': [{'planner': 'idm', 'options': {'v0': 9.0}}, 'reactive']},
+                    {'seeds': [7]}):
+        assert before.isdisjoint(keys(plan | changed, tmp_path).values()), changed
+    game.write_text(text + 'prediction: {horizon: 2.0}\n')
+    assert before.isdisjoint(keys(plan, tmp_path).values())
+
+
+def test_a_game_is_the_same_from_another_place(plan: dict[str, Any], tmp_path: Path) -> None:
+    plan['planners'] = ['idm']
+    copies = []
+    for name in ('one', 'two'):
+        folder = tmp_path / name
+        folder.mkdir()
+        for file in (GAME, GAME.with_name('cut_in.keys.yaml'),
+                     GAME.with_name('ZAM_CutIn-1_1_T-1.xml')):
+            (folder / file.name).write_bytes(file.read_bytes())
+        copies.append(keys(plan | {'games': [str(folder / GAME.name)]}, tmp_path))
+    assert copies[0] == copies[1] == keys(plan, tmp_path)
+
+
+@pytest.mark.parametrize(('values', 'message'), [
+    ({}, 'names no games, scenarios or humans'),
+    ({'games': ['nowhere.yaml']}, 'there is no such file or folder'),
+    ({'games': [str(GAME), str(GAME.parent / '.' / 'cut_in.yaml')], 'planners': ['idm', 'idm']},
+     'two planners have one label'),
+    ({'games': [str(GAME)], 'seeds': 0}, '"seeds" is neither'),
+    ({'games': [str(GAME)], 'seeds': [1, 1]}, '"seeds" is neither'),
+    ({'games': [str(GAME)], 'planners': ['nobody']}, 'there is no planner "nobody"'),
+    ({'games': [str(GAME)], 'planners': ['external']}, 'answers live runs only'),
+    ({'games': [str(GAME)], 'perception': {'x': {'sensors': 3}}}, 'perception: x'),
+    ({'games': [str(GAME)], 'planets': 3}, 'planets')])
+def test_what_is_no_plan_is_told(values: dict[str, Any], message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message.replace('"', '.')):
+        grid(values, tmp_path)
+
+
+def test_games_that_need_a_person_are_refused(tmp_path: Path) -> None:
+    game = tmp_path / 'game.yaml'
+    game.write_text(f'scenario: {GAME.parent}/ZAM_CutIn-1_1_T-1.xml\n'
+                    'humans: [{id: hv0, driver: cockpit}]\n')
+    with pytest.raises(InputError, match='needs a person or a recording'):
+        grid({'games': [str(game)]}, tmp_path)
+
+
+def test_two_scenes_of_one_name_are_refused(tmp_path: Path) -> None:
+    other = tmp_path / 'cut_in.yaml'
+    other.write_text(f'scenario: {GAME.parent}/ZAM_CutIn-1_1_T-1.xml\nhumans: []\n')
+    with pytest.raises(InputError, match='another one is called cut_in'):
+        grid({'games': [str(GAME), str(other)]}, tmp_path)
+
+
+def test_the_plan_of_the_documents_can_be_read(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / 'docs' / 'evaluation.md').read_text()
+    file = tmp_path / 'plan.yaml'
+    file.write_text(text.split('```yaml\n')[1].split('```')[0])
+    plan = load_plan(file)
+    assert [choice.name for choice in plan.planners] == ['idm', 'cautious', 'my_planner.py:Mine']
+    assert plan.seed_numbers() == (0, 1, 2, 3, 4) and set(plan.perceptions()) == {
+        'own', 'short-sighted'}

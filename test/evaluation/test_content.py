@@ -1,0 +1,61 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Files by what they hold."""
+
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.content import Content, ContentStore, digests_in, resolved
+import pytest
+
+MAP = Content('map.yaml', {'map.yaml': b'image: map.pgm\n', 'map.pgm': b'P5 1 1 255\n\0'})
+
+
+def test_what_is_put_in_is_found_by_its_reference(tmp_path: Path) -> None:
+    store = ContentStore(tmp_path / 'files')
+    assert store.put(MAP) == store.put(MAP) == MAP.digest
+    path = Path(resolved(MAP.reference, store.folder))
+    assert path.name == 'map.yaml' and path.read_bytes() == MAP.files['map.yaml']
+    assert (path.parent / 'map.pgm').read_bytes() == MAP.files['map.pgm']
+    assert [item.name for item in store.folder.iterdir()] == [MAP.digest]
+
+
+def test_a_digest_names_names_and_bytes() -> None:
+    assert MAP.digest != Content('map.pgm', MAP.files).digest
+    assert MAP.digest != Content('map.yaml', {**MAP.files, 'map.pgm': b'P5 1 1 255\n\1'}).digest
+
+
+def test_all_references_of_a_text_are_found() -> None:
+    other = Content('mine.py', {'mine.py': b''})
+    text = f'{{"a":"{MAP.reference}","b":"keys:{other.reference}:Mine","c":"{MAP.reference}"}}'
+    assert digests_in(text) == {MAP.digest, other.digest}
+    assert resolved(f'{other.reference}:Mine', Path('/x')) == f'/x/{other.digest}/mine.py:Mine'
+
+
+def test_a_content_travels(tmp_path: Path) -> None:
+    here, there = ContentStore(tmp_path / 'here'), ContentStore(tmp_path / 'there')
+    here.put(MAP)
+    there.unpack(MAP.digest, here.packed(MAP.digest))
+    assert (there.folder / MAP.digest / 'map.pgm').read_bytes() == MAP.files['map.pgm']
+
+
+def test_another_content_under_its_name_is_refused(tmp_path: Path) -> None:
+    here, there = ContentStore(tmp_path / 'here'), ContentStore(tmp_path / 'there')
+    here.put(MAP)
+    packed = here.packed(MAP.digest) | {'more': here.packed(MAP.digest)['map.yaml']}
+    with pytest.raises(InputError, match='is not what its name says'):
+        there.unpack(MAP.digest, packed)
+    with pytest.raises(InputError, match='cannot be read'):
+        here.packed('0' * 32)

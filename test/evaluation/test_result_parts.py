@@ -1,0 +1,112 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The tables of an evaluation survive whatever ends the process that writes them."""
+
+from pathlib import Path
+import subprocess
+import sys
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.result_parts import EARLIER, ResultParts
+import pyarrow.parquet as pq
+import pytest
+
+FILL = """
+import os, sys
+from pathlib import Path
+from crgame_ros.evaluation.result_parts import ResultParts
+sys.path.insert(0, sys.argv[2])
+from test_result_parts import rows
+parts = ResultParts(Path(sys.argv[1]), part_cells=4)
+for number in range(10):
+    parts.add(rows(number))
+os.kill(os.getpid(), 9)
+"""
+
+
+def rows(number: int, status: str = 'ok') -> dict[str, Any]:
+    """Give the rows of a cell with two vehicles."""
+    key = f'{number:032x}'
+    return {'cell': {'cell': key, 'planner': 'idm', 'seed': number, 'status': status},
+            'vehicles': [{'cell': key, 'vehicle': name, 'distance': number + 0.1}
+                         for name in ('hv0', 'av0')],
+            'work': {'cell': key, 'wall_s': 0.5}}
+
+
+def seeds(folder: Path, table: str = 'cells', column: str = 'seed') -> list[Any]:
+    """Read a column of all parts, in their order."""
+    return [value for path in sorted((folder / table).glob('part-*.parquet'))
+            for value in pq.read_table(path)[column].to_pylist()]
+
+
+def test_a_killed_process_loses_no_cell(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, '-c', FILL, tmp_path, Path(__file__).parent],
+                          capture_output=True, text=True)
+    assert done.returncode == -9, done.stderr
+    assert seeds(tmp_path) == [*range(8)]
+    with ResultParts(tmp_path, part_cells=4) as parts:
+        assert list(parts.keys()) == [f'{number:032x}' for number in range(10)]
+        parts.add(rows(10))
+        parts.finish_part()
+    assert seeds(tmp_path) == [*range(11)]
+    assert seeds(tmp_path, 'vehicles', 'distance') == [n + 0.1 for n in range(11) for _ in (0, 1)]
+    assert seeds(tmp_path, 'work', 'wall_s') == [0.5] * 11
+    assert not list(tmp_path.glob('journal*')) and not list(tmp_path.rglob('*.part'))
+
+
+def test_a_line_that_is_cut_off_is_no_cell(tmp_path: Path) -> None:
+    with ResultParts(tmp_path) as parts:
+        parts.add(rows(0))
+        parts.add(rows(1))
+    journal = next(tmp_path.glob('journal*'))
+    journal.write_text(journal.read_text()[:-9])
+    with ResultParts(tmp_path) as parts:
+        assert list(parts.keys()) == [f'{0:032x}']
+        parts.add(rows(2))
+    with ResultParts(tmp_path) as parts:
+        assert list(parts.keys()) == [f'{0:032x}', f'{2:032x}']
+
+
+def test_a_journal_whose_part_is_written_counts_once(tmp_path: Path) -> None:
+    with ResultParts(tmp_path) as parts:
+        parts.add(rows(0))
+        kept = next(tmp_path.glob('journal*')).read_text()
+        parts.finish_part()
+    (tmp_path / 'journal-000000.jsonl').write_text(kept)
+    with ResultParts(tmp_path) as parts:
+        assert list(parts.keys()) == [f'{0:032x}']
+
+
+def test_a_second_writer_is_refused(tmp_path: Path) -> None:
+    with ResultParts(tmp_path), pytest.raises(InputError, match='another evaluation writes there'):
+        ResultParts(tmp_path)
+
+
+def test_what_is_not_wanted_is_put_away_and_comes_back(tmp_path: Path) -> None:
+    with ResultParts(tmp_path, part_cells=3) as parts:
+        for number in range(7):
+            parts.add(rows(number, 'error' if number == 5 else 'ok'))
+        assert parts.keep_wanted(lambda key, status: int(key, 16) > 1 and status == 'ok') == 3
+        assert seeds(tmp_path) == [2, 3, 4, 6]
+        assert sorted(seeds(tmp_path / EARLIER)) == [0, 1, 5]
+        assert sorted(seeds(tmp_path / EARLIER, 'vehicles', 'distance')) == [
+            0.1, 0.1, 1.1, 1.1, 5.1, 5.1]
+        parts.add(rows(7))
+        assert parts.keep_wanted(lambda key, status: int(key, 16) != 3) == 1
+    assert sorted(seeds(tmp_path)) == [0, 1, 2, 4, 5, 6, 7]
+    assert sorted(seeds(tmp_path, 'vehicles', 'distance')) == sorted(
+        number + 0.1 for number in (0, 1, 2, 4, 5, 6, 7) for _ in (0, 1))
+    assert seeds(tmp_path / EARLIER) == [3]

@@ -1,0 +1,68 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Recorded humans in an evaluation: they drive as they did, against whoever is asked for."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell_grid import make_grid
+from crgame_ros.evaluation.cell_run import run_cell
+from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.evaluation_plan import parse_plan
+from crgame_ros.game.game_file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
+import numpy as np
+import pytest
+
+NAME = 'dense_merge'
+
+
+@pytest.fixture(scope='module')
+def recorded(recorder: Any, tmp_path_factory: pytest.TempPathFactory,
+             ) -> tuple[Path, OfflineResult]:
+    """Record a game with traffic over uneven steps."""
+    setup = build_setup(load_game(scenarios_directory() / f'{NAME}.yaml'))
+    intervals_s = np.random.default_rng(3).uniform(0.006, 0.014, 200)
+    result = run_offline(setup, duration_s=2.0, intervals_s=intervals_s)
+    folder = tmp_path_factory.mktemp('recorded') / 'somebody'
+    recorder.ours(folder / 'bag', recorder.messages(result, intervals_s=intervals_s))
+    return folder, result
+
+
+def test_the_recorded_planner_gives_the_recorded_run(recorded: tuple[Path, OfflineResult],
+                                                     tmp_path: Path) -> None:
+    folder, result = recorded
+    plan = parse_plan({'humans': [str(folder)], 'planners': ['own', 'constant-velocity'],
+                       'seeds': [result.setup.game.seed]}, 'plan', tmp_path)
+    store = ContentStore(tmp_path / 'files')
+    same, other = make_grid(plan, store)
+    assert same.human == other.human == 'somebody' and same.game == ''
+    again, another = (run_cell(cell, store.folder) for cell in (same, other))
+    assert again.state_hash == result.state_hash
+    humans = len(result.setup.humans)
+    assert np.array_equal(another.vehicle_states[:, :humans], result.vehicle_states[:, :humans])
+    assert not np.array_equal(another.vehicle_states, result.vehicle_states)
+
+
+def test_a_run_without_a_human_is_refused(recorder: Any, tmp_path: Path) -> None:
+    setup = build_setup(replace(load_game(scenarios_directory() / 'two_avs.yaml'), humans=()))
+    recorder.ours(tmp_path / 'run' / 'bag', recorder.messages(run_offline(setup, duration_s=0.5)))
+    plan = parse_plan({'humans': [str(tmp_path / 'run')]}, 'plan', tmp_path)
+    with pytest.raises(InputError, match='nobody drove in it'):
+        make_grid(plan, ContentStore(tmp_path / 'files'))
