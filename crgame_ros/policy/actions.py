@@ -128,7 +128,7 @@ def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
         return _driven(pedals(action), ego, vehicle, steps, dt_s, substeps)
     wanted = wanted_motion(action, ego.speed, vehicle)
     angle = math.atan(vehicle.wheelbase * wanted.curvature)
-    drive = Rollout(ego, steps, dt_s, vehicle.wheelbase)
+    drive = Rollout(ego, dt_s, vehicle.wheelbase)
     for _ in range(steps):
         speed, acceleration = drive.speed, wanted.acceleration
         if speed <= 0.0 and acceleration < 0.0:
