@@ -31,6 +31,8 @@ from crgame_ros.paths import share_directory
 # They declare Python < 3.12, so that pip does not bring them there; they work all the same.
 PACKAGES = {'commonroad_idm_planner': 'commonroad-idm-planner',
             'commonroad_rp': 'commonroad-reactive-planner'}
+# Before FILE.py:load, where a planner or a driver is named: a trained policy drives.
+POLICY = 'policy:'
 
 
 class ModelRegistry:
@@ -123,7 +125,7 @@ class ModelRegistry:
         if name in self.built_in:
             found = _from_module(self.built_in[name], label)
         elif ':' in name:
-            if self.judges and not all(judge(name) for judge in self.judges):
+            if not all(judge(name) for judge in self.judges):
                 raise InputError('is code that only a message names: it is not run', label,
                                  'name it in the game file, or to the node that runs it')
             source, _, attribute = name.rpartition(':')

@@ -40,9 +40,9 @@ AT_THE_TOP = {'cli', 'doctor', 'replay_command', 'requirements', 'schema_command
 FOLDERS = (
     LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints', 'occupancy',
     'scripted', 'messages', 'driver', 'timing', 'drivability', 'control', 'planner', 'perception',
-    'traffic', 'simulation', 'recording', 'analysis/criticality', 'analysis/behaviour',
+    'policy', 'traffic', 'simulation', 'recording', 'analysis/criticality', 'analysis/behaviour',
     'analysis/scores', 'analysis/tables', 'analysis/pictures', 'analysis/report', 'analysis',
-    'evaluation/summary', 'evaluation', 'cockpit', 'ros', 'nodes/sim', 'nodes/cockpit',
+    'evaluation/summary', 'evaluation', 'cockpit', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit',
     'nodes/markers', 'nodes', 'launcher', 'analysis/reproduction', 'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].

@@ -31,6 +31,9 @@ from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 if TYPE_CHECKING:
     from crgame_ros.driver.device_map import DeviceMap
     from crgame_ros.driver.evdev_device import EvdevDevice
+    from crgame_ros.game.objects import ObjectStates
+    import numpy as np
+    from numpy.typing import NDArray
 
 JOY_TIMEOUT_S = 0.5
 # Drives in the browser; its node speaks for the seat itself.
@@ -38,9 +41,10 @@ COCKPIT = 'cockpit'
 
 _FORMS = {
     'auto': 'auto', 'cockpit': 'cockpit', 'idle': 'idle', 'evdev': 'evdev or evdev:NAME',
-    'keys': 'keys:FILE', 'joy': 'joy or joy:FILE', 'replay': 'replay:BAG'}
+    'keys': 'keys:FILE', 'joy': 'joy or joy:FILE', 'replay': 'replay:BAG',
+    'policy': 'policy:FILE.py:load'}
 _WITHOUT_ARGUMENT = {'auto', 'cockpit', 'idle', 'evdev', 'joy'}
-_WITH_ARGUMENT = {'evdev', 'keys', 'joy', 'replay'}
+_WITH_ARGUMENT = {'evdev', 'keys', 'joy', 'replay', 'policy'}
 
 
 @dataclass(frozen=True)
@@ -48,9 +52,9 @@ class SourceSpec:
     """
     A source as the game or the command line names it.
 
-    :param kind: auto, cockpit, idle, evdev, keys, joy or replay.
-    :param argument: device name, file or bag; empty for `auto`, `idle`, the best evdev device
-        and the external joy node.
+    :param kind: auto, cockpit, idle, evdev, keys, joy, replay or policy.
+    :param argument: device name, file or bag, or a policy's file and function; empty for `auto`,
+        `idle`, the best evdev device and the external joy node.
     """
 
     kind: str
@@ -117,6 +121,8 @@ class DriverSource(ABC):
     """
 
     problem: InputError | None = None
+    # Whether what it looks at comes between cycles, too, though it has no descriptor.
+    is_looking = False
 
     @property
     def connected(self) -> bool:
@@ -130,6 +136,15 @@ class DriverSource(ABC):
 
         :param n: the cycle, never less than the one asked for last (`reset` begins anew).
         :param dt_s: length of a cycle in simulation time [s].
+        """
+
+    def see(self, n: int, vehicle_states: 'NDArray[np.float64]',  # noqa: B027 - most are blind
+            objects: 'ObjectStates | None') -> None:
+        """
+        Look at the world before the command of cycle n is asked for.
+
+        :param vehicle_states: (V, 8) rear-axle states of humans, then AVs.
+        :param objects: states of everything else where n is a scenario step.
         """
 
     def drives(self, n: int) -> bool:

@@ -132,7 +132,7 @@ class HumanSpec:
 
     :param id: hv0, hv1, …
     :param driver: where its command comes from: auto, cockpit, idle, evdev[:NAME], keys:FILE,
-        joy:FILE, joy, replay:BAG.
+        joy:FILE, joy, policy:FILE.py:load, replay:BAG.
     :param vehicle: name of the vehicle parameters.
     :param spawn: where it starts; None places it beside or behind the first AV, where it can.
     :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
@@ -153,7 +153,7 @@ class AvSpec:
     One autonomous vehicle.
 
     :param id: av0, av1, …
-    :param planner: registered name or `module:Class`.
+    :param planner: registered name, `module:Class`, `file.py:Class` or `policy:FILE.py:load`.
     :param options: keyword arguments of the planner.
     :param planning_problem: id of its planning problem; None takes the next unused one.
     :param vehicle: name of the vehicle parameters.

@@ -44,10 +44,10 @@ examples:
 
 driver sources: cockpit (the run waits for somebody in the browser), auto (wheel, gamepad or
 keyboard, whichever is found), evdev[:NAME], keys:FILE, joy:FILE (scripted), joy (an external joy
-node), replay:BAG (without a game the recording's own), idle. Whoever they are, somebody in the
-browser can take the seat.
+node), replay:BAG (without a game the recording's own), policy:FILE.py:load, idle. Whoever they
+are, somebody in the browser can take the seat.
 planners: idm, idm-package, reactive, reactive-package, constant-velocity, a registered name,
-module:Class or file.py:Class."""
+module:Class, file.py:Class or policy:FILE.py:load."""
 
 
 @dataclass(frozen=True)

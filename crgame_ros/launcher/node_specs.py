@@ -90,7 +90,8 @@ def participant_specs(who: Participants, roster: Path) -> list[NodeSpec]:
         *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av, **code},
                    nice=COMPANION_NICE, restart=True)
           for av, planner in who.avs.items() if planner != EXTERNAL),
-        *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human}, restart=True)
+        *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human, **code},
+                   restart=True)
           for human, driver in who.humans.items()
           if driver != COCKPIT and not is_replay(driver)),
         *(NodeSpec('perception_node', f'perception_node_{av}', {'vehicle': av, **code},

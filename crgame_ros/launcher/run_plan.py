@@ -31,12 +31,14 @@ from crgame_ros.game.game_file import dump_game, load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.paths import check_room, default_game, numbered
 from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
+from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.recording.recorded_game import read_recorded_game
 from crgame_ros.recording.recorded_inputs import (
     recorded_inputs,
     replay_notices,
     with_replayed_events,
 )
+from crgame_ros.registry import POLICY
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.recorded_humans import plays_its_humans
 from crgame_ros.schema.reading import read
@@ -212,6 +214,9 @@ def _check_run(request: RunRequest, setup: Setup) -> None:
                          'leave it out, or name another driver')
     for av in setup.avs:
         _check_planner(av.spec)
+    for human in setup.humans:
+        if human.driver.startswith(POLICY):
+            load_policy(human.driver.removeprefix(POLICY), human.id).check_pedals(human.id)
     _check_swaps(setup)
     if not request.headless:
         check_address(request.listen or '127.0.0.1', request.port)

@@ -17,6 +17,7 @@
 import select
 import threading
 import time
+from typing import TYPE_CHECKING
 
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.source import DriverSource, is_replay, JoyDriver, parse_source
@@ -28,6 +29,7 @@ from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
 from crgame_ros.ros.seats import GAME
 from crgame_ros.ros.spinning import spin
+from crgame_ros.ros.trusted_code import trust_code
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
@@ -35,6 +37,9 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
+
+if TYPE_CHECKING:
+    from crgame_ros.ros.live_policy import PolicyWorld
 
 DEVICE_POLL_S = 0.02
 
@@ -54,10 +59,11 @@ class DriverNode(Node):
             description="id of the human's vehicle", read_only=True)).value
         self._choice: str = declare('source', '', ParameterDescriptor(
             description="driver source instead of the game's: auto, idle, evdev[:NAME], "
-            'keys:FILE, joy:FILE, joy', read_only=True)).value
+            'keys:FILE, joy:FILE, joy, policy:FILE.py:load', read_only=True)).value
         self._joy_map: str = declare('joy_map', 'generic_gamepad', ParameterDescriptor(
             description='device map for the messages of an external joy node',
             read_only=True)).value
+        trust_code(self, self._choice)
         if self._choice:
             parse_source(self._choice)
         if self._choice == 'joy':
@@ -67,6 +73,7 @@ class DriverNode(Node):
         self._raw = endpoints.publisher('/<hv>/joy', self._vehicle_id)
         self._diagnostics = endpoints.diagnostics
         self._lock = threading.Lock()
+        self._world: PolicyWorld | None = None
         self._driver: DriverSource | None = None
         self._game: GameDocument | None = None
         self._cycle = -1
@@ -105,7 +112,7 @@ class DriverNode(Node):
                 driver = live_driver(self._choice or human.driver,
                                      '' if self._choice else human.timeline,
                                      self._vehicle_id, self._joy_map,
-                                     self.get_logger().warning)
+                                     self.get_logger().warning, self._policy_world)
                 self.get_logger().info(
                     f'{self._vehicle_id}: driven by {self._choice or human.driver}')
         except CrgameError as error:
@@ -119,6 +126,13 @@ class DriverNode(Node):
         if isinstance(driver, JoyDriver) and self._joy_subscription is None:
             self._joy_subscription = self._endpoints.subscription(
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
+
+    def _policy_world(self) -> 'PolicyWorld':
+        """Give what a policy looks at; it is subscribed to once, and only where one drives."""
+        if self._world is None:
+            from crgame_ros.ros.live_policy import PolicyWorld
+            self._world = PolicyWorld(self._endpoints)
+        return self._world
 
     def _on_seats(self, message: String) -> None:
         """Fall silent while somebody else has the seat."""
@@ -172,6 +186,7 @@ class DriverNode(Node):
                 descriptor = None if self._driver is None else self._driver.fileno()
             if descriptor is None:
                 time.sleep(DEVICE_POLL_S)
+                self._look()
                 continue
             try:
                 select.select([descriptor], [], [], DEVICE_POLL_S)
@@ -181,6 +196,13 @@ class DriverNode(Node):
             except (OSError, ValueError):
                 # The device went away between two looks; the driver finds it again.
                 time.sleep(DEVICE_POLL_S)
+
+    def _look(self) -> None:
+        """Let a policy see what has come since the last cycle, as before the first one."""
+        with self._lock:
+            if self._driver is not None and self._driver.is_looking \
+                    and self._driver.poll(time.monotonic()):
+                self._publish()
 
     def _tell_of_problem(self) -> None:
         """Tell once of each new trouble with the device, and of its end."""

@@ -21,7 +21,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.planner.interface import Planner
-from crgame_ros.registry import ModelRegistry
+from crgame_ros.registry import ModelRegistry, POLICY
 
 # As a planner's name: a process of the user's own answers (docs/external_planners.md).
 EXTERNAL = 'external'
@@ -38,8 +38,14 @@ class PlannerRegistry(ModelRegistry):
     """The planners of the package, of entry points, and those that users write."""
 
     def __init__(self) -> None:
-        super().__init__('planners', 'planner', BUILT_IN, Planner, 'docs/planners.md')
+        super().__init__('planners', 'planner', {
+            **BUILT_IN, POLICY: 'crgame_ros.policy.policy_planner:PolicyPlanner'},
+            Planner, 'docs/planners.md')
         self._given: dict[str, type[Planner] | Planner] = {}
+
+    def names(self) -> tuple[str, ...]:
+        """List the registered names; a policy is nothing without its file."""
+        return tuple(name for name in super().names() if name != POLICY)
 
     @contextlib.contextmanager
     def giving(self, planners: Mapping[str, type[Planner] | Planner]) -> Iterator[None]:
@@ -65,10 +71,12 @@ class PlannerRegistry(ModelRegistry):
     def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
                **given: Any) -> Any:
         """
-        Make a planner, or take the object that the caller has given.
+        Make a planner, also of `policy:FILE.py:load`; take an object that the caller has given.
 
         :raises InputError: as for any model; if an object, which is made, is given options.
         """
+        if name.startswith(POLICY):
+            options = {**(options or {}), 'policy': name.removeprefix(POLICY)}
         own = self._given.get(name)
         if own is None or inspect.isclass(own):
             return super().create(name, options, where, **given)
@@ -88,7 +96,8 @@ class PlannerRegistry(ModelRegistry):
         if name == EXTERNAL and name not in self.names():
             raise InputError('an external planner answers live runs only', where or 'planner',
                              'start the run with ./run.sh, or name a planner')
-        found = super().find(name, where)
+        # Which file may be run is decided where it is loaded.
+        found = super().find(POLICY if name.startswith(POLICY) else name, where)
         if not isinstance(getattr(found, 'name', None), str):
             raise InputError('has no name', self.label(name, where),
                              'give the class an attribute `name`')

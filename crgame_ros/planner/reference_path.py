@@ -69,7 +69,7 @@ class DrivingPath:
     changes: int = 0
 
 
-def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: VehicleState,
+def plan_driving_path(scenario: Scenario, problem: PlanningProblem | None, start: VehicleState,
                       vehicle: VehicleParameters, follow_lane: bool = False,
                       keep_lane: bool = False) -> DrivingPath:
     """
@@ -80,6 +80,7 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: Vehic
     successors, then straight ahead where the map ends.
 
     :param start: where the vehicle is (rear axle); it need not be on the road.
+    :param problem: None only with `follow_lane`.
     :param follow_lane: ignore the goal and follow the lane.
     :param keep_lane: follow the route up to its first lane change, and then the lane.
     :raises PlanningError: if the scenario has no lanelets or no usable geometry.
@@ -88,7 +89,8 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem, start: Vehic
         raise PlanningError('the scenario has no lanelets to follow')
     roads = RoadNetwork(scenario.lanelet_network)
     lanelet, s = start_lanelet(roads, start.x, start.y, start.yaw)
-    goals = frozenset[int]() if follow_lane else goal_lanelets(roads, problem)
+    goals = frozenset[int]() if follow_lane or problem is None \
+        else goal_lanelets(roads, problem)
     route = find_route(roads, lanelet, s, goals, LENGTH)
     if keep_lane:
         route = in_lane(roads, route, LENGTH)

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.evdev_device import open_evdev
@@ -31,9 +32,12 @@ from crgame_ros.driver.source import (
 )
 from crgame_ros.errors import InputError
 
+if TYPE_CHECKING:
+    from crgame_ros.ros.live_policy import PolicyWorld
+
 
 def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
-                say: Callable[[str], object]) -> DriverSource:
+                say: Callable[[str], object], world: 'Callable[[], PolicyWorld]') -> DriverSource:
     """
     Make a driver.
 
@@ -42,6 +46,7 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
     :param vehicle_id: for messages.
     :param joy_map: device map for an external joy node.
     :param say: tells the user something in one line.
+    :param world: gives what a policy looks at.
     :raises InputError: if the source names nothing that can be used, or is a recording: what comes
         as messages arrives when it can, while recorded commands belong to their cycles.
     """
@@ -53,6 +58,10 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
     if source.kind == 'replay':
         raise InputError('a recording is repeated by the simulation itself', vehicle_id,
                          f'name it as the driver in the game: {text}')
+    if source.kind == 'policy':
+        # Others should not wait for what it needs.
+        from crgame_ros.ros.live_policy import LivePolicyDriver
+        return LivePolicyDriver(source.argument, vehicle_id, world())
     if source.kind == 'joy':
         return JoyDriver(load_device_map(joy_map))
     if source.kind in ('idle', COCKPIT):

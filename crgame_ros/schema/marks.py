@@ -20,6 +20,8 @@ from pathlib import Path
 import re
 from typing import Any
 
+from crgame_ros.registry import POLICY
+
 # Without comparison and representation, which nobody needs, a mark costs half as much to import.
 
 
@@ -196,8 +198,10 @@ class Named:
 
 
 def named_file(name: str, base: Path) -> str:
-    """Resolve `FILE.yaml` and `FILE.py:Class` against a directory; other names stay."""
+    """Resolve `FILE.yaml` and `[policy:]FILE.py:Class` against a directory; other names stay."""
+    kind = POLICY if name.startswith(POLICY) else ''
+    name = name.removeprefix(POLICY)
     file, colon, attribute = name.rpartition(':')
     if not (name.endswith('.yaml') or file.endswith('.py')):
-        return name
-    return str(base / (file or name)) + colon + (attribute if file else '')
+        return kind + name
+    return kind + str(base / (file or name)) + colon + (attribute if file else '')

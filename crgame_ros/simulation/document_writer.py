@@ -24,6 +24,7 @@ from crgame_ros.game.game_file import dump_game
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.steering import table_text
 
 # How an AV executes its plans and perceives the world.
 _EXECUTION = ('tracker', 'dynamics', 'perception')
@@ -71,6 +72,10 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
 
 
 def _vehicle_entry(vehicle: VehicleParameters) -> dict[str, Any]:
-    """Write a vehicle; JSON has no infinity, so a limit that is none becomes null."""
-    values = asdict(vehicle) | {'steering_ratio': ''}
+    """
+    Write a vehicle; JSON has no infinity, so a limit that is none becomes null.
+
+    The steering ratio's table is written out: who reads this has not its file.
+    """
+    values = asdict(vehicle) | {'steering_ratio': table_text(vehicle.steering_ratio)}
     return {key: None if value == math.inf else value for key, value in values.items()}

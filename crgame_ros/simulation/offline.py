@@ -192,7 +192,8 @@ def run_offline(
     simulation = Simulation(setup, traces=traces)
     steps = simulation.scheduler.steps_for(_duration(setup, duration_s))
     drivers = drivers or {}
-    hands = [drivers.get(human.id) or offline_driver(human) for human in setup.humans]
+    hands = [drivers.get(human.id) or offline_driver(setup, index)
+             for index, human in enumerate(setup.humans)]
     takers = [drivers.get(av.id) for av in setup.avs]
     seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s)
              for index in range(len(setup.avs))]
@@ -205,13 +206,14 @@ def run_offline(
     perceive_every = steps_between_messages(setup.game.timing.rate)
     for _ in range(steps):
         if perceiving and simulation.n % perceive_every == 0:
-            _perceive(simulation, perceiving)
+            perceive(simulation, perceiving)
         for seat in seats:
             seat.proceed(result)
         trace.add(simulation, result, effective_s)
         if trace.stop is not None:
             break
         n = simulation.n
+        show(simulation, result, hands)
         commands = [
             *(hand.command(n, dt_s) for hand in hands),
             *(taker.command(n, dt_s) if taker is not None and taker.drives(n) else None
@@ -233,12 +235,21 @@ def observed_run(setup: Setup) -> ObservedRun:
         (*[None] * len(setup.humans), *(av.planning_problem for av in setup.avs)))
 
 
-def _perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
+def perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
     """Let every perception see what is published of the present state."""
     states, objects = published_states(simulation.states), simulation.objects
     since_tick_s = simulation.scheduler.since_tick_s(simulation.n)
     for perception in perceiving:
         perception.observe(simulation.n, states, objects.poses, objects.velocities, since_tick_s)
+
+
+def show(simulation: Simulation, result: StepResult, hands: Sequence[DriverSource]) -> None:
+    """Let drivers look at the present state, and at everything else in it at a tick."""
+    looking = [hand for hand in hands if type(hand).see is not DriverSource.see]
+    if looking:
+        states = np.reshape(simulation.states, (-1, STATE_WIDTH))
+        for hand in looking:
+            hand.see(simulation.n, states, result.objects)
 
 
 def _trigger(simulation: Simulation, triggers: Sequence[tuple[int, str]], n: int) -> None:

@@ -18,6 +18,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from commonroad.planning.planning_problem import PlanningProblem
@@ -29,6 +30,7 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.registry import POLICY
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.export_check import refuse_unwritable
 from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedScenario
@@ -229,7 +231,8 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
         source = parse_source(spec.driver)
         timeline = timeline_text(load_timeline(source, game.base)) \
             if source.has_timeline else ''
-        humans.append(HumanSetup(spec.id, parameters, state, spec.driver, timeline,
+        humans.append(HumanSetup(spec.id, parameters, state,
+                                 _from_anywhere(spec.driver, game.base), timeline,
                                  spec.dynamics))
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
     setup = Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler,
@@ -246,6 +249,13 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     refuse_unwritable(loaded, setup.obstacles.descriptions,
                       [av.planning_problem.planning_problem_id for av in avs])
     return setup
+
+
+def _from_anywhere(driver: str, base: Path) -> str:
+    """Give a policy's file so that it is found from any folder; other drivers stay."""
+    if not driver.startswith(POLICY):
+        return driver
+    return POLICY + str((base / Path(driver.removeprefix(POLICY)).expanduser()).resolve())
 
 
 def _scripted(game: Game, network: RoadNetwork,

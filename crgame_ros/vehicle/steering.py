@@ -17,13 +17,15 @@
 from bisect import bisect_right
 from dataclasses import dataclass
 import functools
+import json
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Called, Within
 from crgame_ros.schema.reading import read
+from crgame_ros.schema.writing import write
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.yaml_text import read_yaml
 
@@ -66,9 +68,14 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
     """
     Read a ratio table.
 
+    :param path: of its file; or the table itself, as `table_text` gives it.
     :raises InputError: if the file is missing or is no ascending grid of positive ratios.
     """
-    table = read(SteeringRatioTable, read_yaml(Path(path), 'table of steering ratios'), path)
+    if path.startswith('{'):
+        values, path = _from_text(path), 'table of steering ratios'
+    else:
+        values = read_yaml(Path(path), 'table of steering ratios')
+    table = read(SteeringRatioTable, values, path)
     for name, grid in (('speed', table.speeds), ('steering_wheel_angle', table.wheel_angles)):
         if len(grid) < 2 or any(not b > a for a, b in zip(grid, grid[1:], strict=False)):
             raise InputError(f'"{name}" does not ascend', path, 'give at least two grid points')
@@ -77,6 +84,18 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
         raise InputError('"ratio" does not fit the grid', path,
                          'give one row for each speed, one column for each angle')
     return table
+
+
+def table_text(path: str) -> str:
+    """Give the text of a ratio table, for who has not its file."""
+    return json.dumps(write(load_steering_ratio(path)))
+
+
+def _from_text(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError('is no JSON', 'table of steering ratios', 'send it whole') from error
 
 
 class Steering:

@@ -57,7 +57,7 @@ def drive(game: str, planner: str, spec: PerceptionSpec, steps: int) -> Drive:
         replace(av, spec=replace(av.spec, planner=planner, options={})) for av in setup.avs))
     simulation, av = Simulation(setup), setup.avs[0]
     seat = PlannerSeat(setup, 0, simulation, 0, None)
-    hands = [offline_driver(human) for human in setup.humans]
+    hands = [offline_driver(setup, index) for index in range(len(setup.humans))]
     dt_s, per_tick = setup.scheduler.dt_s, setup.scheduler.steps_per_tick
     perception = Perception(av.id, spec, setup.descriptions, av.vehicle, av.transform, av.state,
                             3, dt_s)

@@ -32,6 +32,7 @@ from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.steering import load_steering_ratio, table_text
 import pytest
 import simulation_support as support
 
@@ -58,7 +59,11 @@ def test_game_round_trip(game: Setup, text: str) -> None:
     assert [item.id for item in document.vehicles] == ['hv0', 'av0', 'av1']
     for setup, item in zip(game.vehicles, document.vehicles, strict=True):
         assert item.state == setup.state
-        assert item.vehicle == replace(setup.vehicle, steering_ratio='')
+        assert item.vehicle == replace(
+            setup.vehicle, steering_ratio=table_text(setup.vehicle.steering_ratio))
+        # Who drives by pedals in another process needs the table itself.
+        assert load_steering_ratio(item.vehicle.steering_ratio) == load_steering_ratio(
+            setup.vehicle.steering_ratio)
     for av, item in zip(game.avs, document.avs, strict=True):
         assert (item.planner, dict(item.options), item.transform, item.perception) == (
             av.spec.planner, av.spec.options, av.transform, av.spec.perception)

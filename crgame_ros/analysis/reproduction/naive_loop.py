@@ -46,7 +46,7 @@ class NaiveLoop:
         self._simulation = Simulation(setup)
         self._seats = [PlannerSeat(setup, index, self._simulation, 0, time.perf_counter)
                        for index in range(len(setup.avs))]
-        self._drivers = [offline_driver(human) for human in setup.humans]
+        self._drivers = [offline_driver(setup, index) for index in range(len(setup.humans))]
         self._dt_s = setup.scheduler.dt_s
         spec: TimingSpec = replace(
             setup.game.timing, pacing=False, frame_skipping=False, drift_reset=False,

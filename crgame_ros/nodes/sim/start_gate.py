@@ -114,7 +114,8 @@ class StartGate:
                                 in self._unrecorded.items() if topic in missing}
         if now_ns - self._asked_ns > ASK_AGAIN_NS:
             self._asked_ns = now_ns
-            if self._traffic_answers is not None:
+            if self._traffic_answers is not None or self._seats:
+                # Agents and policies answer what they have seen.
                 self._outputs.resend_world(self._simulation)
             for av_id in self._planners | (self._result.requests.keys() & self._unrecorded):
                 self._outputs.resend(av_id, self._result)

@@ -1,0 +1,187 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A game as its agents live it: what they see, what they are rewarded for, when it is over."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import Game
+from crgame_ros.gym.driving_game import AgentSeat, DrivingGame
+from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
+from crgame_ros.gym.game_choice import chosen_game
+from crgame_ros.gym.goal_watch import GoalWatch
+from crgame_ros.gym.reward import Decision, Reward, USUAL_REWARD
+from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
+from crgame_ros.policy.observation import Observation, Observed
+from crgame_ros.policy.observation_spec import ObservationSpec
+from crgame_ros.schema.reading import read
+from crgame_ros.simulation.offline import DEFAULT_DURATION_S, observed_run
+from crgame_ros.simulation.setup import AvSetup
+import numpy as np
+from numpy.typing import NDArray
+
+ENDS = ('collision', 'off_road', 'goal')
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """
+    What all episodes of an environment have in common; see `docs/gym.md`.
+
+    :param setups: of the episodes.
+    :param seats: that agents take.
+    :param action: what their actions mean.
+    :param observation: what they are told.
+    :param reward: for what they are rewarded.
+    :param ends: which events terminate an episode.
+    :param ticks: scenario steps for which an action holds.
+    :param duration_s: simulated time after which an episode is truncated [s]
+    """
+
+    setups: EpisodeSetups
+    seats: tuple[str, ...]
+    action: ActionKind
+    observation: ObservationSpec
+    reward: Reward
+    ends: tuple[str, ...]
+    ticks: int
+    duration_s: float
+
+
+def make_experiment(
+    seats: Sequence[str], game: Game | Path | str | None = None,
+    scenario: Path | str | None = None, action: ActionKind = 'acceleration',
+    observation: Mapping[str, Any] | None = None, reward: Mapping[str, float] | None = None,
+    ends: Sequence[str] = ENDS, duration: float | None = None, ticks: int = 1,
+    drivers: Mapping[str, str] | None = None, planners: Mapping[str, str] | None = None,
+    vary: Mapping[str, float] | None = None, worlds: int | None = None,
+) -> Experiment:
+    """
+    Check the keywords of an environment.
+
+    :param seats: ids of the vehicles that agents drive.
+    :param vary: keys of `StartVariation`.
+    :param worlds: as for `EpisodeSetups`.
+    :raises InputError: if one is wrong, or the game cannot be used.
+    """
+    if action not in ACTION_KINDS:
+        raise InputError(f'"action" is {action!r}', 'environment',
+                         'use one of ' + ', '.join(ACTION_KINDS))
+    for end in ends:
+        if end not in ENDS:
+            raise InputError(f'there is no end "{end}"', 'environment', 'use ' + ', '.join(ENDS))
+    chosen = chosen_game(game, scenario, seats, drivers or {}, planners or {}, duration)
+    setups = EpisodeSetups(chosen, read(StartVariation, dict(vary or {}), 'vary'), worlds)
+    return Experiment(
+        setups, tuple(seats), action,
+        read(ObservationSpec, dict(observation or {}), 'observation'),
+        Reward(USUAL_REWARD if reward is None else reward), tuple(ends), ticks,
+        DEFAULT_DURATION_S if math.isinf(chosen.duration) else chosen.duration)
+
+
+class AgentOutcome(NamedTuple):
+    """
+    What an agent is told of a decision besides what it sees.
+
+    :param terminated: whether the episode is over by what has happened.
+    :param truncated: whether it is over because its time is.
+    """
+
+    reward: float
+    terminated: bool
+    truncated: bool
+    info: dict[str, Any]
+
+
+class AgentGame:
+    """
+    One game and its agents.
+
+    :param experiment: what its episodes have in common.
+    :ivar game: moves everybody.
+    """
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.experiment = experiment
+        self.game = DrivingGame(experiment.setups, experiment.seats, experiment.action,
+                                experiment.ticks)
+        self._observations = [
+            Observation(experiment.observation, seat.vehicle.vehicle, seat.view.things)
+            for seat in self.game.seats]
+        self._goals = {seat.id: GoalWatch(
+            seat.vehicle.planning_problem if isinstance(seat.vehicle, AvSetup) else None,
+            seat.vehicle.vehicle.rear_to_center) for seat in self.game.seats}
+        self._criticality: Criticality | None = None
+
+    @property
+    def seats(self) -> list[AgentSeat]:
+        """Give the agents' seats."""
+        return self.game.seats
+
+    def begin(self, seed: int) -> None:
+        """Begin an episode."""
+        if self.experiment.reward.is_measured:
+            self._criticality = Criticality(observed_run(self.game.setup))
+        self.game.begin(seed, [] if self._criticality is None else [self._criticality])
+
+    def act(self, actions: Mapping[str, Any]) -> None:
+        """Move on to the next decision (`DrivingGame.act`)."""
+        self.game.act(actions)
+
+    def observed(self, number: int) -> Observed:
+        """Give what an agent sees, by part."""
+        seen = observe_together(self._observations[number], [self.seats[number]])
+        return {part: values[0] for part, values in seen.items()}
+
+    def outcomes(self) -> list[AgentOutcome]:
+        """Judge the last decision of each agent."""
+        return [self._outcome(seat, off) for seat, off in zip(
+            self.seats, self.game.off_road(), strict=True)]
+
+    def info(self) -> dict[str, Any]:
+        """Tell of the episode's beginning."""
+        return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed}
+
+    def _outcome(self, seat: AgentSeat, off_road: bool) -> AgentOutcome:
+        game, experiment = self.game, self.experiment
+        scheduler = game.simulation.scheduler
+        measures = None if self._criticality is None else next(
+            tick for tick in self._criticality.latest if tick.subject == seat.row)
+        goal = self._goals[seat.id].is_met(
+            seat.state, scheduler.k(game.simulation.n))
+        collision = bool(seat.hit)
+        reward, terms = experiment.reward.of(Decision(
+            experiment.ticks * scheduler.time_step_s, seat.before[0], seat.state, seat.place,
+            collision, off_road, goal, measures))
+        happened = {'collision': collision, 'off_road': off_road, 'goal': goal}
+        terminated = any(happened[end] for end in experiment.ends)
+        time_s = game.time_s
+        info = {'time_s': time_s, **happened, 'hit': ','.join(seat.hit), 'terms': terms}
+        if seat.refusal is not None:
+            info['refusal'] = seat.refusal
+        return AgentOutcome(reward, terminated, time_s >= experiment.duration_s - 1e-9, info)
+
+
+def observe_together(observation: Observation, seats: Sequence[AgentSeat]) -> Observed:
+    """Give what the agents of several games see, (B, …) by part."""
+    poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
+    velocities = np.stack([seat.around.velocities for seat in seats])
+    return observation.of([seat.state for seat in seats], [seat.place for seat in seats],
+                          [seat.guide for seat in seats], poses, velocities)

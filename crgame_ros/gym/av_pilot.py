@@ -1,0 +1,96 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""An AV that an agent plans for, in the place of its planner."""
+
+from crgame_ros.messages.joints import plan_to_joints
+from crgame_ros.messages.plan import Plan
+from crgame_ros.perception.perception import Perception
+from crgame_ros.planner.request_reader import RequestReader
+from crgame_ros.policy.seat_view import RequestView, SeatView, Surrounded
+from crgame_ros.simulation.av_models import make_perception, published_states
+from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+
+class AvPilot:
+    """
+    Tells an agent of the world, and hands its plans to the engine without a latency.
+
+    An AV that perceives the world truly is asked for nothing: a request with predictions, which
+    no observation has, would cost more than the rest of the step. One with perception is told
+    what its planner would be.
+
+    :param setup: of the run.
+    :param index: of the AV.
+    :param simulation: of the run.
+    :param view: of the true world.
+    """
+
+    def __init__(self, setup: Setup, index: int, simulation: Simulation, view: SeatView) -> None:
+        av = setup.avs[index]
+        self.id = av.id
+        self._simulation, self._av, self._view = simulation, simulation.avs[index], view
+        self.perception: Perception | None = None
+        self.around: Surrounded
+        self._stamp_ns = 0
+        if av.spec.perception is None:
+            self._av.planner_running = False
+            return
+        objects = {item.id: item for item in setup.descriptions}
+        self._reader = RequestReader(av.id, objects, simulation.scheduler)
+        self._request_view = RequestView(av.id, objects)
+        initial = published_states([av.state])[0]
+        self.perception = make_perception(
+            av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
+            VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
+            setup.open_occupancy())
+
+    def look(self, result: StepResult, states: NDArray[np.float64]) -> Surrounded:
+        """
+        Give what the agent is told of at a tick.
+
+        :param states: (V, 8) of all driven vehicles, rear axle, simulation coordinates
+        """
+        simulation = self._simulation
+        if self.perception is None:
+            self._stamp_ns = simulation.scheduler.stamp_ns(simulation.n)
+            self.around = self._view.of(states, simulation.objects)
+        elif self.id in result.requests:
+            request = self.perception.perceive(result.requests[self.id])
+            simulation.request_perceived(self.id, request)
+            self._stamp_ns = request.stamp_ns
+            self.around = self._request_view.of(self._reader.read(request))
+        return self.around
+
+    def offer(self, states: NDArray[np.float64]) -> str | None:
+        """
+        Let the AV follow a plan.
+
+        :param states: (S, 8) from what `look` has told on.
+        :return: why the engine refuses it, or None.
+        """
+        simulation = self._simulation
+        if self.perception is None:
+            self._av.request_sent(simulation.n, self._stamp_ns, self.around.state)
+        return simulation.offer_plan(self.id, plan_to_joints(
+            Plan(self._stamp_ns, states), self.id, simulation.scheduler.time_step_ns))
+
+
+def stacked(states: list[VehicleState]) -> NDArray[np.float64]:
+    """Give the states (V, 8) of driven vehicles as an array."""
+    return np.array(states, dtype=np.float64).reshape(-1, STATE_WIDTH)

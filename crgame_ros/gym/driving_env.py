@@ -1,0 +1,133 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A game for one agent: Gymnasium's environment."""
+
+from typing import Any, ClassVar, TYPE_CHECKING
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.gym.agent_game import AgentGame, make_experiment
+from crgame_ros.gym.agent_spaces import action_space, observation_space
+from crgame_ros.gym.episode_setups import SEEDS
+from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
+import gymnasium
+from gymnasium import spaces
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from crgame_ros.gym.page_viewer import PageViewer
+
+Seen = dict[str, NDArray[np.float32]]
+
+
+class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
+    """
+    One vehicle of a game, driven by an agent; everybody else drives as in an offline run.
+
+    :param seat: id of the agent's vehicle: a human's (hv0, …) or an AV (av0, …).
+    :param render_mode: `rgb_array` paints a picture, `human` shows the cockpit's page.
+    :param keywords: of `make_experiment`: game or scenario, action, observation, reward, ends,
+        duration, ticks, drivers, planners, vary, worlds.
+    :raises InputError: if one of them is wrong.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        'render_modes': ['human', 'rgb_array'], 'render_fps': FRAMES_PER_S}
+
+    def __init__(self, seat: str = 'av0', render_mode: str | None = None,
+                 **keywords: Any) -> None:
+        check_render_mode(render_mode, self.metadata['render_modes'])
+        self.experiment = make_experiment((seat,), **keywords)
+        self.render_mode = render_mode
+        self.agent = AgentGame(self.experiment)
+        self.observation_space: spaces.Dict = observation_space(  # type: ignore[assignment]
+            self.experiment.observation)
+        self.action_space: spaces.Box = action_space(  # type: ignore[assignment]
+            self.experiment.action)
+        self._painter: ScenePainter | None = None
+        self._viewer: PageViewer | None = None
+        self._begun = False
+
+    def reset(self, *, seed: int | None = None,
+              options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+        """
+        Begin an episode; with equal seeds, and then equal actions, it is the same.
+
+        :param options: none are known.
+        """
+        super().reset(seed=seed)
+        self.agent.begin(int(self.np_random.integers(SEEDS)))
+        self._begun = True
+        if self.render_mode == 'human':
+            self._show(begin=True)
+        return self.agent.observed(0), self.agent.info()
+
+    def step(self, action: NDArray[np.float32]
+             ) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+        """
+        Drive until the next decision.
+
+        :raises PlanningError: if the action is none.
+        """
+        self._need_begun()
+        self.agent.act({self.agent.seats[0].id: action})
+        outcome = self.agent.outcomes()[0]
+        if self.render_mode == 'human':
+            self._show()
+        return (self.agent.observed(0), outcome.reward, outcome.terminated, outcome.truncated,
+                outcome.info)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Give a picture (H, W, 3) in the mode `rgb_array`; the page shows itself."""
+        self._need_begun()
+        if self.render_mode != 'rgb_array':
+            return None
+        if self._painter is None:
+            self._painter = ScenePainter(self.agent.game.setup)
+        return self._painter.paint(self.agent.game)
+
+    def close(self) -> None:
+        """End the page, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
+
+    @property
+    def page(self) -> str | None:
+        """Give the address of the page; None before the first reset and in other modes."""
+        return None if self._viewer is None else self._viewer.url
+
+    def _show(self, begin: bool = False) -> None:
+        if self._viewer is None:
+            # Its server needs aiohttp and a thread: for those only who look.
+            from crgame_ros.gym.page_viewer import PageViewer
+            self._viewer = PageViewer()
+        if begin:
+            self._viewer.begin(self.agent.game)
+        self._viewer.show(self.agent.game)
+
+    def _need_begun(self) -> None:
+        if not self._begun:
+            raise CrgameError('the environment has not begun: call reset first')
+
+
+def check_render_mode(mode: str | None, modes: list[str]) -> None:
+    """
+    Refuse an unknown way to render.
+
+    :raises InputError: naming those that there are.
+    """
+    if mode is not None and mode not in modes:
+        raise InputError(f'"render_mode" is {mode!r}', 'environment', 'use ' + ', '.join(modes))

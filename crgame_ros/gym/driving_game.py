@@ -1,0 +1,288 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One game whose seats agents take, moved from decision to decision without a clock."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from crgame_ros.drivability.monitor import road_transforms
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.gym.av_pilot import AvPilot, stacked
+from crgame_ros.gym.contact_search import ContactSearch
+from crgame_ros.gym.episode_setups import EpisodeSetups
+from crgame_ros.planner.road_limit import TOLERANCE
+from crgame_ros.policy.actions import (
+    ActionKind,
+    checked_action,
+    pedals,
+    planned_states,
+    wanted_motion,
+)
+from crgame_ros.policy.pedal_inverse import PedalInverse
+from crgame_ros.policy.route_guide import RouteGuide, RoutePlace
+from crgame_ros.policy.seat_view import SeatView, Surrounded
+from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.observer import RunObserver
+from crgame_ros.simulation.offline import perceive, PlannerSeat, show
+from crgame_ros.simulation.offline_driver import offline_driver
+from crgame_ros.simulation.setup import AvSetup, HumanSetup
+from crgame_ros.timing.publishing import steps_between_messages
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class AgentSeat:
+    """
+    A seat that an agent has.
+
+    :param id: of the vehicle.
+    :param row: of it among the driven ones.
+    :param vehicle: as it is set up.
+    :param view: of the world from it.
+    :param guide: of its route.
+    :param inverse: of its pedals.
+    :param pilot: of an AV; None in a human's seat.
+    :param around: what the agent is told of, at the last decision.
+    :param place: on the route, then.
+    :param before: its state at the decision before, and where it then was.
+    :param action: in force.
+    :param centers: (T, 3) of its footprint on the road at the steps since the last decision
+    :param hit: ids of whom it has touched since then.
+    :param refusal: why the engine has refused its plan; None if it has not.
+    :param overhang: how far it began off the road, while it has not been on it [m]
+    """
+
+    id: str  # noqa: A003
+    row: int
+    vehicle: HumanSetup | AvSetup
+    view: SeatView
+    guide: RouteGuide
+    inverse: PedalInverse
+    pilot: AvPilot | None = None
+    around: Surrounded = field(init=False)
+    place: RoutePlace = field(init=False)
+    before: tuple[VehicleState, RoutePlace] = field(init=False)
+    action: Array = field(init=False)
+    centers: Array = field(init=False)
+    hit: tuple[str, ...] = ()
+    refusal: str | None = None
+    overhang: float = 0.0
+
+    @property
+    def state(self) -> VehicleState:
+        """Give its present state, rear axle, coordinates of the road."""
+        return self.around.state
+
+
+class DrivingGame:
+    """
+    A game in which agents have some seats; everybody else drives as in an offline run.
+
+    :param setups: of its episodes.
+    :param seats: ids of the agents' vehicles.
+    :param action: what their actions mean.
+    :param ticks: scenario steps for which an action holds.
+    :raises InputError: if there is no such seat, or it cannot take such actions.
+    """
+
+    def __init__(self, setups: EpisodeSetups, seats: Sequence[str], action: ActionKind,
+                 ticks: int) -> None:
+        setup = setups.base
+        self._setups, self._action, self._ticks = setups, action, ticks
+        ids, driven = setup.vehicle_ids, setup.vehicle_descriptions
+        transforms = road_transforms(len(setup.humans), [av.transform for av in setup.avs])
+        self._transforms = transforms
+        self._to_center = np.array([item.rear_to_center for item in driven])
+        if not ticks >= 1 or (action == 'plan' and ticks > 1):
+            raise InputError(f'"ticks" is {ticks}', 'environment',
+                             'give 1 for plans, else a number from 1')
+        self.seats: list[AgentSeat] = []
+        for name in seats:
+            if name not in ids:
+                raise InputError(f'there is no seat "{name}"', setup.loaded.source,
+                                 'take one of ' + ', '.join(ids) if ids else
+                                 'add a human or an AV to the game')
+            row = ids.index(name)
+            if row < len(setup.humans) and action == 'plan':
+                raise InputError('a human drives by pedals, not by plans', name,
+                                 'choose the action acceleration or pedals, or an AV')
+            vehicle = setup.vehicles[row]
+            view = SeatView(row, driven, setup.obstacles.descriptions, transforms[row])
+            problem = vehicle.planning_problem if isinstance(vehicle, AvSetup) else None
+            start = view.own(stacked([item.state for item in setup.vehicles]))
+            self.seats.append(AgentSeat(
+                name, row, vehicle, view,
+                RouteGuide(setup.loaded.scenario, problem, start, vehicle.vehicle),
+                PedalInverse(vehicle.vehicle)))
+        self._observers: Sequence[RunObserver] = ()
+        self.setup = setup
+        self.road: RoadBoundary | None = None
+        if setup.game.drivability.road and setup.network.lanelet_ids:
+            self.road = setup.road
+            self.road.prepare([seat.view.own(stacked([item.state for item in setup.vehicles]))[:2]
+                               for seat in self.seats])
+
+    @property
+    def objects(self) -> ObjectStates:
+        """States of everything that is no driven vehicle, now."""
+        return self.simulation.objects
+
+    @property
+    def time_s(self) -> float:
+        """Time of the simulation since the start [s]."""
+        return self.simulation.n * self.simulation.scheduler.dt_s
+
+    def begin(self, seed: int, observers: Sequence[RunObserver] = ()) -> None:
+        """
+        Begin an episode.
+
+        :param observers: look on at its ticks.
+        """
+        self.setup = setup = self._setups.make(seed, {item.id: item.guide for item in self.seats})
+        self.simulation = Simulation(setup)
+        self._observers = observers
+        agents = {item.row for item in self.seats}
+        humans = len(setup.humans)
+        self._hands: dict[int, DriverSource] = {
+            row: offline_driver(setup, row) for row in range(humans) if row not in agents}
+        self._planners = [PlannerSeat(setup, index, self.simulation, 0, None)
+                          for index in range(len(setup.avs)) if humans + index not in agents]
+        self._search = ContactSearch(setup) if setup.game.drivability.collision else None
+        self._perceive_every = steps_between_messages(setup.game.timing.rate)
+        for seat in self.seats:
+            seat.vehicle = setup.vehicles[seat.row]
+            seat.pilot = None if seat.row < humans else AvPilot(
+                setup, seat.row - humans, self.simulation, seat.view)
+            seat.hit, seat.refusal = (), None
+        perceptions = [planner.perception for planner in self._planners] + [
+            seat.pilot.perception for seat in self.seats if seat.pilot]
+        self._perceiving = [item for item in perceptions if item is not None]
+        if self._perceiving:
+            perceive(self.simulation, self._perceiving)
+        states = stacked(self.simulation.states)
+        for seat in self.seats:
+            seat.guide.restart(seat.view.own(states))
+        self._proceed(self.simulation.begin(), states)
+        for seat in self.seats:
+            seat.place = seat.guide.follow(seat.state)
+            seat.before = seat.state, seat.place
+            if self.road is not None:
+                state, vehicle = seat.view.own(states), seat.vehicle.vehicle
+                seat.overhang = self.road.overhang(
+                    *state.center(vehicle.rear_to_center), state.yaw, vehicle.shape)
+
+    def act(self, actions: Mapping[str, Array]) -> None:
+        """
+        Move on to the next decision.
+
+        :param actions: of every agent, by seat.
+        :raises PlanningError: if an action is none.
+        """
+        for seat in self.seats:
+            seat.action = checked_action(self._action, actions[seat.id])
+            seat.before = seat.state, seat.place
+            seat.hit, seat.refusal = (), None
+        ways = [self._tick() for _ in range(self._ticks)]
+        for seat in self.seats:
+            poses = np.concatenate([way[:, seat.row] for way in ways])
+            transform = self._transforms[seat.row]
+            seat.centers = poses if transform.is_identity else transform.to_scenario(poses)
+            seat.place = seat.guide.follow(seat.state)
+
+    def off_road(self) -> list[bool]:
+        """
+        Tell of each seat whether its vehicle was off the road since the last decision.
+
+        One that began off the road leaves it when it comes further off, until it was on it.
+        """
+        return [self.road is not None and self._is_off(self.road, seat) for seat in self.seats]
+
+    def _is_off(self, road: RoadBoundary, seat: AgentSeat) -> bool:
+        shape, centers = seat.vehicle.vehicle.shape, seat.centers.tolist()
+        off = [road.is_off_road(x, y, yaw, shape) for x, y, yaw in centers]
+        if seat.overhang and not all(off):
+            seat.overhang, off = 0.0, off[off.index(False):]
+        if seat.overhang:
+            x, y, yaw = centers[-1]
+            return road.overhang(x, y, yaw, shape) > seat.overhang + TOLERANCE
+        return any(off)
+
+    def _tick(self) -> Array:
+        """Drive one scenario step; give the vehicles' centres (T, V, 3) at its steps."""
+        simulation, scheduler = self.simulation, self.simulation.scheduler
+        self._plan()
+        before, dt_s = simulation.objects, scheduler.dt_s
+        trace, since_s = [], []
+        for _ in range(scheduler.steps_per_tick):
+            result = simulation.step(dt_s, self._commands(dt_s))
+            trace.append(simulation.states)
+            since_s.append(scheduler.since_tick_s(simulation.n))
+            if self._perceiving and simulation.n % self._perceive_every == 0:
+                perceive(simulation, self._perceiving)
+            if not result.tick:
+                show(simulation, result, list(self._hands.values()))
+        states = np.array(trace, dtype=np.float64)
+        self._proceed(result, states[-1])
+        centers = shifted(states[..., :3], self._to_center)
+        if self._search is not None:
+            for seat in self.seats:
+                found = self._search.hits(seat.row, centers, since_s, before, simulation.objects)
+                seat.hit = tuple(sorted({*seat.hit, *found})) if found else seat.hit
+        return centers
+
+    def _proceed(self, result: StepResult, states: Array) -> None:
+        """Let everybody look at a tick, planners plan, and observers observe."""
+        for planner in self._planners:
+            planner.proceed(result)
+        show(self.simulation, result, list(self._hands.values()))
+        for seat in self.seats:
+            seat.around = seat.pilot.look(result, states) if seat.pilot else seat.view.of(
+                states, self.simulation.objects)
+        for observer in self._observers:
+            observer.observe(result.n, 0.0, states, result.objects)
+
+    def _plan(self) -> None:
+        """Plan for the AVs; of one that is driven by pedals, only where requests wait for it."""
+        scheduler = self.simulation.scheduler
+        for seat in self.seats:
+            if seat.pilot is not None and (
+                    self._action != 'pedals' or seat.pilot.perception is not None):
+                refusal = seat.pilot.offer(planned_states(
+                    self._action, seat.action, seat.state, seat.vehicle.vehicle,
+                    scheduler.time_step_s, scheduler.steps_per_tick))
+                seat.refusal = seat.refusal or refusal
+
+    def _commands(self, dt_s: float) -> list[DriverCommand | None]:
+        simulation = self.simulation
+        commands: list[DriverCommand | None] = [None] * len(self.setup.vehicles)
+        for row, hand in self._hands.items():
+            commands[row] = hand.command(simulation.n, dt_s)
+        for seat in self.seats:
+            if self._action == 'pedals':
+                commands[seat.row] = pedals(seat.action)
+            elif seat.pilot is None:
+                commands[seat.row] = seat.inverse.command(
+                    wanted_motion(seat.action, seat.before[0].speed, seat.vehicle.vehicle),
+                    simulation.humans[seat.row].state.speed)
+        return commands

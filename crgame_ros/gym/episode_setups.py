@@ -1,0 +1,126 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The setups of a game's episodes: what a seed changes, and what agents let vary."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, TypeVar
+
+from crgame_ros.drivability.monitor import road_transforms
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import Game
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.policy.route_guide import RouteGuide
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Within
+from crgame_ros.simulation.setup import AvSetup, build_setup, HumanSetup, Setup
+from crgame_ros.simulation.traffic_setup import TrafficSetup
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+
+Vehicle = TypeVar('Vehicle', HumanSetup, AvSetup)
+# Seeds of games drawn by an environment are below this.
+SEEDS = 2**31
+
+
+@dataclass(frozen=True)
+class StartVariation:
+    """
+    How far the start of the agents' vehicles varies, evenly to both sides.
+
+    :param speed: [m/s]; nobody starts backwards
+    :param along: the route [m]
+    """
+
+    FORM: ClassVar[Form] = Form('see docs/gym.md for the keys')
+
+    speed: Annotated[float, Within(0.0, 50.0)] = 0.0
+    along: Annotated[float, Within(0.0, 100.0)] = 0.0
+
+
+class EpisodeSetups:
+    """
+    Makes the setup of each episode from its seed.
+
+    :param game: of all episodes.
+    :param vary: the start of the vehicles.
+    :param worlds: placements of traffic that the seeds share; None makes one for each seed, which
+        costs 0.1 s and more.
+    """
+
+    def __init__(self, game: Game, vary: StartVariation, worlds: int | None = None) -> None:
+        if worlds is not None and not worlds >= 1:
+            raise InputError(f'"worlds" is {worlds}', 'environment', 'give a number from 1')
+        self.base = build_setup(game)
+        self._vary, self._worlds = vary, worlds
+        self._placed: dict[int, Setup] = {}
+
+    def make(self, seed: int, guides: Mapping[str, RouteGuide]) -> Setup:
+        """
+        Give the setup of an episode: the same for the same seed.
+
+        :param guides: routes of the vehicles whose start varies, by id.
+        """
+        setup = self.base
+        if setup.traffic is not None:
+            setup = self._with_traffic(seed)
+        setup = replace(setup, game=replace(setup.game, seed=seed))
+        if self._vary == StartVariation():
+            return setup
+        random = np.random.Generator(np.random.PCG64(seed))
+        drawn = {vehicle: random.uniform(-1.0, 1.0, 2).tolist() for vehicle in guides}
+        transforms = dict(zip(setup.vehicle_ids, road_transforms(
+            len(setup.humans), [av.transform for av in setup.avs]), strict=True))
+
+        def varied(vehicle: Vehicle) -> Vehicle:
+            if vehicle.id not in guides:
+                return vehicle
+            return replace(vehicle, state=self._moved(
+                vehicle.state, guides[vehicle.id], transforms[vehicle.id], *drawn[vehicle.id]))
+
+        return replace(setup, humans=tuple(map(varied, setup.humans)),
+                       avs=tuple(map(varied, setup.avs)))
+
+    def _moved(self, state: VehicleState, guide: RouteGuide, transform: RigidTransform,
+               speed_share: float, along_share: float) -> VehicleState:
+        """Give a start that is varied by shares in [-1, 1] of what it may."""
+        speed = max(0.0, state.speed + speed_share * self._vary.speed)
+        if not self._vary.along:
+            return state._replace(speed=speed)
+        x, y, yaw = transform.to_scenario(np.array(state[:3])).tolist()
+        path, s = guide.driving.path, guide.driving.start_s
+        s, d, heading = path.locate(x, y, s)
+        moved = path.poses(np.array([s + along_share * self._vary.along]), np.array([d]))[0]
+        moved[2] += yaw - heading
+        x, y, yaw = transform.to_simulation(moved).tolist()
+        return state._replace(x=x, y=y, yaw=yaw, speed=speed)
+
+    def _with_traffic(self, seed: int) -> Setup:
+        """Place traffic by the seed, or take a placement that was made before."""
+        world = seed if self._worlds is None else seed % self._worlds
+        if world in self._placed:
+            return self._placed[world]
+        game, spec = self.base.game, self.base.game.traffic
+        assert spec is not None
+        placed = build_setup(replace(game, seed=world, traffic=replace(spec, seed=None)),
+                             self.base.loaded)
+        if self._worlds is not None:
+            assert placed.traffic is not None
+            fresh = placed.traffic.make()
+            placed = replace(placed, traffic=TrafficSetup(
+                placed.traffic.descriptions, lambda: deepcopy(fresh)))
+            self._placed[world] = placed
+        return placed

@@ -1,0 +1,199 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The cockpit's page on an environment: `render_mode='human'`.
+
+The server listens on loopback, in a thread beside the environment's. Whoever opens the page
+watches the agent in real time; nobody can steer there, for the agent's actions are the only ones.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+import sys
+import threading
+import time
+from typing import Any, Literal
+
+from crgame_ros.cockpit import frames
+from crgame_ros.cockpit.access import Access
+from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.message_frames import state_rows
+from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.cockpit.server import create_app, listen
+from crgame_ros.errors import CrgameError
+from crgame_ros.game.documents import parse_game_document
+from crgame_ros.gym.av_pilot import stacked
+from crgame_ros.gym.driving_game import DrivingGame
+from crgame_ros.messages.status_values import Status
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+
+HOST, PORT = '127.0.0.1', 8080
+# An environment that is slower than this behind does not catch up [s].
+_PATIENCE_S = 0.5
+_WATCH_ONLY = 'This is an environment: its agent drives, and nothing in it can be changed here.'
+
+
+class EnvironmentBackend:
+    """Stands behind the page; the environment's thread tells it what to show."""
+
+    mode: Literal['live', 'replay'] = 'live'
+
+    def __init__(self) -> None:
+        self.hub: Hub | None = None
+
+    async def start(self, hub: Hub) -> None:
+        """Remember whom to tell."""
+        self.hub = hub
+
+    async def stop(self) -> None:
+        """Do nothing: the environment goes on."""
+
+    async def command(self, client: Client, message: Mapping[str, Any]) -> str:
+        """
+        Refuse: the agent drives.
+
+        :raises CrgameError: always.
+        """
+        raise CrgameError(_WATCH_ONLY)
+
+    def joined(self, client: Client) -> None:
+        """Do nothing: everybody sees the same."""
+
+    def left(self, client: Client) -> None:
+        """Do nothing."""
+
+    async def load_game(self, path: Any) -> str:
+        """
+        Refuse: the environment has its game.
+
+        :raises CrgameError: always.
+        """
+        raise CrgameError(_WATCH_ONLY)
+
+
+class PageViewer:
+    """
+    Serves the page and shows a game on it, in real time.
+
+    :param port: the first to try.
+    :ivar url: of the page.
+    """
+
+    def __init__(self, port: int = PORT) -> None:
+        self._backend = EnvironmentBackend()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name='page', daemon=True)
+        self._thread.start()
+        access = Access(HOST, port)
+        try:
+            self._runner, port = asyncio.run_coroutine_threadsafe(listen(
+                create_app(self._backend, access, None), HOST, port), self._loop).result()
+        except BaseException:
+            self._end_thread()
+            raise
+        self.url = access.at_port(port).url
+        self._epoch = 0
+        self._due_s = 0.0
+        self._status = RunStatus()
+        print(f'the environment is shown at {self.url}', file=sys.stderr, flush=True)
+
+    def begin(self, game: DrivingGame) -> None:
+        """Show another episode."""
+        self._epoch += 1
+        self._due_s = time.monotonic()
+        setup = game.setup
+        document = parse_game_document(game_document(
+            setup, epoch=self._epoch, clock_offset_ns=0, real_time_factor=1.0))
+        scene = scene_document(setup.loaded, setup.descriptions, document)
+        self._status.begin(setup.vehicle_ids)
+        self._status.take(Status('sim_node: run', 0, 'running', {}), 0.0)
+        for seat in game.seats:
+            # Not who the game says.
+            scene['drivers' if seat.pilot is None else 'planners'][seat.id] = 'agent'
+        self._tell(lambda hub: hub.set_document('scene', scene))
+        self._tell(lambda hub: hub.set_document('events', {'fired': []}))
+        self._tell(lambda hub: hub.set_document('seats', {'seats': {}}))
+
+    def show(self, game: DrivingGame) -> None:
+        """Show the present state, when its time has come."""
+        now_s = time.monotonic()
+        if now_s - self._due_s > _PATIENCE_S:
+            self._due_s = now_s
+        time.sleep(max(0.0, self._due_s - now_s))
+        scheduler, n = game.simulation.scheduler, game.simulation.n
+        self._due_s += scheduler.time_step_s
+        place = (self._epoch, n, scheduler.k(n), n * scheduler.dt_s)
+        objects = game.objects
+        commands = np.array([command or (np.nan,) * 4 for command in game.simulation.commands],
+                            dtype=np.float64).reshape(-1, 4)
+        made = {
+            'state': frames.encode_state(*place, state_rows(
+                stacked(game.simulation.states), commands)),
+            'objects': frames.encode_objects(*place, np.concatenate(
+                (objects.poses, objects.velocities), axis=1)),
+            **_plans(game, place)}
+        for seat in game.seats:
+            self._status.take(Status(f'{seat.id}/drivability', 0, '', {
+                'collision': str(bool(seat.hit)).lower(), 'hit': ','.join(seat.hit)}), place[3])
+        status = {**self._status.document(), 't': place[3], 'n': n, 'k': place[2],
+                  'epoch': self._epoch, 'measured_factor': None, 'frames_skipped': False,
+                  'clients': 0}
+        alarms = self._status.alarms_document()
+
+        def send(hub: Hub) -> None:
+            for slot, frame in made.items():
+                hub.send_frame(slot, frame)
+            hub.set_document('status', {**status, 'clients': len(hub.clients)})
+            hub.set_document('alarms', alarms)
+
+        self._tell(send)
+
+    def close(self) -> None:
+        """End the server and its thread."""
+        asyncio.run_coroutine_threadsafe(self._runner.cleanup(), self._loop).result()
+        self._end_thread()
+
+    def _tell(self, what: Callable[[Hub], object]) -> None:
+        hub = self._backend.hub
+        assert hub is not None
+        self._loop.call_soon_threadsafe(what, hub)
+
+    def _end_thread(self) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+
+def _plans(game: DrivingGame, place: tuple[int, int, int, float]) -> dict[str, bytes]:
+    """Give the frames of the plans that AVs follow."""
+    setup: Setup = game.setup
+    made = {}
+    for index, av in enumerate(game.simulation.avs):
+        if av.plan is None or av.driven:
+            continue
+        column = len(setup.humans) + index
+        states = av.plan.states
+        age_s = 1e-9 * (game.simulation.scheduler.stamp_ns(place[1]) - av.plan.stamp_ns)
+        rows = np.column_stack((
+            states[:, :StateColumn.SPEED + 1],
+            np.arange(len(states)) * setup.scheduler.time_step_s - age_s))
+        rows[:, :3] = av.setup.transform.to_simulation(rows[:, :3])
+        made[f'plan:{column}'] = frames.encode_plan(*place, column, rows)
+    return made

@@ -1,0 +1,125 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A game for several agents: PettingZoo's parallel environment."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from crgame_ros.errors import InputError
+from crgame_ros.gym.agent_game import AgentGame, make_experiment
+from crgame_ros.gym.agent_spaces import action_space, observation_space
+from crgame_ros.gym.driving_env import check_render_mode, Seen
+from crgame_ros.gym.episode_setups import SEEDS
+from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
+from gymnasium import spaces
+import numpy as np
+from numpy.typing import NDArray
+
+try:
+    from pettingzoo import ParallelEnv
+except ImportError as _error:
+    raise ImportError('crgame_ros.gym.parallel_env needs the package pettingzoo, which is not '
+                      "installed: pip install 'crgame_ros[gym]'", name='pettingzoo') from _error
+
+
+class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
+    """
+    Several vehicles of a game, each driven by an agent of its own, all at the same time.
+
+    The episode of all ends when that of one is terminated, for the others would go on against a
+    vehicle that nobody drives; theirs are truncated.
+
+    :param seats: ids of the agents' vehicles; None takes all.
+    :param render_mode: `rgb_array` or None.
+    :param keywords: of `make_experiment`.
+    :raises InputError: if one of them is wrong.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        'name': 'crgame_v0', 'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
+        'is_parallelizable': True}
+
+    def __init__(self, seats: Sequence[str] | None = None, render_mode: str | None = None,
+                 **keywords: Any) -> None:
+        check_render_mode(render_mode, self.metadata['render_modes'])
+        if seats is None:
+            seats = make_experiment((), **keywords).setups.base.vehicle_ids
+        if not seats or len(set(seats)) < len(seats):
+            raise InputError(f'"seats" are {list(seats)}', 'environment',
+                             'name each vehicle once, and one at least')
+        self.experiment = make_experiment(seats, **keywords)
+        self.render_mode = render_mode
+        self.possible_agents = list(seats)
+        self.agents: list[str] = []
+        self._together = AgentGame(self.experiment)
+        self.observation_spaces = {
+            seat: observation_space(self.experiment.observation) for seat in seats}
+        self.action_spaces = {seat: action_space(self.experiment.action) for seat in seats}
+        self._random = np.random.Generator(np.random.PCG64())
+        self._painter: ScenePainter | None = None
+
+    def observation_space(self, agent: str) -> spaces.Dict:
+        """Give the space of an agent's observations."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Box:
+        """Give the space of an agent's actions."""
+        return self.action_spaces[agent]
+
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None
+              ) -> tuple[dict[str, Seen], dict[str, dict[str, Any]]]:
+        """Begin an episode; with equal seeds, and then equal actions, it is the same."""
+        if seed is not None:
+            self._random = np.random.Generator(np.random.PCG64(seed))
+        self._together.begin(int(self._random.integers(SEEDS)))
+        self.agents = list(self.possible_agents)
+        return self._seen(), {agent: self._together.info() for agent in self.agents}
+
+    def step(self, actions: dict[str, NDArray[np.float32]]) -> tuple[
+            dict[str, Seen], dict[str, float], dict[str, bool], dict[str, bool],
+            dict[str, dict[str, Any]]]:
+        """
+        Drive until the next decision.
+
+        :raises PlanningError: if an action is none.
+        :raises InputError: if an agent's is missing.
+        """
+        agents = self.agents
+        if not agents:
+            return {}, {}, {}, {}, {}
+        missing = [agent for agent in agents if agent not in actions]
+        if missing:
+            raise InputError('has no action', missing[0], 'give one for each agent')
+        self._together.act(actions)
+        outcomes = dict(zip(agents, self._together.outcomes(), strict=True))
+        over = any(item.terminated or item.truncated for item in outcomes.values())
+        if over:
+            self.agents = []
+        return (self._seen(), {agent: item.reward for agent, item in outcomes.items()},
+                {agent: item.terminated for agent, item in outcomes.items()},
+                {agent: over and not item.terminated for agent, item in outcomes.items()},
+                {agent: item.info for agent, item in outcomes.items()})
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Give a picture (H, W, 3) around the first agent in the mode `rgb_array`."""
+        if self.render_mode is None:
+            return None
+        if self._painter is None:
+            self._painter = ScenePainter(self._together.game.setup)
+        return self._painter.paint(self._together.game)
+
+    def _seen(self) -> dict[str, Seen]:
+        return {agent: self._together.observed(number)
+                for number, agent in enumerate(self.possible_agents)}

@@ -1,0 +1,152 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The reward of a decision: a weighted sum of named terms."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+import math
+from typing import NamedTuple
+
+from crgame_ros.analysis.criticality.criticality import COLUMN, MEASURES, TickMeasures
+from crgame_ros.analysis.criticality.thresholds import USUAL
+from crgame_ros.errors import InputError
+from crgame_ros.policy.route_guide import RoutePlace
+from crgame_ros.vehicle.state import VehicleState
+
+
+class Decision(NamedTuple):
+    """
+    What came of a decision.
+
+    :param lapse_s: from it to now [s]
+    :param before: state at the decision.
+    :param now: state now.
+    :param place: on the route, now.
+    :param collision: whether the vehicle has touched anybody since.
+    :param off_road: whether it has left the road since.
+    :param goal: whether it is at its goal.
+    :param measures: what is left to whom; None where no term asks for it.
+    """
+
+    lapse_s: float
+    before: VehicleState
+    now: VehicleState
+    place: RoutePlace
+    collision: bool
+    off_road: bool
+    goal: bool
+    measures: TickMeasures | None = None
+
+    def shortage(self, measure: str, threshold: float) -> float:
+        """Give how far a measure is below a threshold: 0 if it is not, 1 where nothing is left."""
+        value = self.worst(measure)
+        return max(0.0, 1.0 - value / threshold) if value == value else 0.0
+
+    def worst(self, measure: str) -> float:
+        """Give the most critical value of a measure."""
+        assert self.measures is not None
+        return float(self.measures.worst()[0][COLUMN[measure]])
+
+
+@dataclass(frozen=True)
+class RewardTerm:
+    """
+    A term of the reward.
+
+    :param unit: of its value.
+    :param meaning: in a sentence.
+    :param value: of a decision.
+    :param is_measured: whether it needs the measures of criticality.
+    """
+
+    unit: str
+    meaning: str
+    value: Callable[[Decision], float]
+    is_measured: bool = False
+
+
+def _driven_well(decision: Decision) -> float:
+    place = decision.place
+    share = decision.now.speed / place.speed_limit if place.speed_limit > 0.0 else 0.0
+    return min(max(share, 0.0), 1.0)
+
+
+TERMS: dict[str, RewardTerm] = {
+    'progress': RewardTerm('m', 'come along the route since the last decision',
+                           lambda it: it.place.progress),
+    'speed': RewardTerm('-', 'speed as a share of the limit, 0 to 1', _driven_well),
+    'speeding': RewardTerm('m/s', 'speed above the limit',
+                           lambda it: max(0.0, it.now.speed - it.place.speed_limit)),
+    'collision': RewardTerm('-', '1 if anything was touched since the last decision',
+                            lambda it: float(it.collision)),
+    'off_road': RewardTerm('-', '1 if a part of the vehicle was off the road since',
+                           lambda it: float(it.off_road)),
+    'goal': RewardTerm('-', "1 if the planning problem's goal is reached",
+                       lambda it: float(it.goal)),
+    'time': RewardTerm('s', 'simulated time since the last decision', lambda it: it.lapse_s),
+    'offset': RewardTerm('m', 'distance of the rear axle from the route, to either side',
+                         lambda it: abs(it.place.d)),
+    'heading': RewardTerm('rad', 'heading error from the route, to either side',
+                          lambda it: abs(it.place.heading_error)),
+    'acceleration': RewardTerm('m^2/s^4', 'longitudinal acceleration, squared',
+                               lambda it: it.now.acceleration ** 2),
+    'jerk': RewardTerm('m^2/s^6', 'mean longitudinal jerk since, squared', lambda it: (
+        (it.now.acceleration - it.before.acceleration) / it.lapse_s) ** 2),
+    'lateral_acceleration': RewardTerm('m^2/s^4', 'speed times yaw rate, squared', lambda it: (
+        it.now.speed * it.now.yaw_rate) ** 2),
+    'steering_rate': RewardTerm('rad^2/s^2', 'mean rate of the steering angle since, squared',
+                                lambda it: ((it.now.steering_angle - it.before.steering_angle)
+                                            / it.lapse_s) ** 2),
+    'ttc': RewardTerm('-', f'shortage of the time to collision below {USUAL.ttc_s:g} s, 0 to 1',
+                      lambda it: it.shortage('ttc', USUAL.ttc_s), True),
+    'thw': RewardTerm('-', 'shortage of the time headway below 2 s, 0 to 1',
+                      lambda it: it.shortage('thw', 2.0), True),
+    'ttc_2d': RewardTerm('-', f'shortage of the time to contact below {USUAL.ttc_s:g} s, 0 to 1',
+                         lambda it: it.shortage('ttc_2d', USUAL.ttc_s), True),
+    'min_distance': RewardTerm('-', 'shortage of the distance to everybody below 2 m, 0 to 1',
+                               lambda it: it.shortage('min_distance', 2.0), True),
+    'drac': RewardTerm(MEASURES['drac'].unit, MEASURES['drac'].definition,
+                       lambda it: it.worst('drac'), True),
+    'a_req': RewardTerm(MEASURES['a_req'].unit, 'braking that just avoids contact, above 0',
+                        lambda it: -min(0.0, it.worst('a_req')), True)}
+USUAL_REWARD = {'progress': 0.05, 'offset': -0.02, 'jerk': -0.0002, 'collision': -10.0,
+                'off_road': -10.0, 'goal': 5.0}
+
+
+class Reward:
+    """
+    Adds the terms up.
+
+    :param weights: by term; 0 still tells the term's value.
+    :raises InputError: if there is no such term, or a weight is no number.
+    """
+
+    def __init__(self, weights: Mapping[str, float]) -> None:
+        for name, weight in weights.items():
+            if name not in TERMS:
+                raise InputError(f'there is no term "{name}"', 'reward',
+                                 'use ' + ', '.join(TERMS))
+            if isinstance(weight, bool) or not isinstance(weight, int | float) \
+                    or not math.isfinite(weight):
+                raise InputError(f'the weight of "{name}" is {weight!r}', 'reward',
+                                 'give a finite number')
+        self._terms = [(name, TERMS[name].value, float(weight))
+                       for name, weight in weights.items()]
+        self.is_measured = any(TERMS[name].is_measured for name in weights)
+
+    def of(self, decision: Decision) -> tuple[float, dict[str, float]]:
+        """Give the reward, and the value of each term before its weight."""
+        values = {name: value(decision) for name, value, _ in self._terms}
+        return sum(weight * values[name] for name, _, weight in self._terms), values

@@ -1,0 +1,93 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A picture of a game, seen from above, painted fast enough for every step."""
+
+from crgame_ros.geometry.outline import outline, placed_at
+from crgame_ros.geometry.reference_point import ahead
+from crgame_ros.gym.driving_game import DrivingGame
+from crgame_ros.roads.road_surface import lanelet_areas
+from crgame_ros.simulation.setup import Setup
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+import shapely
+
+Points = NDArray[np.float64]
+FRAMES_PER_S = 10
+# Of the picture [px], and what a metre is in it [px].
+WIDTH, HEIGHT = 720, 432
+SCALE = 6.0
+# Colours as in the figures: humans warm, AVs cold.
+GROUND, ROAD, LINE = (208, 214, 205), (235, 235, 235), (160, 160, 160)
+AGENT, HUMAN, AV, OBJECT = (0, 158, 115), (213, 94, 0), (0, 114, 178), (140, 140, 140)
+ROUTE = (140, 205, 180)
+# Of the route that is shown [m].
+_AHEAD, _STEP = 80.0, 2.0
+
+
+class ScenePainter:
+    """
+    Paints games on one road, north up, around the first agent's vehicle.
+
+    :param setup: of any episode.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        network = setup.loaded.scenario.lanelet_network
+        self._lanelets = [np.concatenate((item.left_vertices[:, :2],
+                                          item.right_vertices[::-1, :2]))
+                          for item in network.lanelets]
+        areas = lanelet_areas(list(network.lanelets))
+        self._tree = shapely.STRtree(areas)
+        self._outlines = [outline(item.shape) for item in setup.descriptions]
+        self._to_center = [item.vehicle.rear_to_center for item in setup.vehicles]
+        self._humans = len(setup.humans)
+
+    def paint(self, game: DrivingGame) -> NDArray[np.uint8]:
+        """Give a picture (HEIGHT, WIDTH, 3) of the present state."""
+        states = game.simulation.states
+        seat = game.seats[0]
+        middle = np.array(states[seat.row][:2])
+        image = Image.new('RGB', (WIDTH, HEIGHT), GROUND)
+        draw = ImageDraw.Draw(image)
+        half = np.array((WIDTH, HEIGHT)) / (2.0 * SCALE)
+        window = shapely.box(*(middle - half), *(middle + half))
+        for index in sorted(self._tree.query(window).tolist()):
+            draw.polygon(_pixels(self._lanelets[index], middle), fill=ROAD, outline=LINE)
+        self._paint_route(draw, game, middle)
+        poses = game.objects.poses
+        near = np.abs(poses[:, :2] - middle).max(axis=1) < half.max() + 20.0
+        for index in np.flatnonzero(near).tolist():
+            draw.polygon(_pixels(placed_at(self._outlines[len(states) + index],
+                                           *poses[index].tolist()), middle), fill=OBJECT)
+        agents = {item.row for item in game.seats}
+        for row, state in enumerate(states):
+            x, y = ahead(state.x, state.y, state.yaw, self._to_center[row])
+            colour = AGENT if row in agents else HUMAN if row < self._humans else AV
+            draw.polygon(_pixels(placed_at(self._outlines[row], x, y, state.yaw), middle),
+                         fill=colour, outline=(34, 34, 34))
+        return np.asarray(image)
+
+    def _paint_route(self, draw: ImageDraw.ImageDraw, game: DrivingGame, middle: Points) -> None:
+        seat = game.seats[0]
+        ways = np.arange(0.0, _AHEAD, _STEP) + seat.place.s
+        points = seat.view.in_simulation(seat.guide.driving.path.pose_at(ways)[:, :3])
+        draw.line(_pixels(points[:, :2], middle), fill=ROUTE, width=2)
+
+
+def _pixels(points: Points, middle: Points) -> list[tuple[float, float]]:
+    """Give places in the picture; its rows count downwards."""
+    shown = (points - middle) * (SCALE, -SCALE) + (0.5 * WIDTH, 0.5 * HEIGHT)
+    return [(x, y) for x, y in shown.tolist()]

@@ -1,0 +1,44 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The ids of the environments: one for each shipped game, and one for any other."""
+
+from crgame_ros.paths import scenarios_directory
+import gymnasium
+
+NAMESPACE = 'crgame'
+ANY_GAME = f'{NAMESPACE}/Game-v0'
+_ENTRY = 'crgame_ros.gym.driving_env:DrivingEnv'
+_VECTOR_ENTRY = 'crgame_ros.gym.games_together:GamesTogether'
+
+
+def shipped_games() -> tuple[str, ...]:
+    """Name the shipped games, such as cut_in."""
+    # A name with a dot in it is that of a driver's timeline.
+    return tuple(sorted(path.stem for path in scenarios_directory().glob('*.yaml')
+                        if '.' not in path.stem))
+
+
+def environment_id(game: str) -> str:
+    """Give the id of a shipped game's environment, such as crgame/CutIn-v0."""
+    return f'{NAMESPACE}/{"".join(word.capitalize() for word in game.split("_"))}-v0'
+
+
+def register_all() -> None:
+    """Register every environment with Gymnasium; what is registered already stays."""
+    for name, keywords in ((ANY_GAME, {}), *((environment_id(game), {'game': game})
+                                             for game in shipped_games())):
+        if name not in gymnasium.registry:
+            gymnasium.register(name, entry_point=_ENTRY, vector_entry_point=_VECTOR_ENTRY,
+                               kwargs=keywords)

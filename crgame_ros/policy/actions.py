@@ -1,0 +1,187 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a policy's action means, the same in training, offline and live."""
+
+from collections.abc import Sequence
+import math
+from typing import Any, Literal, NamedTuple
+
+from crgame_ros.errors import PlanningError
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.planner.rollout import Rollout
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.human_vehicle import HumanVehicle
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+from crgame_ros.vehicle.steering import steering_rate
+from crgame_ros.vehicle.stopping import moving_time
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ActionKind = Literal['acceleration', 'pedals', 'plan']
+ACTION_KINDS: tuple[ActionKind, ...] = ('acceleration', 'pedals', 'plan')
+# What 1 and -1 stand for: driving on and braking [m/s^2].
+DRIVING, BRAKING = 4.0, 8.0
+# The greatest curvature is that of full lock, and of so much lateral acceleration [m/s^2].
+LATERAL = 5.0
+# An action is planned on for so long, should the next one be late [s].
+HELD_S = 0.5
+# Points of an action that is a plan, a scenario step apart.
+PLAN_POINTS = 10
+# Slower than this a heading that changes says nothing of the steering [m/s].
+_CREEPING = 0.5
+
+
+class WantedMotion(NamedTuple):
+    """
+    What the action `acceleration` asks for.
+
+    :param acceleration: along the heading [m/s^2]
+    :param curvature: of the rear axle's path, left positive [1/m]
+    """
+
+    acceleration: float
+    curvature: float
+
+
+def action_bounds(kind: ActionKind) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """
+    Give the least and greatest values of an action.
+
+    :return: (2) for `acceleration` and `pedals`; (10, 4) for `plan`: x and y [m] of the rear axle
+        as seen from its present pose, yaw from the present one [rad] and speed [m/s]
+    """
+    if kind == 'plan':
+        row = np.array((100.0, 100.0, math.pi, 100.0), np.float32)
+        high = np.tile(row, (PLAN_POINTS, 1))
+        return -high, high
+    return np.full(2, -1.0, np.float32), np.full(2, 1.0, np.float32)
+
+
+def checked_action(kind: ActionKind, action: Any) -> Array:
+    """
+    Cut an action to its bounds.
+
+    :raises PlanningError: if it has another shape, or a number that is not finite.
+    """
+    low, high = action_bounds(kind)
+    values = np.asarray(action, dtype=np.float64)
+    if values.shape != low.shape or not np.isfinite(values).all():
+        raise PlanningError(f'an action "{kind}" is {low.shape} finite numbers, this is '
+                            f'{np.array2string(values.ravel()[:6], precision=3)}'
+                            f' of shape {values.shape}')
+    return np.minimum(np.maximum(values, low), high)
+
+
+def wanted_motion(action: Array, speed: float, vehicle: VehicleParameters) -> WantedMotion:
+    """
+    Give what an action `acceleration` asks for.
+
+    :param action: (2) in [-1, 1]: 1 is 4 m/s^2, -1 is braking by 8 m/s^2; then the share of the
+        curvature that the vehicle can drive at its speed, left positive
+    :param speed: of the vehicle [m/s]
+    """
+    pedal, turn = action.tolist()
+    lock = math.tan(vehicle.max_steering_angle) / vehicle.wheelbase
+    return WantedMotion(pedal * (DRIVING if pedal > 0.0 else BRAKING),
+                        turn * min(lock, LATERAL / max(speed * speed, 1e-6)))
+
+
+def pedals(action: Array) -> DriverCommand:
+    """
+    Give the command of an action `pedals`.
+
+    :param action: (2) in [-1, 1]: throttle, below 0 brake; steering wheel, left positive
+    """
+    pedal, steering = action.tolist()
+    return DriverCommand(max(pedal, 0.0), max(-pedal, 0.0), steering)
+
+
+def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
+                   vehicle: VehicleParameters, dt_s: float, substeps: int) -> Array:
+    """
+    Plan what an action means.
+
+    :param action: as `checked_action` gives it.
+    :param ego: present state, rear axle.
+    :param dt_s: scenario step [s]
+    :param substeps: simulation steps in it, of which a driven vehicle's motion is made.
+    :return: (S, 8) rear-axle states, a scenario step apart, the first the ego's
+    """
+    if kind == 'plan':
+        return _stated(action, ego, vehicle, dt_s)
+    steps = max(1, math.ceil(HELD_S / dt_s - 1e-9))
+    if kind == 'pedals':
+        return _driven(pedals(action), ego, vehicle, steps, dt_s, substeps)
+    wanted = wanted_motion(action, ego.speed, vehicle)
+    angle = math.atan(vehicle.wheelbase * wanted.curvature)
+    drive = Rollout(ego, dt_s, vehicle.wheelbase)
+    for _ in range(steps):
+        speed, acceleration = drive.speed, wanted.acceleration
+        if speed <= 0.0 and acceleration < 0.0:
+            # Brakes hold; whoever rolls backwards is stopped.
+            acceleration = BRAKING if speed < 0.0 else 0.0
+        acceleration = min(acceleration, (vehicle.max_speed - speed) / dt_s)
+        moving_s = moving_time(speed, acceleration, dt_s)
+        rate = steering_rate(angle, drive.steering, moving_s, vehicle.max_steering_rate) \
+            if moving_s > 0.0 else 0.0
+        drive.step(acceleration, rate, moving_s)
+    return drive.states
+
+
+def _driven(command: DriverCommand, ego: VehicleState, vehicle: VehicleParameters, steps: int,
+            dt_s: float, substeps: int) -> Array:
+    """Drive as a person would who holds a command."""
+    driven, states = HumanVehicle(vehicle, ego), [ego]
+    for _ in range(steps):
+        for _ in range(substeps):
+            driven.step(command, dt_s / substeps)
+        states.append(driven.state)
+    return np.array(states, dtype=np.float64)
+
+
+def _stated(points: Array, ego: VehicleState, vehicle: VehicleParameters, dt_s: float) -> Array:
+    """Complete the states of which an action says x, y, yaw and speed."""
+    states = np.empty((len(points) + 1, STATE_WIDTH))
+    states[0] = ego
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    states[1:, StateColumn.X] = ego.x + cos * points[:, 0] - sin * points[:, 1]
+    states[1:, StateColumn.Y] = ego.y + sin * points[:, 0] + cos * points[:, 1]
+    states[1:, StateColumn.YAW] = wrap_pi_array(ego.yaw + points[:, 2])
+    states[1:, StateColumn.SPEED] = points[:, 3]
+    turn = wrap_pi_array(np.diff(states[:, StateColumn.YAW]))
+    states[1:, StateColumn.ACCELERATION] = np.diff(states[:, StateColumn.SPEED]) / dt_s
+    states[1:, StateColumn.YAW_RATE] = turn / dt_s
+    states[1:, StateColumn.STEERING_ANGLE] = _steering(states, turn, vehicle, dt_s)
+    states[1:, StateColumn.STEERING_RATE] = np.diff(states[:, StateColumn.STEERING_ANGLE]) / dt_s
+    return states
+
+
+def _steering(states: Array, turn: Array, vehicle: VehicleParameters,
+              dt_s: float) -> Sequence[float]:
+    """Give the angles (S - 1) that turn the heading so, as fast as the wheels follow."""
+    angle, angles = float(states[0, StateColumn.STEERING_ANGLE]), []
+    speeds = states[:, StateColumn.SPEED]
+    for mean, turned in zip((0.5 * (speeds[1:] + speeds[:-1])).tolist(), turn.tolist(),
+                            strict=True):
+        wanted = angle
+        if abs(mean) > _CREEPING:
+            wanted = math.atan(vehicle.wheelbase * turned / (mean * dt_s))
+        limit = vehicle.max_steering_angle
+        wanted = min(max(wanted, -limit), limit)
+        angle += dt_s * steering_rate(wanted, angle, dt_s, vehicle.max_steering_rate)
+        angles.append(angle)
+    return angles

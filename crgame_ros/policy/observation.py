@@ -1,0 +1,144 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The observation of a policy: the same in training, offline and live.
+
+Everything is seen from the vehicle's rear axle: x ahead, y to the left. Many vehicles are observed
+at once; what one is told does not depend on the others.
+"""
+
+from collections.abc import Sequence
+
+from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.game.perception_spec import SensorSpec
+from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.reference_point import ahead, seen_from
+from crgame_ros.perception.bodies import SensedBodies
+from crgame_ros.perception.sensors import create_sensor
+from crgame_ros.policy.observation_spec import (
+    OBJECT_COLUMNS,
+    ObservationSpec,
+    ROUTE_COLUMNS,
+    STATE_COLUMNS,
+)
+from crgame_ros.policy.route_guide import RouteGuide, RoutePlace
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Observed = dict[str, NDArray[np.float32]]
+
+
+class Observation:
+    """
+    Makes observations of one kind of vehicle among the same things.
+
+    :param spec: what is told.
+    :param vehicle: parameters of the vehicle.
+    :param things: (N) everything else that can appear; who of them is there comes with each call.
+    """
+
+    def __init__(self, spec: ObservationSpec, vehicle: VehicleParameters,
+                 things: Sequence[ObjectDescription]) -> None:
+        self.spec = spec
+        self._bounds = spec.bounds()
+        self._sizes = np.array([(item.shape.length, item.shape.width) for item in things]
+                               ).reshape(-1, 2)
+        self._ahead: Array = spec.route_spacing * np.arange(
+            1, spec.route_points + 1, dtype=np.float64)
+        self._to_center = vehicle.rear_to_center
+        if 'lidar' in spec.parts:
+            self._lidar = create_sensor(SensorSpec(
+                'lidar', field_of_view=2.0 * np.pi, horizon=spec.horizon, rays=spec.rays))
+            self._bodies = SensedBodies(things)
+
+    def of(self, states: Sequence[VehicleState], places: Sequence[RoutePlace],
+           guides: Sequence[RouteGuide], poses: Array, velocities: Array) -> Observed:
+        """
+        Observe B vehicles.
+
+        :param states: (B) rear axle, scenario coordinates.
+        :param places: (B) on their routes.
+        :param guides: (B) of their routes.
+        :param poses: (B, N, 3) centres of the things, in the same coordinates; NaN where absent
+        :param velocities: (B, N, 3)
+        :return: by part, (B, …) as in `ObservationSpec.bounds`, within them.
+        """
+        own = np.array(states, dtype=np.float64)[:, :3]
+        made: Observed = {}
+        for part in self.spec.parts:
+            if part == 'state':
+                values = _state(states, places)
+            elif part == 'route':
+                values = self._route(own, places, guides)
+            elif part == 'objects':
+                values = self._objects(own, poses, velocities)
+            else:
+                values = self._ranges(states, poses)
+            low, high = self._bounds[part]
+            # Rounded last: what is cut must be a bound of the space to the last bit.
+            made[part] = np.minimum(np.maximum(values.astype(np.float32), low), high)
+        return made
+
+    def _route(self, own: Array, places: Sequence[RoutePlace],
+               guides: Sequence[RouteGuide]) -> Array:
+        points = np.stack([guide.driving.path.pose_at(place.s + self._ahead)
+                           for guide, place in zip(guides, places, strict=True)])
+        result = np.empty((*points.shape[:2], len(ROUTE_COLUMNS)))
+        result[..., 0], result[..., 1] = seen_from(own[:, None], points)
+        result[..., 2] = wrap_pi_array(points[..., 2] - own[:, 2, None])
+        result[..., 3] = points[..., 3]
+        return result
+
+    def _objects(self, own: Array, poses: Array, velocities: Array) -> Array:
+        rows, wanted = np.arange(len(own))[:, None], self.spec.objects
+        result = np.zeros((len(own), wanted, len(OBJECT_COLUMNS)))
+        if not poses.shape[1]:
+            return result
+        apart = poses[:, :, :2] - own[:, None, :2]
+        distance = np.einsum('bni,bni->bn', apart, apart)
+        # NaN, who is absent, is farther than everybody.
+        distance = np.where(distance <= self.spec.reach ** 2, distance, np.inf)
+        nearest = np.argsort(distance, axis=1, kind='stable')[:, :wanted]
+        there = np.isfinite(distance[rows, nearest])
+        apart, speeds = apart[rows, nearest], velocities[rows, nearest]
+        cos, sin = np.cos(own[:, 2, None]), np.sin(own[:, 2, None])
+        seen = result[:, :nearest.shape[1]]
+        seen[..., 0] = 1.0
+        for column, vectors in ((1, apart), (4, speeds)):
+            seen[..., column] = vectors[..., 0] * cos + vectors[..., 1] * sin
+            seen[..., column + 1] = vectors[..., 1] * cos - vectors[..., 0] * sin
+        seen[..., 3] = wrap_pi_array(poses[rows, nearest, 2] - own[:, 2, None])
+        seen[..., 6:] = self._sizes[nearest]
+        seen[~there] = 0.0
+        return result
+
+    def _ranges(self, states: Sequence[VehicleState], poses: Array) -> Array:
+        result = np.empty((len(states), self.spec.rays))
+        for row, state, around in zip(result, states, poses, strict=True):
+            self._bodies.place(around)
+            x, y = ahead(state.x, state.y, state.yaw, self._to_center)
+            scan = self._lidar.scan((x, y, state.yaw), self._bodies)
+            row[:] = np.minimum(scan.ranges, self.spec.horizon)
+        return result
+
+
+def _state(states: Sequence[VehicleState], places: Sequence[RoutePlace]) -> Array:
+    return np.array([
+        (state.speed, state.acceleration, state.steering_angle, state.yaw_rate, place.d,
+         place.heading_error, place.curvature, place.speed_limit, place.goal_distance)
+        for state, place in zip(states, places, strict=True)]).reshape(-1, len(STATE_COLUMNS))

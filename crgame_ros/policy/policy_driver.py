@@ -1,0 +1,117 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A trained policy as a human's driver: `driver: policy:FILE.py:load` in a game."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from commonroad.scenario.scenario import Scenario
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.game.objects import ObjectDescription, ObjectStates
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.policy.actions import checked_action, pedals, wanted_motion
+from crgame_ros.policy.observation import Observation
+from crgame_ros.policy.pedal_inverse import PedalInverse
+from crgame_ros.policy.policy_file import Policy
+from crgame_ros.policy.route_guide import RouteGuide
+from crgame_ros.policy.seat_view import SeatView
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class DrivenSeat:
+    """
+    A seat that a policy may take.
+
+    :param row: of its vehicle among the driven ones.
+    :param driven: (V) all driven vehicles.
+    :param others: (M) everything else that can appear.
+    :param scenario: the road.
+    :param vehicle: its parameters.
+    :param start: where it begins, rear axle, simulation coordinates.
+    :param transform: from simulation coordinates to those of the road.
+    :param steps_per_tick: simulation steps in a scenario step.
+    """
+
+    row: int
+    driven: Sequence[ObjectDescription]
+    others: Sequence[ObjectDescription]
+    scenario: Scenario
+    vehicle: VehicleParameters
+    start: VehicleState
+    transform: RigidTransform
+    steps_per_tick: int
+
+    @property
+    def id(self) -> str:  # noqa: A003
+        """Give the id of the vehicle."""
+        return self.driven[self.row].id
+
+
+class PolicyDriver(DriverSource):
+    """
+    Asks a policy at scenario steps, and holds its action until the next.
+
+    :param policy: whose action is `acceleration` or `pedals`.
+    :param seat: that it takes.
+    :raises InputError: if its action is a plan, which nobody can drive by pedals.
+    """
+
+    def __init__(self, policy: Policy, seat: DrivenSeat) -> None:
+        policy.check_pedals(seat.id)
+        self._policy, self._seat = policy, seat
+        self._view = SeatView(seat.row, seat.driven, seat.others, seat.transform)
+        self._observation = Observation(policy.spec, seat.vehicle, self._view.things)
+        self._inverse = PedalInverse(seat.vehicle)
+        self._start = self._view.own(np.tile(np.array(seat.start), (len(seat.driven), 1)))
+        self._guide = RouteGuide(seat.scenario, None, self._start, seat.vehicle)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a new run."""
+        self._guide.restart(self._start)
+        self._policy.begin()
+        self._action: NDArray[np.float64] | None = None
+        self._speed = self._decided_speed = self._seat.start.speed
+
+    def see(self, n: int, vehicle_states: NDArray[np.float64],
+            objects: ObjectStates | None) -> None:
+        """Decide at a scenario step; between them only look at the own speed."""
+        state = self._view.own(vehicle_states)
+        self._speed = state.speed
+        if objects is None:
+            return
+        place = self._guide.follow(state)
+        if self._action is not None and (n // self._seat.steps_per_tick) % self._policy.ticks:
+            return
+        around = self._view.of(vehicle_states, objects)
+        seen = self._observation.of([state], [place], [self._guide], around.poses[None],
+                                    around.velocities[None])
+        self._action = checked_action(self._policy.action, self._policy.act(
+            {part: values[0] for part, values in seen.items()}))
+        self._decided_speed = state.speed
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Give the command of the action in force; released before there is one."""
+        if self._action is None:
+            return RELEASED
+        if self._policy.action == 'pedals':
+            return pedals(self._action)
+        wanted = wanted_motion(self._action, self._decided_speed, self._seat.vehicle)
+        return self._inverse.command(wanted, self._speed)

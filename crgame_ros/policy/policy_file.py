@@ -1,0 +1,125 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A trained policy in a file of the user's own: `policy:FILE.py:load`."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+import importlib.util
+from pathlib import Path
+import sys
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
+from crgame_ros.policy.observation_spec import ObservationSpec
+from crgame_ros.registry import ModelRegistry, POLICY
+from crgame_ros.schema.reading import read
+import numpy as np
+from numpy.typing import NDArray
+
+_SEE = 'see docs/gym.md'
+
+
+@dataclass(frozen=True)
+class Policy:
+    """
+    What `load` in a policy's file gives.
+
+    :param act: gives the action for an observation: arrays by part, as the environment gives
+        them. It must depend on nothing else but what it has seen since `begin`.
+    :param action: what its actions mean, as in the environment it was trained in.
+    :param observation: what it is told, as there: keys of `ObservationSpec`.
+    :param ticks: scenario steps for which an action holds, as there.
+    :param begin: is called before each run; for policies that remember.
+    """
+
+    act: Callable[[Mapping[str, NDArray[np.float32]]], Any]
+    action: ActionKind = 'acceleration'
+    observation: Mapping[str, Any] = field(default_factory=dict)
+    ticks: int = 1
+    begin: Callable[[], object] = lambda: None
+
+    def check_pedals(self, seat: str) -> None:
+        """
+        Refuse to drive a human's seat by plans.
+
+        :raises InputError: naming the seat.
+        """
+        if self.action == 'plan':
+            raise InputError('its actions are plans, which no pedals can drive',
+                             f'{seat}: driver {POLICY}…',
+                             "name it as an AV's planner, or train it with other actions")
+
+    @property
+    def spec(self) -> ObservationSpec:
+        """Give what it is told."""
+        return read(ObservationSpec, dict(self.observation), 'observation of the policy')
+
+
+def load_policy(name: str, where: str = '') -> Policy:
+    """
+    Load a policy.
+
+    :param name: `FILE.py:load`: a file, and a function in it that takes nothing and gives a
+        `Policy`.
+    :param where: the file and key that named it, for messages.
+    :raises InputError: if there is none, it may not be run or is no policy.
+    """
+    label = f'{where}: {POLICY}{name}' if where else f'{POLICY}{name}'
+    if not all(judge(f'{POLICY}{name}') for judge in ModelRegistry.judges):
+        raise InputError('is code that only a message names: it is not run', label,
+                         'name it in the game file, or to the node that runs it')
+    file, _, function = name.rpartition(':')
+    path = Path(file).expanduser()
+    if not file.endswith('.py'):
+        raise InputError('is no policy', label, f'write {POLICY}FILE.py:load')
+    if not path.is_file():
+        raise InputError(f'there is no file {path}', label, 'check the path')
+    policy = _called(path.resolve(), function, label)
+    if not isinstance(policy, Policy):
+        raise InputError(f'gives a {type(policy).__name__}', label,
+                         f'return a crgame_ros.policy.policy_file.Policy; {_SEE}')
+    if policy.action not in ACTION_KINDS:
+        raise InputError(f'"action" is {policy.action!r}', label,
+                         'use one of ' + ', '.join(ACTION_KINDS))
+    if not (isinstance(policy.ticks, int) and policy.ticks >= 1):
+        raise InputError(f'"ticks" is {policy.ticks!r}', label, 'give a whole number from 1')
+    try:
+        assert policy.spec
+    except InputError as error:
+        raise InputError(error.what, f'{label}: {error.where}', error.remedy) from error
+    return policy
+
+
+def _called(path: Path, function: str, label: str) -> Any:
+    """Run a file as a module of its own, and give what its function gives."""
+    module_name = f'crgame_ros_policy_{path.stem}'
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Dataclasses and pickling look their module up by name.
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+        load = getattr(module, function, None)
+        if not callable(load):
+            raise InputError(f'{path.name} has no function "{function}"', label,
+                             'name the function behind the colon')
+        return load()
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f'cannot be loaded ({type(error).__name__}: {error})', label,
+                         'mend the file') from error

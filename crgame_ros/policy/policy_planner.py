@@ -1,0 +1,72 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A trained policy as an AV's planner: `planner: policy:FILE.py:load` in a game."""
+
+from typing import ClassVar
+
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.interface import Planner, PlannerContext
+from crgame_ros.planner.path_planner import initial_state
+from crgame_ros.policy.actions import checked_action, planned_states
+from crgame_ros.policy.observation import Observation
+from crgame_ros.policy.policy_file import load_policy
+from crgame_ros.policy.route_guide import RouteGuide
+from crgame_ros.policy.seat_view import RequestView
+
+# Of a person's motion by pedals, as live games have it [s].
+DRIVEN_STEP_S = 0.01
+
+
+class PolicyPlanner(Planner):
+    """
+    Ask a policy for an action at each request, and plan what that means.
+
+    :param policy: `FILE.py:load`.
+    """
+
+    name: ClassVar[str] = 'policy'
+
+    def __init__(self, policy: str) -> None:
+        self._policy = load_policy(policy)
+
+    def setup(self, context: PlannerContext) -> None:
+        """Plan the route, and warm the policy up, which may take long at first."""
+        self._context = context
+        self._view = RequestView(context.vehicle_id, context.objects)
+        self._observation = Observation(self._policy.spec, context.vehicle, self._view.things)
+        start = initial_state(context)
+        self._guide = RouteGuide(context.scenario, context.planning_problem, start,
+                                 context.vehicle)
+        self._decided_k: int | None = None
+        self._policy.begin()
+        self.plan(PlanRequest(0, context.k0, context.time_step_s, start))
+        self._guide.restart(start)
+        self._policy.begin()
+        self._decided_k = None
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Decide, or hold on to what was decided; plan it from where the vehicle is."""
+        decided, place = self._decided_k, self._guide.follow(request.ego)
+        if decided is None or not 0 < request.k - decided < self._policy.ticks:
+            self._decided_k = request.k
+            around = self._view.of(request)
+            seen = self._observation.of([request.ego], [place], [self._guide],
+                                        around.poses[None], around.velocities[None])
+            self._action = checked_action(self._policy.action, self._policy.act(
+                {part: values[0] for part, values in seen.items()}))
+        states = planned_states(
+            self._policy.action, self._action, request.ego, self._context.vehicle,
+            request.time_step_s, max(1, round(request.time_step_s / DRIVEN_STEP_S)))
+        return Plan(request.stamp_ns, states)

@@ -1,0 +1,142 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The route that a seat is to follow: where it is along it, how fast it may drive, how far."""
+
+import math
+from typing import NamedTuple
+
+from commonroad.geometry.shape import Shape, ShapeGroup
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.scenario import Scenario
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.planner.reference_path import DrivingPath, plan_driving_path
+from crgame_ros.planner.speed_profile import default_speed, desired_speeds, SLOWEST_DESIRED
+from crgame_ros.policy.observation_spec import FAR
+from crgame_ros.roads.route import goal_lanelets
+from crgame_ros.scenario.loading import group_outline
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+import shapely
+
+# A path that goes on is planned anew when so little of it is left [m].
+RESERVE = 300.0
+# Whoever is farther beside the route, or has come farther than that at once, is sought anew [m].
+LOST, JUMP = 10.0, 20.0
+
+
+class RoutePlace(NamedTuple):
+    """
+    Where a vehicle is along its route.
+
+    :param s: arc length of the rear axle [m]
+    :param d: its offset to the left [m]
+    :param heading_error: of the vehicle from the route, in (-pi, pi] [rad]
+    :param curvature: of the route there [1/m]
+    :param speed_limit: there [m/s]
+    :param goal_distance: along the route, 1000 m at most [m]
+    :param progress: come along the route since the place before [m]
+    """
+
+    s: float
+    d: float
+    heading_error: float
+    curvature: float
+    speed_limit: float
+    goal_distance: float
+    progress: float
+
+
+class RouteGuide:
+    """
+    Follows one vehicle along its route.
+
+    An AV's route leads to the goal of its planning problem, a human's along its lane.
+
+    :param scenario: with at least one lanelet.
+    :param problem: None follows the lane.
+    :param start: where the vehicle is, rear axle, scenario coordinates.
+    :param vehicle: its parameters.
+    :raises PlanningError: if there is no road to follow.
+    """
+
+    def __init__(self, scenario: Scenario, problem: PlanningProblem | None, start: VehicleState,
+                 vehicle: VehicleParameters) -> None:
+        self._scenario, self._problem, self._vehicle = scenario, problem, vehicle
+        self._replanned = False
+        self._plan(start)
+
+    def restart(self, state: VehicleState) -> None:
+        """Begin another drive over the same route."""
+        if self._replanned:
+            self._plan(state)
+        self._s = self._search(state)
+
+    def follow(self, state: VehicleState) -> RoutePlace:
+        """Give where the vehicle is now, which it was near before."""
+        path, before = self.driving.path, self._s
+        s, d, heading = path.locate(state.x, state.y, before)
+        if not (abs(d) < LOST and abs(s - before) < JUMP):
+            s, d, heading = path.locate(state.x, state.y, self._search(state))
+        progress = s - before
+        if math.isinf(self.driving.end_s) and s > path.length - RESERVE:
+            self._plan(state)
+            self._replanned = True
+            path = self.driving.path
+            s, d, heading = path.locate(state.x, state.y, self._s)
+        self._s = s
+        row = min(max(round(s / path.step), 0), len(self._limits) - 1)
+        return RoutePlace(
+            s, d, wrap_pi(state.yaw - heading), path.curvature_at(s), self._limits[row],
+            min(max(self._goal_s - s, 0.0), FAR), progress)
+
+    def _plan(self, state: VehicleState) -> None:
+        problem = self._problem
+        self.driving: DrivingPath = plan_driving_path(
+            self._scenario, problem, state, self._vehicle, follow_lane=problem is None)
+        usual = max(SLOWEST_DESIRED, abs(state.speed)) if problem is None \
+            else default_speed(problem)
+        self._limits: list[float] = desired_speeds(self.driving, None, usual).tolist()
+        self._goal_s = _goal(self.driving, problem)
+        self._replanned = False
+        self._s = self._search(state)
+
+    def _search(self, state: VehicleState) -> float:
+        s, _ = self.driving.path.project(np.array([[state.x, state.y]]))
+        return float(s[0])
+
+
+def _goal(driving: DrivingPath, problem: PlanningProblem | None) -> float:
+    """Give the arc length at which the route comes to its goal; inf without one."""
+    if problem is None or not driving.reaches_goal:
+        return math.inf
+    path = driving.path
+    ahead = path.s >= driving.start_s
+    for state in problem.goal.state_list:
+        position = getattr(state, 'position', None)
+        if isinstance(position, Shape):
+            inside = shapely.intersects_xy(goal_area(position), *path.points.T)
+            found = np.flatnonzero(ahead & inside)
+            if len(found):
+                return float(path.s[found[0]])
+    goals = goal_lanelets(driving.roads, problem)
+    return min((first for lanelet, (first, _) in zip(
+        driving.lanelets, driving.lanelet_spans.tolist(), strict=True) if lanelet in goals),
+        default=math.inf)
+
+
+def goal_area(position: Shape) -> shapely.Geometry:
+    """Give the area of a goal's position."""
+    return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))

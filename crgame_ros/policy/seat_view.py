@@ -1,0 +1,113 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The world around one driven vehicle, as a policy that drives it is told of it."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from crgame_ros.game.objects import ObjectDescription, ObjectStates
+from crgame_ros.geometry.reference_point import shifted, shifted_velocities
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.messages.plan import PlanRequest
+from crgame_ros.vehicle.state import pose_rates, VehicleState
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Surrounded(NamedTuple):
+    """
+    A vehicle among the things around it, in scenario coordinates.
+
+    :param state: of its rear axle.
+    :param poses: (N, 3) centres of all things; NaN where absent
+    :param velocities: (N, 3)
+    """
+
+    state: VehicleState
+    poses: Array
+    velocities: Array
+
+
+class RequestView:
+    """
+    Reads a plan request as a policy is told of it.
+
+    :param vehicle_id: of the AV that asks.
+    :param objects: description of everything that may appear in a request, by id.
+    """
+
+    def __init__(self, vehicle_id: str, objects: Mapping[str, ObjectDescription]) -> None:
+        # In the order of `Surrounded.poses`.
+        self.things = tuple(item for key, item in objects.items() if key != vehicle_id)
+        self._rows = {item.id: row for row, item in enumerate(self.things)}
+
+    def of(self, request: PlanRequest) -> Surrounded:
+        """Give what is around the AV at the time of the request; the predictions stay unread."""
+        poses, velocities = np.full((2, len(self.things), 3), np.nan)
+        rows = [self._rows[name] for name in request.obstacle_ids]
+        poses[rows], velocities[rows] = request.obstacle_poses[0], request.obstacle_velocities[0]
+        return Surrounded(request.ego, poses, velocities)
+
+
+class SeatView:
+    """
+    Looks at a world from one of its driven vehicles.
+
+    :param row: of the vehicle among the driven ones.
+    :param driven: (V) all driven vehicles.
+    :param others: (M) everything else that can appear.
+    :param transform: from simulation to scenario coordinates, where its road is.
+    """
+
+    def __init__(self, row: int, driven: Sequence[ObjectDescription],
+                 others: Sequence[ObjectDescription], transform: RigidTransform) -> None:
+        self._row, self._transform = row, transform
+        self._rows = np.array([i for i in range(len(driven)) if i != row], dtype=np.intp)
+        self._to_center = np.array([driven[i].rear_to_center for i in self._rows])
+        # In the order of `Surrounded.poses`.
+        self.things = (*(driven[i] for i in self._rows), *others)
+
+    def own(self, states: Array) -> VehicleState:
+        """Give the vehicle's own state of all states (V, 8) in simulation coordinates."""
+        state = VehicleState(*states[self._row].tolist())
+        if self._transform.is_identity:
+            return state
+        x, y, yaw = self._transform.to_scenario(states[self._row, :3]).tolist()
+        return state._replace(x=x, y=y, yaw=yaw)
+
+    def of(self, states: Array, objects: ObjectStates) -> Surrounded:
+        """
+        Give what is around it.
+
+        :param states: (V, 8) rear axles, simulation coordinates
+        :param objects: (M) at the same time.
+        """
+        poses, velocities = objects.poses, objects.velocities
+        if len(self._rows):
+            others = states[self._rows]
+            centers = shifted(others[:, :3], self._to_center)
+            rates = shifted_velocities(others[:, 2], pose_rates(others), self._to_center)
+            poses, velocities = (np.concatenate(pair) for pair in (
+                (centers, poses), (rates, velocities)))
+        if not self._transform.is_identity:
+            poses, velocities = self._transform.to_scenario(poses), velocities.copy()
+            velocities[:, :2] = self._transform.turn_to_scenario(velocities[:, :2])
+        return Surrounded(self.own(states), poses, velocities)
+
+    def in_simulation(self, poses: Array) -> Array:
+        """Give poses (..., 3) of the road's coordinates in those of the simulation."""
+        return poses if self._transform.is_identity else self._transform.to_simulation(poses)

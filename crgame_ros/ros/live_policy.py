@@ -1,0 +1,130 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A human's seat that a policy drives in a live run."""
+
+from collections.abc import Callable
+
+from crgame_ros.drivability.monitor import road_transforms
+from crgame_ros.driver.source import DriverSource
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.policy.policy_driver import DrivenSeat, PolicyDriver
+from crgame_ros.policy.policy_file import load_policy
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
+from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+
+
+class PolicyWorld:
+    """
+    The run that a policy looks at; a node has one, whoever drives.
+
+    :param endpoints: of the node.
+    """
+
+    def __init__(self, endpoints: Endpoints) -> None:
+        self._documents = ScenarioDocuments(endpoints)
+        self._world = WorldFollower(endpoints, '/vehicles/state', self._again)
+        self.scenario: ScenarioSet | None = None
+        self._begin: Callable[[], object] = lambda: None
+
+    def follow(self, begin: Callable[[], object]) -> None:
+        """Call somebody where a run begins, from now on."""
+        self._begin = begin
+
+    def steps(self) -> list[WorldStep]:
+        """
+        Take what has come.
+
+        :raises CrgameError: if a document cannot be used.
+        """
+        scenario = self._documents.poll()
+        if scenario is not None:
+            self.scenario = scenario
+            self._world.begin(scenario)
+            self._begin()
+        if self.scenario is None:
+            self._world.drop()
+        return list(self._world.steps())
+
+    def _again(self) -> None:
+        """Begin the same run anew: a recording is played once more."""
+        if self.scenario is not None:
+            self._world.begin(self.scenario)
+            self._begin()
+
+
+class LivePolicyDriver(DriverSource):
+    """
+    Drives as the policy of `policy:FILE.py:load` says, on the states that sim_node publishes.
+
+    A policy that fails is told as a problem of the seat, which then brakes as for a lost device.
+
+    :param name: `FILE.py:load`.
+    :param vehicle_id: of the seat.
+    :param world: of the node.
+    :raises InputError: if there is no such policy.
+    """
+
+    is_looking = True
+
+    def __init__(self, name: str, vehicle_id: str, world: PolicyWorld) -> None:
+        self._policy = load_policy(name, vehicle_id)
+        self._vehicle_id, self._world = vehicle_id, world
+        self._driver: PolicyDriver | None = None
+        self._latest_n = -1
+        world.follow(self._begin)
+        if world.scenario is not None:
+            self._begin()
+
+    @property
+    def connected(self) -> bool:
+        """Whether the policy has seen the run and can drive."""
+        return self._driver is not None and self._latest_n >= 0 and self.problem is None
+
+    def poll(self, now_s: float) -> bool:
+        """Look at what has happened since, and decide at scenario steps."""
+        decided = False
+        try:
+            for step in self._world.steps():
+                if self._driver is not None:
+                    self._driver.see(step.n, step.states, step.objects if step.tick else None)
+                    self._latest_n, decided = step.n, decided or step.tick
+        except Exception as error:
+            # A user's code may raise anything; its seat must not stay in its hands.
+            text = str(error) if isinstance(error, CrgameError) else f'{type(error).__name__}: ' \
+                f'{error}'
+            self.problem = InputError(f'the policy has failed ({text})', self._vehicle_id,
+                                      'mend it and reset the run')
+        return decided
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """Give the command of the action in force."""
+        return RELEASED if self._driver is None else self._driver.command(n, dt_s)
+
+    def _begin(self) -> None:
+        """Take the seat in a run."""
+        scenario = self._world.scenario
+        assert scenario is not None
+        self._driver, self._latest_n, self.problem = None, -1, None
+        game, ids = scenario.game, [item.id for item in scenario.driven]
+        human = game.human(self._vehicle_id)
+        if human is None:
+            return
+        row = ids.index(human.id)
+        transforms = road_transforms(len(game.humans), [av.transform for av in game.avs])
+        self._driver = PolicyDriver(self._policy, DrivenSeat(
+            row, scenario.driven, scenario.others, scenario.loaded.scenario, human.vehicle,
+            human.state, transforms[row], game.scheduler.steps_per_tick))

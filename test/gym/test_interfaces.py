@@ -1,0 +1,134 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The interfaces of Gymnasium and PettingZoo, by their own checkers, of every environment."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from crgame_ros.errors import InputError
+from crgame_ros.gym.driving_env import DrivingEnv
+from crgame_ros.gym.games_together import GamesTogether
+from crgame_ros.gym.parallel_env import ParallelDrivingEnv
+from crgame_ros.gym.shipped_environments import ANY_GAME, environment_id, shipped_games
+import gymnasium
+from gymnasium.utils.env_checker import check_env
+import numpy as np
+from pettingzoo.test import parallel_api_test
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.filterwarnings('error')
+
+
+@pytest.mark.parametrize('game', shipped_games())
+def test_gymnasium_accepts_every_environment(game: str) -> None:
+    # The checker begins a dozen episodes: they share a placement of traffic.
+    check_env(gymnasium.make(environment_id(game), worlds=1).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize('game', shipped_games())
+def test_pettingzoo_accepts_every_game_with_all_its_seats(game: str) -> None:
+    parallel_api_test(ParallelDrivingEnv(game=game, duration=1.0, worlds=1), num_cycles=12)
+
+
+@pytest.mark.parametrize('keywords', [
+    {'seat': 'hv0'}, {'seat': 'hv0', 'action': 'pedals'}, {'action': 'pedals'},
+    {'observation': {'parts': ['lidar', 'state'], 'rays': 8}}, {'ticks': 5},
+    {'vary': {'speed': 3.0, 'along': 10.0}}, {'reward': {'ttc': -1.0, 'a_req': -0.1}}])
+def test_gymnasium_accepts_every_choice(keywords: dict[str, object]) -> None:
+    check_env(gymnasium.make('crgame/Merge-v0', **keywords).unwrapped, skip_render_check=True)
+
+
+# Its own warning: a plan is no vector that could be normalised.
+@pytest.mark.filterwarnings('ignore:.*normalized space')
+def test_gymnasium_accepts_plans_and_perception() -> None:
+    check_env(gymnasium.make('crgame/Fog-v0', action='plan').unwrapped, skip_render_check=True)
+    check_env(gymnasium.make('crgame/OccludedPedestrian-v0', action='pedals').unwrapped,
+              skip_render_check=True)
+
+
+@pytest.mark.parametrize(('keywords', 'said'), [
+    ({'game': 'no_game'}, 'no_game'), ({}, 'a game or a scenario'),
+    ({'game': 'cut_in', 'scenario': 'x.xml'}, 'one of them'),
+    ({'game': 'cut_in', 'seat': 'av7'}, 'take one of hv0, av0'),
+    ({'game': 'cut_in', 'seat': 'hv0', 'action': 'plan'}, 'by pedals, not by plans'),
+    ({'game': 'cut_in', 'action': 'fly'}, 'acceleration, pedals, plan'),
+    ({'game': 'cut_in', 'reward': {'joy': 1.0}}, 'there is no term "joy"'),
+    ({'game': 'cut_in', 'reward': {'goal': float('nan')}}, 'finite'),
+    ({'game': 'cut_in', 'ends': ['boredom']}, 'collision, off_road, goal'),
+    ({'game': 'cut_in', 'observation': {'part': []}}, 'unknown'),
+    ({'game': 'cut_in', 'vary': {'speed': -1.0}}, 'speed'),
+    ({'game': 'cut_in', 'duration': 0.0}, 'positive'), ({'game': 'cut_in', 'ticks': 0}, 'ticks'),
+    ({'game': 'cut_in', 'worlds': 0}, 'worlds'),
+    ({'game': 'cut_in', 'drivers': {'hv7': 'idle'}}, 'hv7'),
+    ({'game': 'cut_in', 'render_mode': 'ansi'}, 'rgb_array')])
+def test_wrong_keywords_are_refused_in_a_line(keywords: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        DrivingEnv(**keywords)
+
+
+def test_games_together_are_the_same_as_one_after_the_other() -> None:
+    keywords = {'game': 'merge', 'duration': 4.0, 'vary': {'speed': 4.0, 'along': 20.0}}
+    together = GamesTogether(3, **keywords)
+    apart = gymnasium.make_vec(ANY_GAME, 3, vectorization_mode='sync', **keywords)
+    action = np.random.default_rng(0).uniform(-0.3, 0.3, (60, 3, 2)).astype(np.float32)
+    first, second = together.reset(seed=5), apart.reset(seed=5)
+    # Each game ends on the way and begins anew.
+    for given in (*action, None):
+        for part, values in first[0].items():
+            assert (values == second[0][part]).all()
+        for one, other in zip(first[1:-1], second[1:-1], strict=True):
+            assert (one == other).all()
+        assert first[-1].keys() == second[-1].keys()
+        if given is not None:
+            first, second = together.step(given), apart.step(given)
+    assert first[-1]['time_s'].max() < 2.1
+
+
+def test_processes_give_the_same_episodes_as_one() -> None:
+    keywords = {'game': 'cut_in', 'vary': {'speed': 2.0}}
+    together = gymnasium.make_vec(ANY_GAME, 2, **keywords)
+    assert isinstance(together, GamesTogether)
+    apart = gymnasium.make_vec(ANY_GAME, 2, vectorization_mode='async', **keywords)
+    action = np.array(((0.2, 0.0), (-0.3, 0.01)), np.float32)
+    try:
+        for environment in (together, apart):
+            environment.reset(seed=3)
+        for _ in range(5):
+            first, second = together.step(action), apart.step(action)
+            for part, values in first[0].items():
+                assert (values == second[0][part]).all()
+            assert first[1] == pytest.approx(second[1], abs=0.0)
+    finally:
+        apart.close()
+
+
+def test_the_tables_in_the_document_are_up_to_date() -> None:
+    done = subprocess.run([sys.executable, ROOT / 'scripts' / 'make_gym_docs.py', '--check'],
+                          env=os.environ | {'PYTHONPATH': str(ROOT)}, capture_output=True,
+                          text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_package_says_what_to_install_where_gymnasium_is_missing() -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', 'import sys; sys.modules["gymnasium"] = None\n'
+         'import crgame_ros.cli, crgame_ros.policy.policy_planner\n'
+         'try:\n    import crgame_ros.gym\nexcept ImportError as e:\n    print(e)'],
+        capture_output=True, text=True, check=True)
+    assert done.stdout == ('crgame_ros.gym needs the package gymnasium, which is not installed: '
+                           "pip install 'crgame_ros[gym]'\n")

@@ -1,0 +1,82 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Policies for tests, named in games as policy:…/policies.py:FUNCTION."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from crgame_ros.policy.policy_file import Policy
+import numpy as np
+from numpy.typing import NDArray
+
+HERE = Path(__file__)
+
+
+def follow_lane(seen: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+    """Steer back to the route and hold 0.8 of the speed limit; brake for who is ahead."""
+    speed, _, _, _, offset, heading, curvature, limit, _ = seen['state'].tolist()
+    wanted = curvature - 0.02 * offset - 0.3 * heading
+    share = wanted / min(0.6, 5.0 / max(speed * speed, 1e-6))
+    pedal = 0.2 * (0.8 * limit - speed)
+    ahead = seen['objects']
+    near = (ahead[:, 0] > 0.5) & (ahead[:, 1] > 0.0) & (np.abs(ahead[:, 2]) < 2.0)
+    if near.any():
+        gap = float(ahead[near, 1].min()) - 8.0
+        pedal = min(pedal, 0.1 * (gap - 1.5 * speed))
+    return np.clip(np.array((pedal, share), np.float32), -1.0, 1.0)
+
+
+def acceleration() -> Policy:
+    """Drive by acceleration and curvature."""
+    return Policy(follow_lane)
+
+
+def every_third() -> Policy:
+    """Decide at every third scenario step."""
+    return Policy(follow_lane, ticks=3)
+
+
+def by_pedals() -> Policy:
+    """Hold half the throttle and the wheel a little to the left."""
+    return Policy(lambda seen: np.array((0.5, 0.01), np.float32), 'pedals')
+
+
+def by_plans() -> Policy:
+    """Plan straight on at the present speed."""
+    def act(seen: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        speed = float(seen['state'][0])
+        plan = np.zeros((10, 4), np.float32)
+        plan[:, 0] = speed * 0.1 * np.arange(1, 11)
+        plan[:, 3] = speed
+        return plan
+    return Policy(act, 'plan')
+
+
+def with_lidar() -> Policy:
+    """Look at the lidar alone."""
+    return Policy(lambda seen: np.array((float(seen['lidar'].min() > 20.0), 0.0), np.float32),
+                  observation={'parts': ['lidar'], 'rays': 12})
+
+
+def failing() -> Policy:
+    """Fail at the first question."""
+    def act(seen: Mapping[str, NDArray[np.float32]]) -> None:
+        raise RuntimeError('no weights')
+    return Policy(act)
+
+
+def nothing() -> int:
+    """Give what is no policy."""
+    return 3
