@@ -44,6 +44,8 @@ class SummaryMeasure(NamedTuple):
     :param empty: what an empty value counts as; NaN leaves its row out.
     :param where: another column that has to be known, or the row is left out; empty for none.
     :param what: its definition in a sentence; empty where that of the column says it.
+    :param most: greater values count as this one: they come of speeds that are almost equal, or
+        of gaps that are almost closed, and a mean would be of them alone.
     """
 
     name: str
@@ -55,6 +57,7 @@ class SummaryMeasure(NamedTuple):
     empty: float = math.nan
     where: str = ''
     what: str = ''
+    most: float = math.inf
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -81,7 +84,8 @@ class SummaryMeasure(NamedTuple):
         column = _NUMERIC.get(self.column)
         what = self.column if column is None else column.definition
         if not self.test:
-            return what
+            return what if math.isinf(self.most) \
+                else f'{what}; greater ones count as {self.most:g}'
         condition = (f'is {self.test}' if self.test in ('known', 'true')
                      else f'is {self.test} {self.limit:g}')
         return f'share of AVs of which {self.column} {condition} ({what})'
@@ -98,7 +102,7 @@ class SummaryMeasure(NamedTuple):
         missing = np.isnan(numbers)
         if not self.test:
             # The mean of something infinite says nothing.
-            return np.where(np.isfinite(numbers), numbers, self.empty)
+            return np.where(np.isfinite(numbers), np.minimum(numbers, self.most), self.empty)
         with np.errstate(invalid='ignore'):
             passed = {'<': numbers < self.limit, '>': numbers > self.limit, 'known': ~missing,
                       'true': numbers > 0.0}[self.test]
@@ -131,10 +135,10 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('time_to_collision', 'nuPlan: time to collision', 'score_time_to_collision', 1),
     SummaryMeasure('speed_limit', 'nuPlan: speed limit', 'score_speed_limit', 1),
     SummaryMeasure('comfort', 'nuPlan: comfort', 'score_comfort', 1),
-    SummaryMeasure('worst_ttc', 'least TTC', 'worst_ttc', 1),
-    SummaryMeasure('worst_thw', 'least THW', 'worst_thw', 1),
+    SummaryMeasure('worst_ttc', 'least TTC, 20 s at most', 'worst_ttc', 1, most=20.0),
+    SummaryMeasure('worst_thw', 'least THW, 20 s at most', 'worst_thw', 1, most=20.0),
     SummaryMeasure('worst_min_distance', 'least distance', 'worst_min_distance', 1),
-    SummaryMeasure('worst_drac', 'greatest DRAC', 'worst_drac', -1),
+    SummaryMeasure('worst_drac', 'greatest DRAC, 20 m/s² at most', 'worst_drac', -1, most=20.0),
     SummaryMeasure('worst_pet_s', 'least PET', 'worst_pet_s', 1),
     SummaryMeasure('tet_s', 'time with a critical TTC', 'tet_s', -1),
     SummaryMeasure('tit', 'TTC below its threshold, over time', 'tit', -1),

@@ -15,6 +15,7 @@
 """Evaluations summed up, beside numbers that are got in another way."""
 
 from collections.abc import Sequence
+import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
@@ -22,6 +23,7 @@ from crgame_ros.evaluation.summary.cell_block import CellBlocks
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Estimate, Summary
+from crgame_ros.evaluation.summary.summary_measures import MEASURES
 from evaluation_rows import Evaluation, many
 import numpy as np
 import pyarrow as pa
@@ -290,3 +292,10 @@ def test_a_folder_that_is_no_evaluation_is_refused(tmp_path: Path) -> None:
     pq.write_table(table.drop_columns(['role']), part)
     with pytest.raises(InputError, match='has no column role'):
         summarise(folder)
+
+
+def test_what_comes_of_almost_equal_speeds_does_not_make_the_mean() -> None:
+    ttc = MEASURES['worst_ttc']
+    values = ttc.values(np.array([2.0, 9.0, 3e14, math.nan, math.inf]))
+    assert np.array_equal(values, [2.0, 9.0, 20.0, math.nan, math.nan], equal_nan=True)
+    assert ttc.definition.endswith('greater ones count as 20')
