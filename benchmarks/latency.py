@@ -71,7 +71,7 @@ def input_latency(folder: Path, turns: int) -> None:
         control.close()
         graph.kill()
     p50, p99, worst = np.percentile(times, [50, 99, 100])
-    print(f'{"input to odometry":34}{p50:9.2f}{p99:9.2f}{worst:9.2f}  p50 <= 11, p99 <= 20   '
+    print(f'{"input to odometry":34}{p50:9.2f}{p99:9.2f}{worst:9.2f}  p50 <= 6, p99 <= 11    '
           f'({len(times)} turns, {lost} unanswered)')
 
 

@@ -33,6 +33,7 @@ from crgame_ros.ros.other_simulation import refuse_another
 from crgame_ros.ros.place import held
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.timing.kept_memory import keep_freed_memory, lock_memory
 from crgame_ros.timing.time_slice import shorten_time_slice
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -74,8 +75,9 @@ class SimNode(Node):
                                                 else 0.0))
         if self._control.wants_realtime_priority:
             self._raise_priority()
-        else:
-            shorten_time_slice()
+        keep_freed_memory()
+        # Where it is refused, pages that the system takes back are seen among the causes.
+        lock_memory()
         self._control.paused = self._control.starts_paused
         epoch, offset_ns = 0, FIRST_OFFSET_NS
         while True:
@@ -164,6 +166,8 @@ class SimNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node."""
+    # The middleware's threads take it over: what comes in must not wait for others either.
+    shorten_time_slice()
     run_node(SimNode, args)
 
 

@@ -170,28 +170,27 @@ class SimOutputs:
             String(data=events_document(self._epoch, fired)))
 
     def publish_step(self, simulation: Simulation, result: StepResult) -> None:
-        """Publish a step: requests first, for planners have the least time to lose."""
+        """Publish a step: first what drivers see their input in, then requests to planners."""
+        due = result.n % self.publish_every == 0 or result.tick
+        stamp_ns = simulation.scheduler.stamp_ns(result.n)
+        if due and not self.frames_skipped:
+            for vehicle, state in zip(self._vehicles, simulation.states, strict=True):
+                if vehicle.wanted:
+                    vehicle.publish(state, stamp_ns)
         if result.fired:
             # It may change the planner that the request is for.
             self.publish_events(simulation.fired)
         for av_id, request in result.requests.items():
             self._publish_request(av_id, request)
-        due = result.n % self.publish_every == 0
-        if not due and not result.tick:
+        if not due:
             return
-        stamp_ns = simulation.scheduler.stamp_ns(result.n)
-        states = simulation.states
         self.publish_clock(stamp_ns)
         if result.objects is not None:
             self._publish_objects(result.objects, stamp_ns)
             self._publish_signals(result.k)
             for vehicle in self._vehicles:
                 vehicle.look_for_subscribers()
-        self._publish_states(states, stamp_ns, result.objects is not None)
-        if not self.frames_skipped:
-            for vehicle, state in zip(self._vehicles, states, strict=True):
-                if vehicle.wanted:
-                    vehicle.publish(state, stamp_ns)
+        self._publish_states(simulation.states, stamp_ns, result.objects is not None)
 
     @property
     def listeners(self) -> int:
