@@ -316,7 +316,12 @@ class LiveRun:
         if simulation.scheduler.is_tick(simulation.n + 1):
             self._take_triggers()
         watch.mark(Phase.STEP)
-        result = simulation.step(cycle.dt_eff_s, commands)
+        simulation.move(cycle.dt_eff_s, commands)
+        if outputs.shows_vehicles(simulation):
+            watch.mark(Phase.PUBLISH)
+            outputs.publish_vehicles(simulation)
+            watch.mark(Phase.STEP)
+        result = simulation.conclude()
         watch.mark(Phase.PUBLISH)
         outputs.publish_step(simulation, result)
         if result.tick:

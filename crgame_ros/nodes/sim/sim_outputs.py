@@ -169,21 +169,28 @@ class SimOutputs:
         self._latched['/scenario/events'].publish(
             String(data=events_document(self._epoch, fired)))
 
+    def shows_vehicles(self, simulation: Simulation) -> bool:
+        """Tell whether anybody is to see where the vehicles have moved to, each by itself."""
+        return not self.frames_skipped and any(item.wanted for item in self._vehicles) and (
+            simulation.n % self.publish_every == 0 or simulation.scheduler.is_tick(simulation.n))
+
+    def publish_vehicles(self, simulation: Simulation) -> None:
+        """Publish each vehicle by itself, before all else: drivers see in it what they did."""
+        stamp_ns = simulation.scheduler.stamp_ns(simulation.n)
+        for vehicle, state in zip(self._vehicles, simulation.states, strict=True):
+            if vehicle.wanted:
+                vehicle.publish(state, stamp_ns)
+
     def publish_step(self, simulation: Simulation, result: StepResult) -> None:
-        """Publish a step: first what drivers see their input in, then requests to planners."""
-        due = result.n % self.publish_every == 0 or result.tick
-        stamp_ns = simulation.scheduler.stamp_ns(result.n)
-        if due and not self.frames_skipped:
-            for vehicle, state in zip(self._vehicles, simulation.states, strict=True):
-                if vehicle.wanted:
-                    vehicle.publish(state, stamp_ns)
+        """Publish a step: requests first, for planners have the least time to lose."""
         if result.fired:
             # It may change the planner that the request is for.
             self.publish_events(simulation.fired)
         for av_id, request in result.requests.items():
             self._publish_request(av_id, request)
-        if not due:
+        if result.n % self.publish_every and not result.tick:
             return
+        stamp_ns = simulation.scheduler.stamp_ns(result.n)
         self.publish_clock(stamp_ns)
         if result.objects is not None:
             self._publish_objects(result.objects, stamp_ns)
