@@ -25,7 +25,8 @@ from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import dump_game
-from crgame_ros.nodes.sim.live_run import LiveRun, Outcome
+from crgame_ros.nodes.sim.live_run import LiveRun
+from crgame_ros.nodes.sim.outcome import Outcome
 from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.node_main import run_node, StopFlag

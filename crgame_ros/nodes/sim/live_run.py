@@ -15,16 +15,16 @@
 """One epoch of a live run: from the request of k0 to the end, a reset or a stop."""
 
 from dataclasses import replace
-from enum import auto, Enum
 import gc
 import time
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
+from crgame_ros.nodes.sim.outcome import Outcome
 from crgame_ros.nodes.sim.pacer import NS_PER_S, Pacer
 from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
-from crgame_ros.nodes.sim.run_state import RunState, SIGNAL
+from crgame_ros.nodes.sim.run_state import RunState
 from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.nodes.sim.sim_inputs import SimInputs
 from crgame_ros.nodes.sim.sim_outputs import SimOutputs
@@ -45,14 +45,6 @@ if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to
     from crgame_ros.recording.recorded_inputs import RecordedInputs
 
 SETTLE_NS = 200_000_000
-
-
-class Outcome(Enum):
-    """Why an epoch ended."""
-
-    FINISHED = auto()
-    RESET = auto()
-    STOPPED = auto()
 
 
 class LiveRun:
@@ -108,7 +100,7 @@ class LiveRun:
             self._settle()
         outcome = self._wait_for_companions(result)
         if outcome is not None:
-            self._reason = self._reason or self._reason_for(outcome)
+            self._reason = self._reason or outcome.reason(self._stop.requested)
             self._state.tell('ended', self._reason)
             return outcome
         if not self._watch.tells_waiting:
@@ -124,7 +116,7 @@ class LiveRun:
             self._inputs.forgive(now_ns)
             with self._watch:
                 outcome = self._loop()
-            self._reason = self._reason or self._reason_for(outcome)
+            self._reason = self._reason or outcome.reason(self._stop.requested)
             return outcome
         finally:
             gc.enable()
@@ -146,12 +138,6 @@ class LiveRun:
             self._take_orders(time.monotonic_ns())
         control.over = False
         return Outcome.STOPPED if self._stop.requested else Outcome.RESET
-
-    def _reason_for(self, outcome: Outcome) -> str:
-        """Say why the run has ended: duration, reset, stop, or signal."""
-        if outcome is Outcome.STOPPED:
-            return SIGNAL if self._stop.requested else 'stop'
-        return 'duration' if outcome is Outcome.FINISHED else 'reset'
 
     def destroy(self) -> None:
         """Release the endpoints."""
