@@ -85,6 +85,8 @@ class LiveRun:
         self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
         self._feed = feed
         self._second = max(1, round(1.0 / self._dt_s))
+        # The step from which on all AVs and seats are reported on again.
+        self._report_n = self._second
         self._setup = setup
         self._stop = StopFlag()
         self._reason = ''
@@ -122,7 +124,7 @@ class LiveRun:
             gc.enable()
             gc.unfreeze()
             self._outputs.publish_rows()
-            self._diagnostics.publish(self.simulation.n)
+            self._diagnostics.publish()
             self._state.tell('ended', self._reason)
             self._outputs.wait_until_received()
 
@@ -312,6 +314,8 @@ class LiveRun:
         outputs.publish_step(simulation, result)
         if result.tick:
             self._at_tick(result)
+        if not result.tick or simulation.scheduler.steps_per_tick == 1:
+            self._report(result.n)
         self._control.count_step(simulation.scheduler.steps_per_tick)
         if outputs.rows.full:
             outputs.publish_rows()
@@ -322,7 +326,6 @@ class LiveRun:
 
     def _at_tick(self, result: StepResult) -> None:
         """Do what is due with the scenario's time."""
-        self._state.tell('running')
         for event in result.fired:
             self._node.get_logger().info(
                 f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
@@ -331,5 +334,10 @@ class LiveRun:
         order = self._inputs.frame_skip_order()
         if order is not None:
             self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping
-        if result.n % self._second < self.simulation.scheduler.steps_per_tick:
-            self._diagnostics.publish(result.n)
+
+    def _report(self, n: int) -> None:
+        """Tell how the run is, little by little, in steps that have no tick's work to do."""
+        self._state.tell('running')
+        if not self._diagnostics.tell_next() and n >= self._report_n:
+            self._report_n = n + self._second
+            self._diagnostics.begin()

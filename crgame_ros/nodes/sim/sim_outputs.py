@@ -60,6 +60,7 @@ class VehicleOutputs:
         self.publishers = [endpoints.publisher(name, vehicle_id)
                            for name in ('/<v>/odom', '/<v>/joint_states', '/<v>/accel')]
         self.wanted = False
+        self._listened_to = [False] * len(self.publishers)
         self._odom = Odometry(child_frame_id=f'{vehicle_id}/base_link')
         self._odom.header.frame_id = MAP
         self._odom.pose.covariance = self._odom.twist.covariance = \
@@ -70,25 +71,30 @@ class VehicleOutputs:
 
     def look_for_subscribers(self) -> None:
         """Find out whether anybody listens."""
-        self.wanted = any(item.get_subscription_count() for item in self.publishers)
+        self._listened_to = [item.get_subscription_count() > 0 for item in self.publishers]
+        self.wanted = any(self._listened_to)
 
     def publish(self, state: VehicleState, stamp_ns: int) -> None:
         """Publish the vehicle's state in the types that ROS tools expect."""
-        odom = self._odom
-        set_time(odom.header.stamp, stamp_ns)
-        odom.pose.pose.position.x, odom.pose.pose.position.y = state.x, state.y
-        odom.pose.pose.orientation.z = math.sin(0.5 * state.yaw)
-        odom.pose.pose.orientation.w = math.cos(0.5 * state.yaw)
-        odom.twist.twist.linear.x = state.speed
-        odom.twist.twist.angular.z = state.yaw_rate
-        self.publishers[0].publish(odom)
-        set_time(self._joints.header.stamp, stamp_ns)
-        self._joints.position = [state.steering_angle]
-        self._joints.velocity = [state.steering_rate]
-        self.publishers[1].publish(self._joints)
-        set_time(self._accel.header.stamp, stamp_ns)
-        self._accel.accel.linear.x = state.acceleration
-        self.publishers[2].publish(self._accel)
+        for_odom, for_joints, for_accel = self._listened_to
+        if for_odom:
+            odom = self._odom
+            set_time(odom.header.stamp, stamp_ns)
+            odom.pose.pose.position.x, odom.pose.pose.position.y = state.x, state.y
+            odom.pose.pose.orientation.z = math.sin(0.5 * state.yaw)
+            odom.pose.pose.orientation.w = math.cos(0.5 * state.yaw)
+            odom.twist.twist.linear.x = state.speed
+            odom.twist.twist.angular.z = state.yaw_rate
+            self.publishers[0].publish(odom)
+        if for_joints:
+            set_time(self._joints.header.stamp, stamp_ns)
+            self._joints.position = [state.steering_angle]
+            self._joints.velocity = [state.steering_rate]
+            self.publishers[1].publish(self._joints)
+        if for_accel:
+            set_time(self._accel.header.stamp, stamp_ns)
+            self._accel.accel.linear.x = state.acceleration
+            self.publishers[2].publish(self._accel)
 
 
 class SimOutputs:

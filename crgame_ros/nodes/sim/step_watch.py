@@ -17,6 +17,7 @@
 import gc
 import signal
 import time
+from types import FrameType
 from typing import Any
 
 from crgame_ros.timing.late_step import (
@@ -58,6 +59,7 @@ class StepWatch:
         self._collected_so_far_ns = 0
         self._continued = False
         self._stolen = self._counters.stolen()
+        # Who else wants to know of the signal.
         self._before: Any = None
 
     def __enter__(self) -> 'StepWatch':
@@ -143,5 +145,7 @@ class StepWatch:
         else:
             self._collected_so_far_ns += now_ns - self._collecting_since_ns
 
-    def _on_continued(self, _number: int, _frame: object) -> None:
+    def _on_continued(self, number: int, frame: FrameType | None) -> None:
         self._continued = True
+        if callable(self._before):
+            self._before(number, frame)
