@@ -66,10 +66,6 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
     """
     Start a node in a process group of its own.
 
-    Who steps back behind nobody has a session of its own, too. Where the kernel shares processors
-    out among sessions first (sched_autogroup, see sched(7)), what its companions use up would
-    otherwise be held against it: it would wait for hundreds of milliseconds behind strangers.
-
     :param module: in which it is; its `main` is called.
     :param arguments: of its command line.
     :param nice: how far it steps back behind the simulation.
@@ -88,7 +84,7 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
         return pid, reading
     code = 1
     try:
-        _let_go(writing, own_session=nice == 0)
+        _let_go(writing)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         os.environ |= {PARENT_VARIABLE: str(parent), NICE_VARIABLE: str(nice)}
         die_with_parent()
@@ -103,12 +99,9 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
         _end(code)
 
 
-def _let_go(output: int, own_session: bool) -> None:
+def _let_go(output: int) -> None:
     """Give up what is the launcher's: its group, signals, files and terminal."""
-    if own_session:
-        os.setsid()
-    else:
-        os.setpgid(0, 0)
+    os.setpgid(0, 0)
     for number in ENDING:
         signal.signal(number, signal.SIG_DFL)
     nothing = os.open(os.devnull, os.O_RDONLY)

@@ -64,7 +64,8 @@ class NodeProcess:
 
     It gets a process group of its own, so that Ctrl-C reaches the launcher only, which ends the
     nodes in good order; should the launcher be killed, the kernel ends the node
-    (`die_with_parent`), and wakes it for that where it was stopped.
+    (`die_with_parent`), and wakes it for that where it was stopped, for its group has lost its
+    session's parent.
     """
 
     def __init__(self, spec: NodeSpec, namespace: str = '/') -> None:

@@ -28,7 +28,6 @@ from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
 from crgame_ros.ros.seats import GAME
 from crgame_ros.ros.spinning import prompt_executor, spin
-from crgame_ros.timing.time_slice import shorten_time_slice
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
@@ -201,8 +200,6 @@ class DriverNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node."""
-    # The middleware's threads take it over.
-    shorten_time_slice()
     run_node(DriverNode, args)
 
 

@@ -76,6 +76,8 @@ class SimNode(Node):
                                                 else 0.0))
         if self._control.wants_realtime_priority:
             self._raise_priority()
+        else:
+            shorten_time_slice()
         keep_freed_memory()
         # Where it is refused, pages that the system takes back are seen among the causes.
         lock_memory()
@@ -167,8 +169,6 @@ class SimNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node."""
-    # The middleware's threads take it over: what comes in must not wait for others either.
-    shorten_time_slice()
     run_node(SimNode, args)
 
 

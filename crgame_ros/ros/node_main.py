@@ -63,25 +63,13 @@ def die_with_parent() -> None:
     Ask the kernel to end this process when the one that started the graph dies.
 
     Only where that one asked for it (`CRGAME_PARENT_PID`): a node started by hand lives on.
-    Who is stopped at that time is woken for it: by the kernel, for its group is left alone then,
-    or by the signal itself where its group has always been alone in its session.
     """
     parent = os.environ.get(PARENT_VARIABLE)
     if parent is None:
         return
-    last_word = signal.SIGTERM
-    if os.getsid(0) == os.getpid():
-        last_word = signal.SIGCONT
-        signal.signal(last_word, lambda _number, _frame: _end_without(int(parent)))
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, last_word)
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != int(parent):
         sys.exit(f'the process {parent} that started the graph is gone')
-
-
-def _end_without(parent: int) -> None:
-    """End as asked to, if the process that started this one is gone."""
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGTERM)
 
 
 def name_process(name: str) -> None:

@@ -69,10 +69,6 @@ def test_late_steps_of_a_run_are_told_with_their_causes(tmp_path: Path) -> None:
     with Launcher([write_steady_game(tmp_path), '--duration', 6], tmp_path / 'run') as launcher, \
             Peer(launcher.domain, '/diagnostics', '/clock') as peer:
         peer.wait_until(lambda: len(peer.messages['/clock']) > 100, 'the hundredth step')
-        # What its companions use up of the processors is not held against the loop.
-        sessions = {name: os.getsid(pid) for name, pid in launcher.started}
-        assert sessions['sim_node'] == launcher.node('sim_node')
-        assert sessions['recorder_node'] == os.getsid(launcher.pid)
         launcher.freeze('sim_node')
         time.sleep(STOPPED_S)
         launcher.thaw('sim_node')
