@@ -17,7 +17,7 @@
 from contextlib import suppress
 import mmap
 import os
-from resource import getrusage, RUSAGE_THREAD
+from resource import getrusage, RUSAGE_THREAD, struct_rusage
 import threading
 import time
 from typing import NamedTuple
@@ -35,43 +35,50 @@ class ThreadCounts(NamedTuple):
     What a thread has used and gone through so far.
 
     :param wall_ns: the monotonic clock [ns]
-    :param computed_ns: processor time [ns]
-    :param schedule: `schedstat` as the kernel writes it; empty where it does not.
+    :param computed_ns: processor time [ns]; that until it was last put on a processor or a timer's
+        tick came, where the kernel tells `waited_ns`
+    :param waited_ns: time for which it was ready and not run [ns]; None where the kernel does not
+        tell
+    :param runs: how often it was put on a processor.
     :param minor_faults: page faults served from memory.
     :param major_faults: page faults that waited for a disk.
     """
 
     wall_ns: int
     computed_ns: int
-    schedule: bytes
+    waited_ns: int | None
+    runs: int
     minor_faults: int
     major_faults: int
 
-    @property
-    def waited_ns(self) -> int | None:
-        """Time for which it was ready and not run [ns]; None where the kernel does not tell."""
-        fields = self.schedule.split()
-        return int(fields[1]) if len(fields) > 1 else None
+
+# As read, to be made `ThreadCounts` of: the clock, `schedstat`, processor time, and `getrusage`.
+RawCounts = tuple[int, bytes, int, struct_rusage]
 
 
 class ThreadCounters:
     """
-    Reads the counts of the thread that makes it, in 2 µs; files are opened once.
+    Reads the counts of the thread that makes it, in 1.5 µs; files are opened once.
 
-    See proc(5) for `/proc/PID/task/TID/schedstat`: its second number is the run delay.
+    See proc(5) for `/proc/PID/task/TID/schedstat`. The thread's own clock is left alone wherever
+    that file tells: asking for it lets the kernel see that a short time slice is used up, and give
+    the processor to others.
     """
 
     def __init__(self) -> None:
         self._schedule = _opened(f'/proc/self/task/{threading.get_native_id()}/schedstat')
         self._stat = _opened('/proc/stat')
-        self.tells_waiting = self.read().waited_ns is not None
+        if self._schedule is not None and len(os.pread(self._schedule, _LINE, 0).split()) < 3:
+            os.close(self._schedule)
+            self._schedule = None
+        self.tells_waiting = self._schedule is not None
 
-    def read(self) -> ThreadCounts:
-        """Read everything that a step needs."""
-        usage = getrusage(RUSAGE_THREAD)
-        schedule = b'' if self._schedule is None else os.pread(self._schedule, _LINE, 0)
-        return ThreadCounts(time.monotonic_ns(), time.thread_time_ns(), schedule,
-                            usage.ru_minflt, usage.ru_majflt)
+    def read(self) -> RawCounts:
+        """Read everything that a step needs; `counts_of` says what it means."""
+        if self._schedule is None:
+            return (time.monotonic_ns(), b'', time.thread_time_ns(), getrusage(RUSAGE_THREAD))
+        schedule = os.pread(self._schedule, _LINE, 0)
+        return time.monotonic_ns(), schedule, 0, getrusage(RUSAGE_THREAD)
 
     def stolen(self) -> bytes:
         """Read what `stolen_between` compares, in 3 µs and 1 µs for each further processor."""
@@ -83,6 +90,14 @@ class ThreadCounters:
             if descriptor is not None:
                 os.close(descriptor)
         self._schedule = self._stat = None
+
+
+def counts_of(raw: RawCounts) -> ThreadCounts:
+    """Read what a thread has gone through."""
+    wall_ns, schedule, computed_ns, usage = raw
+    fields = [int(field) for field in schedule.split()]
+    computed_ns, waited_ns, runs = fields[:3] if fields else (computed_ns, None, 0)
+    return ThreadCounts(wall_ns, computed_ns, waited_ns, runs, usage.ru_minflt, usage.ru_majflt)
 
 
 def _opened(path: str) -> int | None:

@@ -14,7 +14,9 @@
 # limitations under the License.
 """Watching the loop: where the time of each late step went."""
 
+from collections.abc import Sequence
 import gc
+from itertools import pairwise
 import signal
 import time
 from types import FrameType
@@ -31,7 +33,9 @@ from crgame_ros.timing.late_step import (
     Surroundings,
 )
 from crgame_ros.timing.thread_counters import (
+    counts_of,
     fault_time_ns,
+    RawCounts,
     stolen_between,
     ThreadCounters,
     ThreadCounts,
@@ -53,7 +57,7 @@ class StepWatch:
         self._counters = ThreadCounters()
         self._fault_ns = fault_time_ns()
         self._phases: list[Phase] = []
-        self._counts: list[ThreadCounts] = []
+        self._counts: list[RawCounts] = []
         self._collected_ns: list[int] = []
         self._collecting_since_ns = 0
         self._collected_so_far_ns = 0
@@ -118,25 +122,55 @@ class StepWatch:
         return found
 
     def _explained(self, due_ns: int, late_s: float, factor: float) -> tuple[Causes, Phase]:
-        uses = [self._use(index, due_ns) for index in range(len(self._phases) - 1)]
+        uses = self._uses(due_ns)
         stolen = self._counters.stolen()
         causes = causes_of(uses, late_s / factor * NS_PER_S, Surroundings(
             stolen_between(self._stolen, stolen), self._continued, self._fault_ns))
         self._stolen = stolen
         return Causes(*(time_ns / NS_PER_S * factor for time_ns in causes)), longest_phase(uses)
 
-    def _use(self, index: int, due_ns: int) -> PhaseUse:
-        phase = self._phases[index]
-        before, after = self._counts[index:index + 2]
-        waited = (before.waited_ns, after.waited_ns)
-        lasted_ns = after.wall_ns - before.wall_ns
-        if phase is Phase.WAIT:
-            lasted_ns = max(0, after.wall_ns - max(due_ns, before.wall_ns))
-        return PhaseUse(
-            phase, lasted_ns, after.computed_ns - before.computed_ns,
-            None if waited[0] is None or waited[1] is None else waited[1] - waited[0],
-            self._collected_ns[index + 1] - self._collected_ns[index],
-            after.minor_faults - before.minor_faults, after.major_faults - before.major_faults)
+    def _uses(self, due_ns: int) -> list[PhaseUse]:
+        """Give the phases of the cycle before."""
+        counts = [counts_of(raw) for raw in self._counts]
+        asleep_ns = self._asleep_ns(counts)
+        uses = []
+        for phase, before, after, collected in zip(
+                self._phases, counts, counts[1:], pairwise(self._collected_ns), strict=False):
+            lasted_ns = after.wall_ns - before.wall_ns
+            waited_ns = None if before.waited_ns is None or after.waited_ns is None \
+                else after.waited_ns - before.waited_ns
+            computed_ns = after.computed_ns - before.computed_ns
+            if phase is Phase.WAIT:
+                lasted_ns = max(0, after.wall_ns - max(due_ns, before.wall_ns))
+            elif waited_ns is not None:
+                # In one phase the kernel may be late to count, not in all of them.
+                slept_ns = min(asleep_ns, max(0, lasted_ns - waited_ns - computed_ns))
+                computed_ns = lasted_ns - waited_ns - slept_ns
+                asleep_ns -= slept_ns
+            uses.append(PhaseUse(
+                phase, lasted_ns, computed_ns, waited_ns, collected[1] - collected[0],
+                after.minor_faults - before.minor_faults,
+                after.major_faults - before.major_faults))
+        return uses
+
+    def _asleep_ns(self, counts: Sequence[ThreadCounts]) -> int:
+        """
+        Tell how long the thread slept outside of its wait [ns].
+
+        Its processor time is exact when it was put on a processor: after the wait before this
+        cycle, and after the wait in it, unless there was no time for one.
+        """
+        last = len(counts) - 1
+        while last and self._phases[last - 1] is not Phase.WAIT:
+            last -= 1
+        if last and counts[last].runs > counts[last - 1].runs:
+            end, last = counts[last].computed_ns, last - 1
+        else:
+            end, last = time.thread_time_ns(), len(counts) - 1
+        first = counts[0]
+        waited_ns = (counts[last].waited_ns or 0) - (first.waited_ns or 0)
+        return max(0, counts[last].wall_ns - first.wall_ns - waited_ns
+                   - (end - first.computed_ns))
 
     def _on_collection(self, phase: str, _info: dict[str, int]) -> None:
         now_ns = time.monotonic_ns()
