@@ -132,7 +132,7 @@ def main() -> None:
     controller.start(time.monotonic_ns())
     with StepWatch() as watch:
         for n in range(steps):
-            pacer.wait(n, watch)
+            pacer.wait(n, watch, lambda _now_ns: None)
             start_ns = time.monotonic_ns()
             watch.mark(Phase.INPUTS)
             cycle = controller.begin_cycle(start_ns)

@@ -260,7 +260,7 @@ class LiveRun:
             if self._control.real_time_factor != self._controller.real_time_factor:
                 self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
                 self._watch.begin()
-            self._pacer.wait(self.simulation.n, self._watch)
+            self._pacer.wait(self.simulation.n, self._watch, self._inputs.seats.listen)
             # Looked at last, so that a verdict on state n ends the run at n.
             outcome = self._ordered_end()
             if outcome is not None:

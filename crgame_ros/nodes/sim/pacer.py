@@ -14,6 +14,7 @@
 # limitations under the License.
 """The pace of the live loop: when a cycle is due, and what is done until then."""
 
+from collections.abc import Callable
 import time
 
 from crgame_ros.nodes.sim.step_watch import StepWatch
@@ -27,6 +28,8 @@ SERVICE_RATE = 20.0
 SERVICE_SLACK_NS = 1_500_000
 # The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
 WAKE_UP_NS = 120_000
+# Reading a driver's command takes so long [ns]; where steps are long it is done before their time.
+READ_NS, LONG_STEP_S = 100_000, 5e-3
 
 
 class Pacer:
@@ -45,15 +48,17 @@ class Pacer:
         # At high rates half a step has to do, or nobody could ever stop the run.
         self._slack_ns = min(SERVICE_SLACK_NS, 0.5 * dt_s * NS_PER_S)
         self._every = max(1, round(1.0 / dt_s / SERVICE_RATE))
+        self._awake_ns = WAKE_UP_NS + (READ_NS if dt_s >= LONG_STEP_S else 0)
         # When the present cycle was due, and since when it was waited for, steady clock [ns].
         self.due_ns = 0
         self.idle_from_ns = 0
 
-    def wait(self, n: int, watch: StepWatch) -> None:
+    def wait(self, n: int, watch: StepWatch, read: Callable[[int], None]) -> None:
         """
         Serve orders now and then, and wait until the cycle after step n is due (CRG 11).
 
         :param watch: is told what is done.
+        :param read: is told the time [ns] shortly before, to take in what has come by then.
         """
         self.due_ns = self._controller.deadline_ns()
         self.idle_from_ns = time.monotonic_ns()
@@ -65,8 +70,11 @@ class Pacer:
             self._executor.spin_once(timeout_sec=0)
         watch.mark(Phase.WAIT)
         left_ns = self.due_ns - time.monotonic_ns()
-        if left_ns > WAKE_UP_NS:
-            time.sleep((left_ns - WAKE_UP_NS) / NS_PER_S)
+        if left_ns > self._awake_ns:
+            time.sleep((left_ns - self._awake_ns) / NS_PER_S)
+        watch.mark(Phase.INPUTS)
+        now_ns = time.monotonic_ns()
+        if self.due_ns - now_ns > READ_NS:
+            read(now_ns)
         while time.monotonic_ns() < self.due_ns:
             pass
-        watch.mark(Phase.INPUTS)
