@@ -24,6 +24,8 @@ import sys
 import time
 
 from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.ros_messages import from_time
 from crgame_ros.timing.late_step import CAUSE_WORDS
 from live_peer import Peer
 from live_support import Launcher
@@ -64,10 +66,21 @@ def ask_for_much(peer: Peer) -> None:
     peer.node.destroy_client(client)
 
 
+def published_ns(slot: PolledSubscription) -> dict[int, int]:
+    """Give the time at which each waiting message was published [ns], by its stamp."""
+    found = {}
+    while (taken := slot.take_timed()) is not None:
+        found[from_time(taken[0].header.stamp)] = taken[1]
+    return found
+
+
 def test_late_steps_of_a_run_are_told_with_their_causes(tmp_path: Path) -> None:
     """Stopped by a signal, asked for much, and without a processor, one after the other."""
     with Launcher([write_steady_game(tmp_path), '--duration', 6], tmp_path / 'run') as launcher, \
             Peer(launcher.domain, '/diagnostics', '/clock') as peer:
+        endpoints = Endpoints(peer.node)
+        odometry = endpoints.polled('/<v>/odom', 'hv0', depth=2000)
+        requests = endpoints.polled('/<av>/plan_request', 'av0', depth=200)
         peer.wait_until(lambda: len(peer.messages['/clock']) > 100, 'the hundredth step')
         launcher.freeze('sim_node')
         time.sleep(STOPPED_S)
@@ -77,7 +90,11 @@ def test_late_steps_of_a_run_are_told_with_their_causes(tmp_path: Path) -> None:
             time.sleep(0.5)
         assert launcher.wait() == 0, launcher.text
         peer.listen()
+        shown_ns, asked_ns = published_ns(odometry), published_ns(requests)
         assert 'ms late at' in peer.statuses('timesync_node: table I')[-1][1]['worst_late_step']
+    # A driver sees what the step has made of the command before planners are asked anything.
+    both = shown_ns.keys() & asked_ns.keys()
+    assert len(both) > 20 and all(shown_ns[stamp] < asked_ns[stamp] for stamp in both)
     cycles = read_cycles(tmp_path / 'run' / 'bag')
     if not cycles.column('late_processor_s').any():
         pytest.skip('this kernel has no schedstat')
