@@ -9,7 +9,9 @@ import { shortName } from '../../crgame_ros/cockpit/page/js/driving/device_panel
 import { describeSeat } from '../../crgame_ros/cockpit/page/js/driving/seat_text.js';
 import { clockTime, count, errorText, fixed, NONE, oneLine, plural } from
   '../../crgame_ros/cockpit/page/js/panels/format.js';
-import { TABLE_I, valueOf, worstLateStep } from '../../crgame_ros/cockpit/page/js/panels/timing.js';
+import {
+  TABLE_I, valueOf, worstLateStep,
+} from '../../crgame_ros/cockpit/page/js/panels/timing.js';
 import { countText } from '../../crgame_ros/cockpit/page/js/perception/unseen.js';
 import { eventText } from '../../crgame_ros/cockpit/page/js/replay/marks.js';
 

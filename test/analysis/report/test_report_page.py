@@ -197,7 +197,8 @@ def test_reverse_and_take_overs_stand_out(run: ReportRun) -> None:
 
 def test_late_steps_are_told_by_their_causes(page: Page, run: ReportRun) -> None:
     """Causes that took time, the worst in words; and that there were none, or nobody told."""
-    cells = [text for path, text in page.texts if path[-1] in ('td', 'th', 'bdi', 'caption')]
+    cells = [text for path, text in page.texts
+             if path and path[-1] in ('td', 'th', 'bdi', 'caption')]
     assert '2 steps were late by more than 0.5 ms' in cells
     place = cells.index('garbage collection')
     assert cells[place:place + 4] == ['garbage collection', '310.0', '1', '1']
@@ -207,7 +208,7 @@ def test_late_steps_are_told_by_their_causes(page: Page, run: ReportRun) -> None
     for late, words in ((None, 'an earlier version made it'),
                         ({'count': 0, 'threshold_ms': 0.5}, 'No step was late')):
         other = replace(run, timing={**run.timing, 'late_steps': late})
-        notes = [text for path, text in Page(report_html([other])).texts if path[-1] == 'p']
+        notes = Page(report_html([other])).text_of('p')
         assert any(words in text for text in notes)
 
 
