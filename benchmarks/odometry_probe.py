@@ -53,6 +53,12 @@ class OdometryProbe:
         self._arrived.clear()
         self._rates.clear()
 
+    def wait_for_step(self) -> None:
+        """Wait for the odometry of another step."""
+        known, until_s = len(self._arrived), time.monotonic() + LIMIT_S
+        while len(self._arrived) == known and time.monotonic() < until_s:
+            self._executor.spin_once(timeout_sec=0.05)
+
     def wait_for_turn(self, direction: float) -> tuple[int, float] | None:
         """
         Wait for the first step whose wheels turn to one side.

@@ -68,9 +68,10 @@ class CycleRows:
         :param late_in: phase in which most of it came; None if it was not late.
         """
         row = self._rows[self.count]
-        row[:_LATE] = (epoch, cycle.n, k, cycle.ideal_s, cycle.actual_s, cycle.step_error_s,
-                    cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s, cycle.resets,
-                    cycle.dropped_s)
+        row[:_LATE] = (
+            epoch, cycle.n, k, cycle.ideal_s, cycle.actual_s, cycle.step_error_s,
+            cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s, cycle.resets,
+            cycle.dropped_s)
         row[_LATE:_COMMANDS] = (*causes, 0 if late_in is None else late_in)
         place = _COMMANDS
         for command in commands:

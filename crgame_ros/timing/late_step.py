@@ -97,7 +97,7 @@ class PhaseUse(NamedTuple):
     major_faults: int = 0
 
 
-class Surroundings(NamedTuple):
+class StepConditions(NamedTuple):
     """
     What is known of a step's time besides.
 
@@ -111,7 +111,7 @@ class Surroundings(NamedTuple):
     fault_ns: float = 0.0
 
 
-def causes_of(uses: Sequence[PhaseUse], late_ns: float, around: Surroundings) -> Causes:
+def causes_of(uses: Sequence[PhaseUse], late_ns: float, around: StepConditions) -> Causes:
     """
     Split the lateness of a step by cause.
 
@@ -141,7 +141,7 @@ def causes_of(uses: Sequence[PhaseUse], late_ns: float, around: Surroundings) ->
     return Causes(**spent)
 
 
-def _waiting(use: PhaseUse, around: Surroundings) -> dict[str, float]:
+def _waiting(use: PhaseUse, around: StepConditions) -> dict[str, float]:
     """Split what a thread overslept: it had asked to be woken before."""
     if use.waited_ns is None:
         return {'stopped': use.lasted_ns} if around.stopped else {}
@@ -149,7 +149,7 @@ def _waiting(use: PhaseUse, around: Surroundings) -> dict[str, float]:
     return {'processor': waited, 'stopped' if around.stopped else 'host': use.lasted_ns - waited}
 
 
-def _working(use: PhaseUse, around: Surroundings) -> dict[str, float]:
+def _working(use: PhaseUse, around: StepConditions) -> dict[str, float]:
     """Split a phase that should compute throughout."""
     collected = min(use.collected_ns, use.computed_ns)
     faults = min(use.minor_faults * around.fault_ns, use.computed_ns - collected)

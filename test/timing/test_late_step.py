@@ -22,7 +22,7 @@ from crgame_ros.timing.late_step import (
     NO_CAUSES,
     Phase,
     PhaseUse,
-    Surroundings,
+    StepConditions,
 )
 from crgame_ros.timing.late_steps import LateSteps, WORST
 from crgame_ros.timing.time_controller import Cycle
@@ -33,9 +33,9 @@ MS = 1e6
 STEP_MS = 10.0
 
 
-def split(*uses: PhaseUse, late_ms: float, around: Surroundings | None = None) -> Causes:
+def split(*uses: PhaseUse, late_ms: float, around: StepConditions | None = None) -> Causes:
     """Split a step's lateness [ms]."""
-    found = causes_of(uses, late_ms * MS, around or Surroundings())
+    found = causes_of(uses, late_ms * MS, around or StepConditions())
     return Causes(*(time_ns / MS for time_ns in found))
 
 
@@ -56,17 +56,17 @@ def test_each_kind_of_time_has_its_name() -> None:
     The step has time for its own work of 2 ms and for 8 ms of the rest.
     """
     for strange, around, cause in (
-            (use(Phase.STEP, 20.0, 0.0, 20.0), Surroundings(), 'processor'),
-            (use(Phase.STEP, 20.0, 0.0, 0.0), Surroundings(), 'blocked'),
-            (use(Phase.STEP, 20.0, 0.0, 0.0, major=1), Surroundings(), 'page_faults'),
-            (use(Phase.STEP, 20.0, 0.0, 0.0), Surroundings(stopped=True), 'stopped'),
-            (use(Phase.STEP, 20.0, 20.0, collected=20.0), Surroundings(), 'gc'),
-            (use(Phase.STEP, 20.0, 20.0, minor=20_000), Surroundings(fault_ns=1000.0),
+            (use(Phase.STEP, 20.0, 0.0, 20.0), StepConditions(), 'processor'),
+            (use(Phase.STEP, 20.0, 0.0, 0.0), StepConditions(), 'blocked'),
+            (use(Phase.STEP, 20.0, 0.0, 0.0, major=1), StepConditions(), 'page_faults'),
+            (use(Phase.STEP, 20.0, 0.0, 0.0), StepConditions(stopped=True), 'stopped'),
+            (use(Phase.STEP, 20.0, 20.0, collected=20.0), StepConditions(), 'gc'),
+            (use(Phase.STEP, 20.0, 20.0, minor=20_000), StepConditions(fault_ns=1000.0),
              'page_faults'),
-            (use(Phase.SERVICES, 20.0, 5.0), Surroundings(), 'services'),
-            (use(Phase.STEP, 20.0, 20.0), Surroundings(stolen_ns=20.0 * MS), 'host'),
-            (use(Phase.STEP, 20.0, 0.0, 20.0), Surroundings(stolen_ns=20.0 * MS), 'host'),
-            (use(Phase.STEP, 20.0, 20.0), Surroundings(), 'work')):
+            (use(Phase.SERVICES, 20.0, 5.0), StepConditions(), 'services'),
+            (use(Phase.STEP, 20.0, 20.0), StepConditions(stolen_ns=20.0 * MS), 'host'),
+            (use(Phase.STEP, 20.0, 0.0, 20.0), StepConditions(stolen_ns=20.0 * MS), 'host'),
+            (use(Phase.STEP, 20.0, 20.0), StepConditions(), 'work')):
         found = split(*USUAL, strange, late_ms=2.0 + 20.0 - STEP_MS, around=around)
         assert found == pytest.approx(NO_CAUSES._replace(**{cause: 12.0})), cause
 
@@ -76,7 +76,7 @@ def test_a_wait_counts_from_the_time_at_which_it_should_have_ended() -> None:
     overslept = use(Phase.WAIT, 3.0, 0.1, 2.0)
     assert split(*USUAL, overslept, late_ms=3.0) == pytest.approx(
         Causes(processor=2.0, host=1.0))
-    assert split(*USUAL, overslept, late_ms=3.0, around=Surroundings(stopped=True)) \
+    assert split(*USUAL, overslept, late_ms=3.0, around=StepConditions(stopped=True)) \
         == pytest.approx(Causes(processor=2.0, stopped=1.0))
     # It was on the run queue before its time as well.
     assert split(*USUAL, use(Phase.WAIT, 3.0, 0.1, 7.0), late_ms=3.0) == pytest.approx(

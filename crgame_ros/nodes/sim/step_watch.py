@@ -30,7 +30,7 @@ from crgame_ros.timing.late_step import (
     NO_CAUSES,
     Phase,
     PhaseUse,
-    Surroundings,
+    StepConditions,
 )
 from crgame_ros.timing.thread_counters import (
     counts_of,
@@ -124,7 +124,7 @@ class StepWatch:
     def _explained(self, due_ns: int, late_s: float, factor: float) -> tuple[Causes, Phase]:
         uses = self._uses(due_ns)
         stolen = self._counters.stolen()
-        causes = causes_of(uses, late_s / factor * NS_PER_S, Surroundings(
+        causes = causes_of(uses, late_s / factor * NS_PER_S, StepConditions(
             stolen_between(self._stolen, stolen), self._continued, self._fault_ns))
         self._stolen = stolen
         return Causes(*(time_ns / NS_PER_S * factor for time_ns in causes)), longest_phase(uses)
