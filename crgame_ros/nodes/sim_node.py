@@ -34,7 +34,7 @@ from crgame_ros.ros.other_simulation import refuse_another
 from crgame_ros.ros.place import held
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.timing.kept_memory import keep_freed_memory, lock_memory
+from crgame_ros.timing.locked_memory import lock_memory
 from crgame_ros.timing.time_slice import shorten_time_slice
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -78,7 +78,6 @@ class SimNode(Node):
             self._raise_priority()
         else:
             shorten_time_slice()
-        keep_freed_memory()
         # Where it is refused, pages that the system takes back are seen among the causes.
         lock_memory()
         self._control.paused = self._control.starts_paused

@@ -18,9 +18,6 @@ import ctypes
 
 # Of sys/mman.h: what is there, what will be, each from its first use on.
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
-# Of malloc.h, and for both the greatest value: memory once used is used again, not given back.
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
-LARGEST_BYTES = 32 << 20
 
 
 def lock_memory() -> bool:
@@ -31,11 +28,3 @@ def lock_memory() -> bool:
         /etc/security/limits.d above the whole address space.
     """
     return bool(ctypes.CDLL(None).mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0)
-
-
-def keep_freed_memory() -> None:
-    """Let the allocator keep what is freed: whatever it gave back would be faulted in again."""
-    allocator = ctypes.CDLL(None)
-    if hasattr(allocator, 'mallopt'):
-        allocator.mallopt(M_TRIM_THRESHOLD, LARGEST_BYTES)
-        allocator.mallopt(M_MMAP_THRESHOLD, LARGEST_BYTES)
