@@ -77,15 +77,19 @@ class LiveGraph:
             used[name] = (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
         return used
 
-    def page(self) -> str:
-        """Wait for the address of the cockpit."""
+    def wait_for(self, pattern: str) -> str:
+        """Wait for a regular expression in what the launcher says; give its last group."""
         until_s = time.monotonic() + START_LIMIT_S
         while time.monotonic() < until_s:
             text = self._log.read_text(encoding='utf-8', errors='replace')
-            if (found := re.search(r'the cockpit is at (http://\S+)', text)) is not None:
-                return found[1]
+            if (found := re.search(pattern, text)) is not None:
+                return found[found.lastindex or 0]
             time.sleep(0.05)
-        sys.exit(f'the cockpit did not start; its output is in {self._log}')
+        sys.exit(f'it did not come to "{pattern}"; the output is in {self._log}')
+
+    def page(self) -> str:
+        """Wait for the address of the cockpit."""
+        return self.wait_for(r'the cockpit is at (http://\S+)')
 
     def wait(self) -> dict[str, Any]:
         """Wait for the end of the run and give its timing report."""

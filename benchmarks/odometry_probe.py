@@ -24,12 +24,12 @@ class OdometryProbe:
     """Notes when the odometry of each step of hv0 arrives, and how its front wheels turn in it."""
 
     def __init__(self) -> None:
+        from crgame_ros.ros.spinning import prompt_executor
         from nav_msgs.msg import Odometry
         import rclpy
-        from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import JointState
         self.node = rclpy.create_node('odometry_probe')
-        self._executor = SingleThreadedExecutor()
+        self._executor = prompt_executor()
         self._executor.add_node(self.node)
         self._arrived: dict[int, float] = {}
         self._rates: dict[int, float] = {}
@@ -52,6 +52,12 @@ class OdometryProbe:
             self._executor.spin_once(timeout_sec=0.002)
         self._arrived.clear()
         self._rates.clear()
+
+    def wait_for_step(self) -> None:
+        """Wait for the odometry of another step."""
+        known, until_s = len(self._arrived), time.monotonic() + LIMIT_S
+        while len(self._arrived) == known and time.monotonic() < until_s:
+            self._executor.spin_once(timeout_sec=0.05)
 
     def wait_for_turn(self, direction: float) -> tuple[int, float] | None:
         """

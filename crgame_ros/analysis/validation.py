@@ -38,6 +38,7 @@ from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.schema.file_kinds import FILE_KINDS, FileKind
 from crgame_ros.schema.reading import faults_of
 from crgame_ros.simulation.setup import build_setup
+from crgame_ros.timing.late_steps import LATE_KEYS
 from crgame_ros.yaml_text import read_text, read_yaml
 
 Progress = Callable[[float], object]
@@ -191,6 +192,10 @@ def _timing(path: Path, _progress: Progress | None) -> FileVerdict:
     except (ValueError, RecursionError) as error:
         raise InputError(f'is no JSON ({error})', str(path)) from error
     missing = sorted(REPORT_KEYS - content.keys()) if isinstance(content, dict) else ['everything']
+    if isinstance(content, dict) and (late := content.get('late_steps')) is not None:
+        # Earlier versions did not tell of them.
+        missing += [f'late_steps.{key}' for key in sorted(
+            LATE_KEYS - late.keys() if isinstance(late, dict) else LATE_KEYS)]
     return FileVerdict('timing report', tuple(
         [f'{path}: lacks {", ".join(missing)}'] if missing else ()))
 

@@ -184,7 +184,9 @@ class RunStatus:
 
     def _take_timing(self, _: int, __: str, values: Mapping[str, str], t: float) -> None:
         self.timing = {key: _number(value) for key, value in values.items()
-                       if key != 'frame_skipping'}
+                       if key not in ('frame_skipping', 'worst_late_step')}
+        if 'worst_late_step' in values:
+            self.timing['worst_late_step'] = values['worst_late_step']
         skipping = status_truth(values, 'frame_skipping')
         self.timing['frame_skipping'] = skipping
         self._alarm('late', 'simulation', skipping, 'late: frames are skipped', t)

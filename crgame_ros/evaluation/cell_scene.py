@@ -137,8 +137,9 @@ def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name
     scenario = Content('scenario.xml', {'scenario.xml': guard.encode(loaded.xml_text)})
     store.put(scenario)
     values['scenario'] = scenario.reference
+    digests = tuple(planner_digest(spec.planner) for spec in game.avs or ())
     return CellScene(loaded.benchmark_id, game_name, human, with_contents(values, store), inputs,
-                 tuple(planner_digest(spec.planner) for spec in game.avs or ()))
+                     digests)
 
 
 def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:

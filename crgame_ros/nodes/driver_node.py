@@ -28,7 +28,7 @@ from crgame_ros.ros.live_driver import live_driver
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
 from crgame_ros.ros.seats import GAME
-from crgame_ros.ros.spinning import spin
+from crgame_ros.ros.spinning import prompt_executor, spin
 from crgame_ros.ros.trusted_code import trust_code
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
@@ -91,7 +91,8 @@ class DriverNode(Node):
         watcher = threading.Thread(target=self._watch_device, name='device')
         watcher.start()
         try:
-            spin(self, stop)
+            # What a driver does must not miss the cycle it is meant for.
+            spin(self, stop, prompt_executor())
         finally:
             self._running = False
             watcher.join()

@@ -25,7 +25,8 @@ from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import dump_game
-from crgame_ros.nodes.sim.live_run import LiveRun, Outcome
+from crgame_ros.nodes.sim.live_run import LiveRun
+from crgame_ros.nodes.sim.outcome import Outcome
 from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -33,6 +34,7 @@ from crgame_ros.ros.other_simulation import refuse_another
 from crgame_ros.ros.place import held
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.timing.locked_memory import lock_memory
 from crgame_ros.timing.time_slice import shorten_time_slice
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -76,6 +78,8 @@ class SimNode(Node):
             self._raise_priority()
         else:
             shorten_time_slice()
+        # Where it is refused, pages that the system takes back are seen among the causes.
+        lock_memory()
         self._control.paused = self._control.starts_paused
         epoch, offset_ns = 0, FIRST_OFFSET_NS
         while True:

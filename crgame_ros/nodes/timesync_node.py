@@ -25,6 +25,7 @@ from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.spinning import poll
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.timing.frame_skipping import FrameSkipping
+from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.timing_metrics import TimingMetrics
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
@@ -47,6 +48,7 @@ class TimesyncNode(Node):
         self._orders = endpoints.publisher('/timing/frame_skip')
         self._game: GameDocument | None = None
         self._metrics: TimingMetrics | None = None
+        self._late = LateSteps()
         self._skipping = FrameSkipping(TimingSpec())
         self._time = RunTime()
         self._awaited = GameAwaited(self, 'nothing is measured')
@@ -80,6 +82,7 @@ class TimesyncNode(Node):
             self._begin_anew(self._game)
         if course in (TimeCourse.ON, TimeCourse.BACK):
             self._metrics.add_rows(table.timing_rows())
+            self._late.add_table(table)
             self._order(table.column('cumulative_error_s')[-1])
             self._diagnostics.now_ns = stamp_ns
 
@@ -94,6 +97,7 @@ class TimesyncNode(Node):
     def _begin_anew(self, game: GameDocument) -> None:
         """Measure a run from its start."""
         self._metrics = TimingMetrics(game.scheduler.dt_s)
+        self._late = LateSteps()
         self._skipping = FrameSkipping(game.timing)
         # An order of the run before, or of a supervisor that was killed, ends with it.
         self._orders.publish(Bool(data=False))
@@ -113,6 +117,9 @@ class TimesyncNode(Node):
         values.update({f'real_time_ratio_{key}': value for key, value in ratios.items()})
         values['frame_skipping'] = self._skipping.active
         values['frame_skip_orders'] = self._skipping.orders
+        values['late_steps'] = self._late.count
+        worst = self._late.worst[:1]
+        values['worst_late_step'] = str(worst[0]) if worst else ''
         self._diagnostics.publish(
             'timesync_node: table I',
             DiagnosticStatus.WARN if late or self._skipping.active else DiagnosticStatus.OK,

@@ -33,6 +33,7 @@ from crgame_ros.recording.run_contacts import recorded_contacts
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.storage import BagMessage
+from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.timing_metrics import TimingMetrics
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,8 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None
             else read_cycles(reader, run.game.epoch)
         metrics = TimingMetrics(run.game.scheduler.dt_s)
         metrics.add_rows(cycles.timing_rows())
+        late = LateSteps()
+        late.add_table(cycles)
         numbers = cycles.column('n')
         collected = _Collector(run)
         for message in reader.messages(collected.topics):
@@ -78,6 +81,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None
         contacts, unknown = _contacts(reader, run, collected.verdicts)
         return {
             **metrics.summary().as_dict(),
+            'late_steps': late.as_dict(),
             # The first row is that of the step to n = 1.
             'gaps': int(numbers[-1]) - len(numbers),
             'scenario_steps': None if log is None else

@@ -91,8 +91,6 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     faulthandler.register(TELL_WHERE)
     name_process(Path(sys.argv[0]).stem)
     die_with_parent()
-    # Planners and recorder give way to the simulation and the driver.
-    os.nice(int(os.environ.get(NICE_VARIABLE, '0')))
     from crgame_ros.ros.environment import prepare_environment
     prepare_environment()
 
@@ -110,6 +108,9 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = create()
+        # Planners and recorder give way to the simulation and the driver. The middleware's
+        # threads, which are there by now, do not: they hold locks that these wait for.
+        os.nice(int(os.environ.get(NICE_VARIABLE, '0')))
         node.run(stop)
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)

@@ -140,10 +140,14 @@ class Seat:
                 self.malformed += 1
         return self._heard_ns is not None
 
+    @property
+    def repeats_recording(self) -> bool:
+        """Whether a recording drives, or will: messages are not for such a seat."""
+        return self.recording is not None and self.source == self.home
+
     def repeats(self, n: int) -> bool:
         """Tell whether cycle n is driven as in the recording."""
-        return self.recording is not None and self.source == self.home \
-            and self.recording.drives(n)
+        return self.recording is not None and self.repeats_recording and self.recording.drives(n)
 
     def awaits_driver(self, now_ns: int) -> bool:
         """Tell whether the seat is the cockpit's by the game, and no hands are on its controls."""
@@ -159,7 +163,7 @@ class Seat:
         :param n: the cycle, which only a recording needs to know.
         :return: None for an AV that nobody has taken over.
         """
-        recording = self.recording if self.source == self.home else None
+        recording = self.recording if self.repeats_recording else None
         self.taken_over_again = self.source == PLANNER and self.repeats(n)
         if self.source == PLANNER and not self.taken_over_again:
             return None
@@ -211,6 +215,12 @@ class Seats:
     def slots(self) -> list[PolledSubscription]:
         """Every subscription, to release it."""
         return [self._orders, *(seat.commands for seat in self.all)]
+
+    def listen(self, now_ns: int) -> None:
+        """Take the commands that have come by now, so that the cycle has less to read."""
+        for seat in self.all:
+            if seat.source != PLANNER and not seat.repeats_recording:
+                seat.listen(now_ns)
 
     def interval_s(self, n: int) -> float | None:
         """Give the interval of cycle n as recorded [s]; None where no human repeats it."""

@@ -20,7 +20,7 @@ import time
 import traceback
 
 from crgame_ros.ros.node_main import StopFlag
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 
 # A waiting executor doesn't see a signal: look at the flag so often [s].
@@ -44,9 +44,28 @@ def attempt(node: Node, work: Callable[[], None]) -> None:
                                 throttle_duration_sec=COMPLAIN_S)
 
 
-def spin(node: Node, stop: StopFlag) -> None:
-    """Run a node's callbacks until asked to stop."""
-    executor = SingleThreadedExecutor()
+def prompt_executor() -> Executor:
+    """
+    Make the executor that runs a callback soonest after its message has come.
+
+    rclpy's own for events costs 70 µs a message, the ordinary one 260 µs. It knows no groups of
+    callbacks, so nothing may be polled; where rclpy is too old to have it, the ordinary one works.
+    """
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:
+        return SingleThreadedExecutor()
+    executor: Executor = EventsExecutor()
+    return executor
+
+
+def spin(node: Node, stop: StopFlag, executor: Executor | None = None) -> None:
+    """
+    Run a node's callbacks until asked to stop.
+
+    :param executor: an ordinary one where None.
+    """
+    executor = executor or SingleThreadedExecutor()
     executor.add_node(node)
     while not stop.requested:
         attempt(node, lambda: executor.spin_once(timeout_sec=LOOK_S))

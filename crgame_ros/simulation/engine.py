@@ -192,6 +192,16 @@ class Simulation:
         :param commands: one for each human, in their order; then, if anybody has taken an AV over,
             one for each AV, None for one that follows its plan
         """
+        self.move(dt_eff_s, commands)
+        return self.conclude()
+
+    def move(self, dt_eff_s: float, commands: Sequence[DriverCommand | None]) -> None:
+        """
+        Move the driven vehicles from n to n + 1, which is half of a step: `conclude` is to follow.
+
+        Parameters are those of `step`. Whoever drives can be shown what became of it before
+        planners' requests are made, which takes ten times as long.
+        """
         self.n += 1
         seats = len(self.humans) + len(self.avs)
         self.commands = [command and command.rounded() for command in commands]
@@ -203,6 +213,9 @@ class Simulation:
                 av.advance(self.n)
             else:
                 av.drive(command, dt_eff_s)
+
+    def conclude(self) -> StepResult:
+        """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
         result = self._result()
         self._add_to_hash()

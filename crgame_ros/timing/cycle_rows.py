@@ -19,6 +19,7 @@ from collections.abc import Sequence
 import math
 
 from crgame_ros.errors import InputError
+from crgame_ros.timing.late_step import Causes, NO_CAUSES, Phase
 from crgame_ros.timing.time_controller import Cycle
 from crgame_ros.vehicle.driver_command import DriverCommand
 import numpy as np
@@ -27,7 +28,11 @@ from numpy.typing import NDArray
 TIMING_COLUMNS = (
     'epoch', 'n', 'k', 'ideal_s', 'actual_s', 'step_error_s', 'cumulative_error_s', 'busy_s',
     'sleep_s', 'dt_eff_s', 'resets', 'dropped_s')
+# Why the cycle was late [s], and in which phase; earlier versions did not tell.
+LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse')
+# Where in a row they begin.
+_LATE, _COMMANDS = len(TIMING_COLUMNS), len(TIMING_COLUMNS) + len(LATE_COLUMNS)
 NO_COMMAND = (math.nan,) * len(COMMAND_COLUMNS)
 
 
@@ -40,7 +45,7 @@ class CycleRows:
     """
 
     def __init__(self, vehicle_ids: Sequence[str], capacity: int) -> None:
-        self.columns = TIMING_COLUMNS + tuple(
+        self.columns = TIMING_COLUMNS + LATE_COLUMNS + tuple(
             f'{vehicle}/{name}' for vehicle in vehicle_ids for name in COMMAND_COLUMNS)
         self._data = array('d', bytes(8 * capacity * len(self.columns)))
         self._rows = np.frombuffer(self._data).reshape(capacity, len(self.columns))
@@ -53,17 +58,22 @@ class CycleRows:
         return self.count == self.capacity
 
     def add(self, epoch: int, k: int, cycle: Cycle, busy_s: float, sleep_s: float,
-            commands: Sequence[DriverCommand | None]) -> None:
+            commands: Sequence[DriverCommand | None], causes: Causes = NO_CAUSES,
+            late_in: Phase | None = None) -> None:
         """
         Add one cycle, with the time it worked and slept [s].
 
         :param commands: of each vehicle; None of an AV that followed its plan, which gives NaN.
+        :param causes: of its lateness [s]
+        :param late_in: phase in which most of it came; None if it was not late.
         """
         row = self._rows[self.count]
-        row[:12] = (epoch, cycle.n, k, cycle.ideal_s, cycle.actual_s, cycle.step_error_s,
-                    cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s, cycle.resets,
-                    cycle.dropped_s)
-        place = len(TIMING_COLUMNS)
+        row[:_LATE] = (
+            epoch, cycle.n, k, cycle.ideal_s, cycle.actual_s, cycle.step_error_s,
+            cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s, cycle.resets,
+            cycle.dropped_s)
+        row[_LATE:_COMMANDS] = (*causes, 0 if late_in is None else late_in)
+        place = _COMMANDS
         for command in commands:
             row[place:place + 4] = NO_COMMAND if command is None else command
             place += len(COMMAND_COLUMNS)
@@ -118,6 +128,12 @@ class CycleTable:
         """Give (R, 4) rows as `TimingMetrics.add_rows` takes them."""
         return self.rows[:, [self._place[name] for name in
                              ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')]]
+
+    def late_rows(self) -> NDArray[np.float64] | None:
+        """Give (R, 9) causes of lateness and phase of each row; None where none are told."""
+        if any(name not in self._place for name in LATE_COLUMNS):
+            return None
+        return self.rows[:, [self._place[name] for name in LATE_COLUMNS]]
 
     def commands(self, vehicle_id: str) -> NDArray[np.float64]:
         """

@@ -148,6 +148,11 @@ def test_timing_numbers() -> None:
     assert status.document()['timing'] == {
         'mean_step_error_ms': 0.05, 'real_time_ratio_min': None, 'frame_skipping': True}
     assert _kinds(status) == ['late:simulation']
+    why = '7.0 ms late at 1.00 s (n = 100): 7.0 ms page faults'
+    _take(status, 'timesync_node: table I', 0, '', {'late_steps': '1', 'worst_late_step': why},
+          5.0)
+    timing = status.document()['timing']
+    assert (timing['late_steps'], timing['worst_late_step']) == (1.0, why)
 
 
 def test_run_state() -> None:

@@ -9,7 +9,9 @@ import { shortName } from '../../crgame_ros/cockpit/page/js/driving/device_panel
 import { describeSeat } from '../../crgame_ros/cockpit/page/js/driving/seat_text.js';
 import { clockTime, count, errorText, fixed, NONE, oneLine, plural } from
   '../../crgame_ros/cockpit/page/js/panels/format.js';
-import { TABLE_I, valueOf } from '../../crgame_ros/cockpit/page/js/panels/timing.js';
+import {
+  TABLE_I, valueOf, worstLateStep,
+} from '../../crgame_ros/cockpit/page/js/panels/timing.js';
 import { countText } from '../../crgame_ros/cockpit/page/js/perception/unseen.js';
 import { eventText } from '../../crgame_ros/cockpit/page/js/replay/marks.js';
 
@@ -51,6 +53,13 @@ test('figures are found live and nested as in timing.json', () => {
   assert.equal(valueOf({ real_time_ratio: { min: 0.25 } }, 'real_time_ratio_min'), 0.25);
   assert.ok(Number.isNaN(valueOf({}, 'real_time_ratio_min')));
   assert.ok(Number.isNaN(valueOf({ final_error_ms: null }, 'final_error_ms')));
+});
+
+test('the worst late step is told in words, and that nobody told of it, too', () => {
+  assert.equal(worstLateStep({ worst_late_step: '7.0 ms late: 7.0 ms\n own work' }),
+    'Worst late step: 7.0 ms late: 7.0 ms own work.');
+  assert.equal(worstLateStep({ worst_late_step: '' }), 'No step was late.');
+  assert.match(worstLateStep({ final_error_ms: 1 }), /does not tell/);
 });
 
 test('table I: how each figure reads, and from when on it is late', () => {

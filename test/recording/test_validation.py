@@ -14,6 +14,7 @@
 # limitations under the License.
 """`crgame validate`: what is wrong with a file is said, and nothing of one that is right."""
 
+import json
 from pathlib import Path
 import shutil
 from typing import Any
@@ -102,6 +103,20 @@ def test_a_recording_that_was_cut_off_is_none(run: Path, tmp_path: Path,
     (tmp_path / 'bag' / 'metadata.yaml').unlink()
     code, _, err = _told(tmp_path / 'bag', capsys)
     assert code == 2 and 'crgame recover' in err
+
+
+def test_a_timing_report_tells_why_steps_were_late(run: Path, tmp_path: Path,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    """Whole, of an earlier version, which did not tell, or in parts."""
+    report = json.loads((run / 'timing.json').read_text())
+    assert report['late_steps'] is not None
+    file = tmp_path / 'timing.json'
+    for late in (report['late_steps'], None):
+        file.write_text(json.dumps(report | {'late_steps': late}))
+        assert _told(file, capsys)[0] == 0
+    file.write_text(json.dumps(report | {'late_steps': {'count': 1}}))
+    code, _, err = _told(file, capsys)
+    assert code == 2 and 'lacks late_steps.by_cause, late_steps.late_ms' in err
 
 
 def test_tables_are_checked_by_their_dictionary(run: Path, tmp_path: Path,

@@ -39,7 +39,7 @@ def test_columns_name_what_is_in_them() -> None:
     """Each value is found under its name after the way through the flat message."""
     rows = filled()
     table = CycleTable.from_message(','.join(rows.columns), rows.taken())
-    assert table.rows.shape == (2, 12 + 8)
+    assert table.rows.shape == (2, 12 + 9 + 8)
     expected = {'epoch': (4, 4), 'n': (7, 8), 'k': (12, 13), 'ideal_s': (0.07, 0.08),
                 'actual_s': (0.0701, 0.0805), 'step_error_s': (0.0001, 0.0002),
                 'cumulative_error_s': (0.0002, 0.0005), 'busy_s': (0.002, 0.003),
@@ -85,7 +85,7 @@ def test_taking_empties_the_buffer() -> None:
     rows.add(4, 13, FIRST, 0.0, 0.0, (LEFT, BACK))
     assert rows.full
     taken = rows.taken()
-    assert len(taken) == 3 * 20
+    assert len(taken) == 3 * 29
     assert (rows.count, rows.full, len(rows.taken())) == (0, False, 0)
     rows.add(5, 1, SECOND, 0.0, 0.0, (BACK, LEFT))
     assert (taken[0], taken[1]) == (4.0, 7.0)

@@ -21,6 +21,7 @@ from crgame_ros.analysis.report.report_run import ReportRun
 from crgame_ros.analysis.report.report_section import Plot, PlotLimit, PlotLine, Section
 from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, share, table
 from crgame_ros.analysis.report.run_section import named
+from crgame_ros.timing.late_step import CAUSE_WORDS
 
 # Of table I: key of `timing.json`, words, unit, factor, digits.
 _TABLE_I = (
@@ -49,6 +50,7 @@ def timing_section(run: ReportRun) -> Section:
             'The recording does not tell of its cycles.'))
     html = table('Timing (table I of the CommonRoad-Game paper)', ('', 'value', 'unit'),
                  _rows(run.timing), 'numbers')
+    html += _late_steps(run.timing.get('late_steps'))
     return Section('timing', 'Timing', html, tuple(_plots(run)))
 
 
@@ -57,6 +59,22 @@ def _rows(timing: Mapping[str, Any]) -> Iterator[Sequence[str]]:
         yield words, number(factor * timing[key], digits), unit
     for key in _RATIO:
         yield f'Real-time ratio, {key}', number(timing['real_time_ratio'][key], 4), ''
+
+
+def _late_steps(late: Mapping[str, Any] | None) -> str:
+    """Show why steps were late: by cause, and the worst of them."""
+    if late is None:
+        return note('The recording does not tell why steps were late: an earlier '
+                    'version made it.')
+    if not late['count']:
+        return note(f'No step was late by more than {late["threshold_ms"]:g} ms.')
+    html = table(f'{late["count"]} steps were late by more than {late["threshold_ms"]:g} ms', (
+        'cause', 'together [ms]', 'main cause of steps', 'of drift resets'), [
+            (CAUSE_WORDS[cause], number(entry['ms'], 1), str(entry['steps']),
+             str(entry['resets'])) for cause, entry in late['by_cause'].items() if entry['ms']],
+        'numbers')
+    return html + table('The worst late steps', ('late [ms]', 'what it was'), [
+        (number(step['late_ms'], 1), free(step['text'])) for step in late['worst']], 'numbers')
 
 
 def _plots(run: ReportRun) -> Iterator[Plot]:

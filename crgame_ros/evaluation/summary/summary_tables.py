@@ -146,6 +146,10 @@ def _means(summary: Summary) -> SummaryTable:
         'over all cells); what is not defined, such as the TTC of who has nobody ahead, is left '
         'out', f'95 % intervals: percentile bootstrap, {summary.resamples} resamples, seed '
         f'{summary.seed}', *_drawn(summary.groups)]
+    bounds = [f'{measure.label} {measure.most:g} {measure.unit}' for _, measure
+              in known_measures(summary) if math.isfinite(measure.most)]
+    if bounds:
+        notes.append(f'greater values count as these: {", ".join(bounds)}')
     if any(measure.is_share and not group.estimates[place].value
            for place, measure in known_measures(summary) for group in summary.groups):
         notes.append(_SHARE_OF_NONE)

@@ -14,10 +14,13 @@
 # limitations under the License.
 """What sim_node tells of its planners and seats on /diagnostics."""
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Mapping
+from functools import partial
 
 from crgame_ros.nodes.sim.sim_inputs import SimInputs
 from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.ros.seats import Seat
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -27,13 +30,15 @@ MAX_REFUSALS_PER_REPORT = 5
 
 
 class LiveDiagnostics:
-    """Reports once a second, and refusals as they happen."""
+    """Reports once a second, one subject a step, and refusals as they happen."""
 
     def __init__(self, outputs: SimOutputs, simulation: Simulation, inputs: SimInputs) -> None:
         self._outputs = outputs
         self._simulation = simulation
         self._inputs = inputs
         self._refusals = 0
+        # What is still to be told of the second that has passed.
+        self._waiting: deque[Callable[[], None]] = deque()
 
     def refusal(self, av_id: str, reason: str) -> None:
         """Tell why a plan was refused."""
@@ -69,32 +74,50 @@ class LiveDiagnostics:
                 subject, DiagnosticStatus.WARN, reason, {**values, 'n': simulation.n},
                 simulation.scheduler.stamp_ns(simulation.n))
 
-    def publish(self, n: int) -> None:
+    def publish(self) -> None:
         """Report on every AV and seat."""
+        self.begin()
+        while self.tell_next():
+            pass
+
+    def begin(self) -> None:
+        """Begin a report on every AV and seat, of which each `tell_next` tells a part."""
         self._refusals = 0
-        simulation = self._simulation
-        stamp_ns, dt_s = simulation.scheduler.stamp_ns(n), simulation.scheduler.dt_s
-        for av in simulation.avs:
-            counters, age = av.counters, av.plan_age_steps(n)
-            stale = av.uses_no_plan
-            self._outputs.publish_diagnostics(
-                f'{av.setup.id} plans',
-                DiagnosticStatus.ERROR if stale else DiagnosticStatus.OK,
-                'no plan: braking' if stale else 'following its plan',
-                {'planner': av.setup.spec.planner, 'running': av.planner_running,
-                 'requests': counters.requests, 'accepted': counters.accepted,
-                 'refused': counters.refused, 'skipped': counters.skipped,
-                 'timed_out': counters.timed_out, 'realigned': counters.realigned,
-                 'steps_without_plan': counters.steps_without_plan,
-                 'latency_ms': round(counters.last_latency_steps * dt_s * 1e3, 3),
-                 'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
-                 'last_refusal': counters.last_refusal, **_tracking(av)}, stamp_ns)
-        for seat in self._inputs.seats.all:
-            self._outputs.publish_diagnostics(
-                f'{seat.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
-                'driver lost' if seat.lost else 'driven',
-                {'source': seat.source, 'losses': seat.losses, 'malformed': seat.malformed,
-                 'outdated': seat.outdated, 'passed_over': seat.passed_over}, stamp_ns)
+        self._waiting = deque((
+            *(partial(self._tell_plans, av) for av in self._simulation.avs),
+            *(partial(self._tell_seat, seat) for seat in self._inputs.seats.all)))
+
+    def tell_next(self) -> bool:
+        """Tell what is next of the report, if there is anything left; tell whether there was."""
+        if not self._waiting:
+            return False
+        self._waiting.popleft()()
+        return True
+
+    def _tell_plans(self, av: AutonomousVehicle) -> None:
+        n, scheduler = self._simulation.n, self._simulation.scheduler
+        counters, age, dt_s = av.counters, av.plan_age_steps(n), scheduler.dt_s
+        stale = av.uses_no_plan
+        self._outputs.publish_diagnostics(
+            f'{av.setup.id} plans',
+            DiagnosticStatus.ERROR if stale else DiagnosticStatus.OK,
+            'no plan: braking' if stale else 'following its plan',
+            {'planner': av.setup.spec.planner, 'running': av.planner_running,
+             'requests': counters.requests, 'accepted': counters.accepted,
+             'refused': counters.refused, 'skipped': counters.skipped,
+             'timed_out': counters.timed_out, 'realigned': counters.realigned,
+             'steps_without_plan': counters.steps_without_plan,
+             'latency_ms': round(counters.last_latency_steps * dt_s * 1e3, 3),
+             'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
+             'last_refusal': counters.last_refusal, **_tracking(av)}, scheduler.stamp_ns(n))
+
+    def _tell_seat(self, seat: Seat) -> None:
+        self._outputs.publish_diagnostics(
+            f'{seat.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
+            'driver lost' if seat.lost else 'driven',
+            {'source': seat.source, 'losses': seat.losses, 'malformed': seat.malformed,
+             'outdated': seat.outdated, 'passed_over': seat.passed_over},
+            self._simulation.scheduler.stamp_ns(self._simulation.n))
 
 
 def _tracking(av: AutonomousVehicle) -> dict[str, object]:

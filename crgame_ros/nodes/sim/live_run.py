@@ -15,24 +15,27 @@
 """One epoch of a live run: from the request of k0 to the end, a reset or a stop."""
 
 from dataclasses import replace
-from enum import auto, Enum
 import gc
 import time
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
+from crgame_ros.nodes.sim.outcome import Outcome
+from crgame_ros.nodes.sim.pacer import NS_PER_S, Pacer
 from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
-from crgame_ros.nodes.sim.run_state import RunState, SIGNAL
+from crgame_ros.nodes.sim.run_state import RunState
 from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.nodes.sim.sim_inputs import SimInputs
 from crgame_ros.nodes.sim.sim_outputs import SimOutputs
 from crgame_ros.nodes.sim.start_gate import StartGate
+from crgame_ros.nodes.sim.step_watch import StepWatch
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.late_step import Phase
 from crgame_ros.timing.time_controller import TimeController
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
@@ -41,21 +44,7 @@ from rclpy.node import Node
 if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
     from crgame_ros.recording.recorded_inputs import RecordedInputs
 
-NS_PER_S = 1_000_000_000
-# How often the executor looks for service calls [Hz], and the least time left for it [ns].
-SERVICE_RATE = 20.0
-SERVICE_SLACK_NS = 1_500_000
-# The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
-WAKE_UP_NS = 120_000
 SETTLE_NS = 200_000_000
-
-
-class Outcome(Enum):
-    """Why an epoch ended."""
-
-    FINISHED = auto()
-    RESET = auto()
-    STOPPED = auto()
 
 
 class LiveRun:
@@ -88,17 +77,17 @@ class LiveRun:
         self._inputs.choose(self._answers, None if feed is None else feed.wants)
         self._dt_s = scheduler.dt_s
         self._controller = TimeController(setup.game.timing, self._dt_s)
+        self._pacer = Pacer(executor, self._controller, self._dt_s)
+        self._watch = StepWatch()
         self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
         self._state = RunState(self._outputs, self.simulation, self._diagnostics, control)
         duration_s = control.duration_s or setup.game.duration
         self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
         self._feed = feed
-        # At high rates half a step has to do, or nobody could ever stop the run.
-        self._service_slack_ns = min(SERVICE_SLACK_NS, 0.5 * self._dt_s * NS_PER_S)
-        self._service_every = max(1, round(1.0 / self._dt_s / SERVICE_RATE))
         self._second = max(1, round(1.0 / self._dt_s))
+        # The step from which on all AVs and seats are reported on again.
+        self._report_n = self._second
         self._setup = setup
-        self._sleep_from_ns = 0
         self._stop = StopFlag()
         self._reason = ''
 
@@ -113,9 +102,12 @@ class LiveRun:
             self._settle()
         outcome = self._wait_for_companions(result)
         if outcome is not None:
-            self._reason = self._reason or self._reason_for(outcome)
+            self._reason = self._reason or outcome.reason(self._stop.requested)
             self._state.tell('ended', self._reason)
             return outcome
+        if not self._watch.tells_waiting:
+            self._node.get_logger().info('this kernel does not tell how long the loop waits for '
+                                         'a processor: late steps have parts unexplained')
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -124,14 +116,15 @@ class LiveRun:
             self._controller.start(now_ns)
             self._controller.resume(now_ns, self._control.real_time_factor)
             self._inputs.forgive(now_ns)
-            outcome = self._loop()
-            self._reason = self._reason or self._reason_for(outcome)
+            with self._watch:
+                outcome = self._loop()
+            self._reason = self._reason or outcome.reason(self._stop.requested)
             return outcome
         finally:
             gc.enable()
             gc.unfreeze()
             self._outputs.publish_rows()
-            self._diagnostics.publish(self.simulation.n)
+            self._diagnostics.publish()
             self._state.tell('ended', self._reason)
             self._outputs.wait_until_received()
 
@@ -148,16 +141,11 @@ class LiveRun:
         control.over = False
         return Outcome.STOPPED if self._stop.requested else Outcome.RESET
 
-    def _reason_for(self, outcome: Outcome) -> str:
-        """Say why the run has ended: duration, reset, stop, or signal."""
-        if outcome is Outcome.STOPPED:
-            return SIGNAL if self._stop.requested else 'stop'
-        return 'duration' if outcome is Outcome.FINISHED else 'reset'
-
     def destroy(self) -> None:
         """Release the endpoints."""
         self._outputs.destroy()
         self._inputs.destroy()
+        self._watch.close()
 
     def _settle(self) -> None:
         """Let everybody take the new documents in before the first message that needs them."""
@@ -271,7 +259,8 @@ class LiveRun:
                 self._stay_paused()
             if self._control.real_time_factor != self._controller.real_time_factor:
                 self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
-            self._wait()
+                self._watch.begin()
+            self._pacer.wait(self.simulation.n, self._watch, self._inputs.seats.listen)
             # Looked at last, so that a verdict on state n ends the run at n.
             outcome = self._ordered_end()
             if outcome is not None:
@@ -293,53 +282,50 @@ class LiveRun:
             self._take_orders(time.monotonic_ns())
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)
+        self._watch.begin()
         self._inputs.forgive(now_ns)
-
-    def _wait(self) -> None:
-        """Serve orders now and then, and wait until the next cycle is due (CRG 11)."""
-        deadline_ns = self._controller.deadline_ns()
-        self._sleep_from_ns = time.monotonic_ns()
-        left_ns = deadline_ns - self._sleep_from_ns
-        due = left_ns > self._service_slack_ns and self.simulation.n % self._service_every == 0
-        # A loop that is late all the time must be stoppable too.
-        if due or self._controller.serves_orders_now:
-            self._executor.spin_once(timeout_sec=0)
-            left_ns = deadline_ns - time.monotonic_ns()
-        if left_ns > WAKE_UP_NS:
-            time.sleep((left_ns - WAKE_UP_NS) / NS_PER_S)
-        while time.monotonic_ns() < deadline_ns:
-            pass
 
     def _cycle(self) -> None:
         """Do the work of one cycle, from reading the inputs to publishing the state."""
         start_ns = time.monotonic_ns()
-        simulation, outputs, inputs = self.simulation, self._outputs, self._inputs
+        simulation, outputs, inputs, watch = \
+            self.simulation, self._outputs, self._inputs, self._watch
+        watch.mark(Phase.INPUTS)
         for av in simulation.avs:
             self._take_plan(av.setup.id)
         self._take_orders(start_ns)
         # A recorded human moves over the recorded intervals, whatever this machine is busy with.
         cycle = self._controller.begin_cycle(start_ns, inputs.seats.interval_s(simulation.n))
+        factor = self._controller.real_time_factor
+        causes, late_in = watch.explain(self._pacer.due_ns, cycle.step_error_s, factor)
         commands = inputs.seats.commands(start_ns, cycle.dt_eff_s, simulation)
         if inputs.seats.repetition_changed():
             outputs.publish_seats(inputs.seats.document())
         if simulation.scheduler.is_tick(simulation.n + 1):
             self._take_triggers()
-        result = simulation.step(cycle.dt_eff_s, commands)
+        watch.mark(Phase.STEP)
+        simulation.move(cycle.dt_eff_s, commands)
+        if outputs.shows_vehicles(simulation):
+            watch.mark(Phase.PUBLISH)
+            outputs.publish_vehicles(simulation)
+            watch.mark(Phase.STEP)
+        result = simulation.conclude()
+        watch.mark(Phase.PUBLISH)
         outputs.publish_step(simulation, result)
         if result.tick:
             self._at_tick(result)
+        if not result.tick or simulation.scheduler.steps_per_tick == 1:
+            self._report(result.n)
         self._control.count_step(simulation.scheduler.steps_per_tick)
         if outputs.rows.full:
             outputs.publish_rows()
         busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S
-        slept_s = (start_ns - self._sleep_from_ns) / NS_PER_S
-        factor = self._controller.real_time_factor
+        slept_s = (start_ns - self._pacer.idle_from_ns) / NS_PER_S
         outputs.rows.add(self._epoch, result.k, cycle, busy_s * factor, slept_s * factor,
-                         simulation.commands)
+                         simulation.commands, causes, late_in)
 
     def _at_tick(self, result: StepResult) -> None:
         """Do what is due with the scenario's time."""
-        self._state.tell('running')
         for event in result.fired:
             self._node.get_logger().info(
                 f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
@@ -348,5 +334,10 @@ class LiveRun:
         order = self._inputs.frame_skip_order()
         if order is not None:
             self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping
-        if result.n % self._second < self.simulation.scheduler.steps_per_tick:
-            self._diagnostics.publish(result.n)
+
+    def _report(self, n: int) -> None:
+        """Tell how the run is, little by little, in steps that have no tick's work to do."""
+        self._state.tell('running')
+        if not self._diagnostics.tell_next() and n >= self._report_n:
+            self._report_n = n + self._second
+            self._diagnostics.begin()

@@ -17,13 +17,12 @@
 import time
 
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
+from crgame_ros.nodes.sim.outcome import SIGNAL
 from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.nodes.sim.sim_outputs import SimOutputs
 from crgame_ros.simulation.engine import Simulation
 
 NS_PER_S = 1_000_000_000
-# Why a run has ended: it was to end with everything else.
-SIGNAL = 'signal'
 # Discovery is not the same on both sides for up to a second or two.
 NEWCOMERS_NS = 3 * NS_PER_S
 

@@ -60,6 +60,7 @@ class VehicleOutputs:
         self.publishers = [endpoints.publisher(name, vehicle_id)
                            for name in ('/<v>/odom', '/<v>/joint_states', '/<v>/accel')]
         self.wanted = False
+        self._listened_to = [False] * len(self.publishers)
         self._odom = Odometry(child_frame_id=f'{vehicle_id}/base_link')
         self._odom.header.frame_id = MAP
         self._odom.pose.covariance = self._odom.twist.covariance = \
@@ -70,25 +71,30 @@ class VehicleOutputs:
 
     def look_for_subscribers(self) -> None:
         """Find out whether anybody listens."""
-        self.wanted = any(item.get_subscription_count() for item in self.publishers)
+        self._listened_to = [item.get_subscription_count() > 0 for item in self.publishers]
+        self.wanted = any(self._listened_to)
 
     def publish(self, state: VehicleState, stamp_ns: int) -> None:
         """Publish the vehicle's state in the types that ROS tools expect."""
-        odom = self._odom
-        set_time(odom.header.stamp, stamp_ns)
-        odom.pose.pose.position.x, odom.pose.pose.position.y = state.x, state.y
-        odom.pose.pose.orientation.z = math.sin(0.5 * state.yaw)
-        odom.pose.pose.orientation.w = math.cos(0.5 * state.yaw)
-        odom.twist.twist.linear.x = state.speed
-        odom.twist.twist.angular.z = state.yaw_rate
-        self.publishers[0].publish(odom)
-        set_time(self._joints.header.stamp, stamp_ns)
-        self._joints.position = [state.steering_angle]
-        self._joints.velocity = [state.steering_rate]
-        self.publishers[1].publish(self._joints)
-        set_time(self._accel.header.stamp, stamp_ns)
-        self._accel.accel.linear.x = state.acceleration
-        self.publishers[2].publish(self._accel)
+        for_odom, for_joints, for_accel = self._listened_to
+        if for_odom:
+            odom = self._odom
+            set_time(odom.header.stamp, stamp_ns)
+            odom.pose.pose.position.x, odom.pose.pose.position.y = state.x, state.y
+            odom.pose.pose.orientation.z = math.sin(0.5 * state.yaw)
+            odom.pose.pose.orientation.w = math.cos(0.5 * state.yaw)
+            odom.twist.twist.linear.x = state.speed
+            odom.twist.twist.angular.z = state.yaw_rate
+            self.publishers[0].publish(odom)
+        if for_joints:
+            set_time(self._joints.header.stamp, stamp_ns)
+            self._joints.position = [state.steering_angle]
+            self._joints.velocity = [state.steering_rate]
+            self.publishers[1].publish(self._joints)
+        if for_accel:
+            set_time(self._accel.header.stamp, stamp_ns)
+            self._accel.accel.linear.x = state.acceleration
+            self.publishers[2].publish(self._accel)
 
 
 class SimOutputs:
@@ -169,6 +175,18 @@ class SimOutputs:
         self._latched['/scenario/events'].publish(
             String(data=events_document(self._epoch, fired)))
 
+    def shows_vehicles(self, simulation: Simulation) -> bool:
+        """Tell whether anybody is to see where the vehicles have moved to, each by itself."""
+        return not self.frames_skipped and any(item.wanted for item in self._vehicles) and (
+            simulation.n % self.publish_every == 0 or simulation.scheduler.is_tick(simulation.n))
+
+    def publish_vehicles(self, simulation: Simulation) -> None:
+        """Publish each vehicle by itself, before all else: drivers see in it what they did."""
+        stamp_ns = simulation.scheduler.stamp_ns(simulation.n)
+        for vehicle, state in zip(self._vehicles, simulation.states, strict=True):
+            if vehicle.wanted:
+                vehicle.publish(state, stamp_ns)
+
     def publish_step(self, simulation: Simulation, result: StepResult) -> None:
         """Publish a step: requests first, for planners have the least time to lose."""
         if result.fired:
@@ -176,22 +194,16 @@ class SimOutputs:
             self.publish_events(simulation.fired)
         for av_id, request in result.requests.items():
             self._publish_request(av_id, request)
-        due = result.n % self.publish_every == 0
-        if not due and not result.tick:
+        if result.n % self.publish_every and not result.tick:
             return
         stamp_ns = simulation.scheduler.stamp_ns(result.n)
-        states = simulation.states
         self.publish_clock(stamp_ns)
         if result.objects is not None:
             self._publish_objects(result.objects, stamp_ns)
             self._publish_signals(result.k)
             for vehicle in self._vehicles:
                 vehicle.look_for_subscribers()
-        self._publish_states(states, stamp_ns, result.objects is not None)
-        if not self.frames_skipped:
-            for vehicle, state in zip(self._vehicles, states, strict=True):
-                if vehicle.wanted:
-                    vehicle.publish(state, stamp_ns)
+        self._publish_states(simulation.states, stamp_ns, result.objects is not None)
 
     @property
     def listeners(self) -> int:

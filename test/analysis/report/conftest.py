@@ -35,6 +35,13 @@ TIMING: dict[str, Any] = {
                      'timeout_ratio', 'time_efficiency', 'precision_ratio', 'step_error_p99_ms',
                      'busy_p50_ms', 'busy_p99_ms', 'rate_hz', 'cycles', 'gaps', 'resets',
                      'catch_up_steps'), 0.5),
+    'late_steps': {
+        'threshold_ms': 0.5, 'count': 2, 'late_ms': 340.0, 'resets_from_outside': 0,
+        'resets_of_ours': 1, 'by_cause': {
+            'processor': {'ms': 30.0, 'steps': 1, 'resets': 0},
+            'gc': {'ms': 310.0, 'steps': 1, 'resets': 1}, 'work': {'ms': 0.0, 'steps': 0,
+                                                                   'resets': 0}},
+        'worst': [{'late_ms': 310.0, 'text': '310.0 ms late, <b>they</b> said'}]},
     'real_time_ratio': {'final': 1.0, 'mean': 1.0, 'min': 0.25},
     'planners': {'av0': {
         'requests': 20, 'accepted': 17, 'refused': 2, 'timed_out': 1, 'skipped': 0, 'fallback': 3,

@@ -198,6 +198,23 @@ def test_reverse_and_take_overs_stand_out(run: ReportRun) -> None:
     assert 'av0 taken over' in [text for path, text in page.texts if 'th' in path]
 
 
+def test_late_steps_are_told_by_their_causes(page: Page, run: ReportRun) -> None:
+    """Causes that took time, the worst in words; and that there were none, or nobody told."""
+    cells = [text for path, text in page.texts
+             if path and path[-1] in ('td', 'th', 'bdi', 'caption')]
+    assert '2 steps were late by more than 0.5 ms' in cells
+    place = cells.index('garbage collection')
+    assert cells[place:place + 4] == ['garbage collection', '310.0', '1', '1']
+    assert 'own work' not in cells
+    assert '310.0 ms late, <b>they</b> said' in cells
+    assert run.timing is not None
+    for late, words in ((None, 'an earlier version made it'),
+                        ({'count': 0, 'threshold_ms': 0.5}, 'No step was late')):
+        other = replace(run, timing={**run.timing, 'late_steps': late})
+        notes = Page(report_html([other])).text_of('p')
+        assert any(words in text for text in notes)
+
+
 def test_what_a_recording_does_not_tell_is_left_out(run: ReportRun) -> None:
     """Without cycles there are neither inputs nor timing, and the page says so."""
     bare = replace(run, timing=None, record=replace(

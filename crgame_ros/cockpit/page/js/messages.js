@@ -175,9 +175,10 @@ export {};
  */
 
 /**
- * Figures of the time-sync supervisor by key; in timing.json some are nested.
+ * Figures of the time-sync supervisor by key, and words; in timing.json some are nested.
  *
- * @typedef {Record<string, number|boolean|null|undefined|Record<string, number|null>>} Timing
+ * @typedef {Record<string, number|boolean|string|null|undefined|Record<string, number|null>>
+ *   } Timing
  */
 
 /** @typedef {{vehicle: string, with: string, t: number}} Contact */

@@ -3,7 +3,7 @@
 /** How true the run is to the wall clock: the live figures of the time-sync supervisor. */
 
 import { element, setAttribute, setText } from '../dom.js';
-import { count, fixed, plural } from './format.js';
+import { count, fixed, oneLine, plural } from './format.js';
 
 /** @import { Status, Timing } from '../messages.js' */
 /** @import { Store } from '../store.js' */
@@ -52,6 +52,7 @@ const MORE = [
   ['rate_hz', 'Rate', 'steps per second', (value) => `${fixed(value, 1)} Hz`],
   ['worst_lag_ms', 'Worst lag', 'behind the schedule in force when a cycle began', ms(1),
     (value, step) => value > LATE_STEPS * step],
+  ['late_steps', 'Late steps', 'steps of an error over 0.5 ms', count],
   ['catch_up_steps', 'Caught up', 'cycles that began more than a step late', count],
   ['step_error_p50_ms', 'Step error, median', 'of |e_n|', ms(3)],
   ['step_error_p99_ms', 'Step error, 99 %', '99th percentile of |e_n|', ms(3)],
@@ -79,9 +80,10 @@ export function createTiming(root, store) {
   const run = new Map();
   /** @type {Rows} */
   const rows = new Map();
+  const worst = element('p', { class: 'hint', 'data-key': 'worst_late_step' });
   const tables = element('div', {},
     element('h2', { text: 'Timekeeping' }), table(TABLE_I, rows, 'Table I'),
-    element('h3', { text: 'What explains it' }), table(MORE, rows, 'What explains it'));
+    element('h3', { text: 'What explains it' }), table(MORE, rows, 'What explains it'), worst);
   root.append(element('h2', { text: 'Run' }), table([
     ['factor', 'Speed of time', 'measured, and as asked for'],
     ['skipping', 'Frames', 'frames for people are skipped while the run is late'],
@@ -104,6 +106,7 @@ export function createTiming(root, store) {
         const value = valueOf(timing, key);
         rows.get(key)?.show(format(value), Boolean(isLate?.(value, step_ms)));
       }
+      setText(worst, worstLateStep(timing));
     }
   };
   store.on('status', update);
@@ -122,6 +125,18 @@ export function valueOf(timing, key) {
   const group = nested && !(key in timing) ? timing[nested[1]] : undefined;
   const value = nested && group && typeof group === 'object' ? group[nested[2]] : timing[key];
   return typeof value === 'number' ? value : NaN;
+}
+
+/**
+ * @param {Timing} timing
+ * @returns {string} the worst late step and its causes, in words
+ */
+export function worstLateStep(timing) {
+  const told = timing.worst_late_step;
+  if (typeof told !== 'string') {
+    return 'This recording does not tell why steps were late: an earlier version made it.';
+  }
+  return told === '' ? 'No step was late.' : `Worst late step: ${oneLine(told)}.`;
 }
 
 /**

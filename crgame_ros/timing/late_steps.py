@@ -1,0 +1,167 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The late steps of a run: how many, by which cause, and the worst of them in words."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+import heapq
+from typing import Any
+
+from crgame_ros.timing.cycle_rows import CycleTable
+from crgame_ros.timing.late_step import (
+    CAUSE_WORDS,
+    Causes,
+    FROM_OUTSIDE,
+    LATE_S,
+    Phase,
+    PHASE_WORDS,
+    UNEXPLAINED,
+)
+import numpy as np
+
+# So many of the worst are kept. A cause below this share of one is not worth a word.
+WORST = 10
+_WORTH_A_WORD = 0.02
+_MS = 1e3
+# Of `late_steps` in `timing.json`.
+LATE_KEYS = frozenset(('threshold_ms', 'count', 'late_ms', 'by_cause', 'resets_from_outside',
+                       'resets_of_ours', 'worst'))
+_PHASES = frozenset(map(int, Phase))
+
+
+@dataclass(frozen=True)
+class LateStep:
+    """
+    A step that began late.
+
+    :param n: simulation step.
+    :param at_s: when it began, on the run's time line [s]
+    :param late_s: its step error e_n [s]
+    :param causes: what that is made of [s]
+    :param during: phase in which most time was lost; None where nobody knows.
+    :param reset: whether it moved the schedule.
+    """
+
+    n: int
+    at_s: float
+    late_s: float
+    causes: Causes
+    during: Phase | None
+    reset: bool
+
+    @property
+    def split_s(self) -> Mapping[str, float]:
+        """Give the time by cause, with what is unexplained; together they are the lateness [s]."""
+        return {**self.causes._asdict(), UNEXPLAINED: max(0.0, self.late_s - sum(self.causes))}
+
+    @property
+    def main_cause(self) -> str:
+        """Name the greatest cause."""
+        split = self.split_s
+        return max(split, key=lambda cause: split[cause])
+
+    @property
+    def why(self) -> str:
+        """Say in words what it is made of, the greatest first."""
+        parts = sorted(self.split_s.items(), key=lambda item: -item[1])
+        return ', '.join(f'{_MS * time_s:.1f} ms {CAUSE_WORDS[cause]}' for cause, time_s in parts
+                         if time_s > _WORTH_A_WORD * self.late_s)
+
+    def __str__(self) -> str:
+        """Tell of it in a line."""
+        during = '' if self.during is None else f' while {PHASE_WORDS[self.during]}'
+        moved = '; the schedule was moved' if self.reset else ''
+        return (f'{_MS * self.late_s:.1f} ms late at {self.at_s:.2f} s (n = {self.n}){during}: '
+                f'{self.why}{moved}')
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give an entry of `timing.json`."""
+        return {'n': self.n, 'at_s': self.at_s, 'late_ms': _MS * self.late_s,
+                'cause': self.main_cause,
+                'during': None if self.during is None else self.during.name.lower(),
+                'reset': self.reset,
+                'causes_ms': {cause: _MS * time_s for cause, time_s in self.split_s.items()},
+                'text': str(self)}
+
+
+class LateSteps:
+    """Gathers the late steps of one run in constant memory, from its cycles as they come."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.late_s = 0.0
+        self.by_cause_s = dict.fromkeys((*Causes._fields, UNEXPLAINED), 0.0)
+        self._steps_by_cause: Counter[str] = Counter()
+        self._resets_by_cause: Counter[str] = Counter()
+        self._resets: float | None = None
+        self._told = True
+        # Those of equal lateness in the order in which they came.
+        self._worst: list[tuple[float, int, LateStep]] = []
+
+    @property
+    def told(self) -> bool:
+        """Whether every cycle told why it was late; earlier versions did not."""
+        return self._told
+
+    @property
+    def worst(self) -> list[LateStep]:
+        """Give the worst of them, the latest first."""
+        return [step for _, _, step in sorted(self._worst, reverse=True)]
+
+    def add_table(self, table: CycleTable) -> None:
+        """Take cycles, in the order of time."""
+        late_rows = table.late_rows()
+        if late_rows is None or not len(table.rows):
+            self._told &= late_rows is not None
+            return
+        errors, resets = table.column('step_error_s'), table.column('resets')
+        moved = np.diff(resets, prepend=resets[0] if self._resets is None else self._resets) > 0
+        self._resets = float(resets[-1])
+        starts = table.column('actual_s')
+        # What anybody sent may be no number.
+        told = np.isfinite(errors) & np.isfinite(starts) & np.isfinite(late_rows).all(axis=1)
+        for row in np.flatnonzero(told & (errors > LATE_S)).tolist():
+            *causes, phase = late_rows[row].tolist()
+            self._add(LateStep(
+                int(table.column('n')[row]), float(starts[row]), float(errors[row]),
+                Causes(*causes), Phase(int(phase)) if phase in _PHASES else None,
+                bool(moved[row])))
+
+    def _add(self, step: LateStep) -> None:
+        self.count += 1
+        self.late_s += step.late_s
+        for cause, time_s in step.split_s.items():
+            self.by_cause_s[cause] += time_s
+        self._steps_by_cause[step.main_cause] += 1
+        self._resets_by_cause[step.main_cause] += step.reset
+        heapq.heappush(self._worst, (step.late_s, -self.count, step))
+        if len(self._worst) > WORST:
+            heapq.heappop(self._worst)
+
+    def as_dict(self) -> dict[str, Any] | None:
+        """Give `late_steps` of `timing.json`; None where the cycles do not tell."""
+        if not self._told:
+            return None
+        resets = self._resets_by_cause
+        return {
+            'threshold_ms': _MS * LATE_S, 'count': self.count, 'late_ms': _MS * self.late_s,
+            'by_cause': {cause: {'ms': _MS * time_s, 'steps': self._steps_by_cause[cause],
+                                 'resets': resets[cause]}
+                         for cause, time_s in self.by_cause_s.items()},
+            'resets_from_outside': sum(resets[cause] for cause in FROM_OUTSIDE),
+            'resets_of_ours': sum(count for cause, count in resets.items()
+                                  if cause not in FROM_OUTSIDE),
+            'worst': [step.as_dict() for step in self.worst]}

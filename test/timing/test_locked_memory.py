@@ -1,0 +1,38 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the loop's process asks for its memory, against what the kernel says of it."""
+
+import subprocess
+import sys
+
+LOCKED = """
+from pathlib import Path
+from crgame_ros.timing.locked_memory import lock_memory
+given = lock_memory()
+lines = Path('/proc/self/status').read_text().splitlines()
+(locked,) = [int(line.split()[1]) for line in lines if line.startswith('VmLck')]
+print(given, locked > 0)
+"""
+
+
+def _said(program: str) -> list[str]:
+    return subprocess.run([sys.executable, '-c', program], check=True, capture_output=True,
+                          text=True).stdout.split()
+
+
+def test_memory_is_locked_where_the_system_allows_it() -> None:
+    """What is told is what the kernel has done, with the privilege or without it."""
+    given, locked = _said(LOCKED)
+    assert given == locked
