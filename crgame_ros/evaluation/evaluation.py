@@ -71,6 +71,7 @@ class EvaluationTally:
     :param failed: failed since.
     :param put_away: cells in the folder that the plan does not have.
     :param dashboard: address of Dask's page; empty without one.
+    :param threads: that compute, at the beginning.
     """
 
     total: int = 0
@@ -79,6 +80,7 @@ class EvaluationTally:
     failed: int = 0
     put_away: int = 0
     dashboard: str = ''
+    threads: int = 0
 
 
 # Is given how far it is; with a cell and its row when one has ended.
@@ -129,8 +131,10 @@ def _compute(grid: CellGrid, finished: set[bytes], parts: ResultParts, store: Co
     with dask_client(computing.scheduler, computing.workers, computing.dashboard) as client:
         check_workers(client)
         tally.dashboard = client.dashboard_link if computing.dashboard is not None else ''
+        flight = _Flight(client, store, computing)
+        tally.threads = flight.threads
         told(tally, None, None)
-        for cell, rows in _Flight(client, store, computing).results(cells):
+        for cell, rows in flight.results(cells):
             row = {'cell': cell.key, **cell.factors, **rows['cell']}
             for vehicle in rows['vehicles']:
                 vehicle.update({'cell': cell.key, **cell.factors})
@@ -180,9 +184,11 @@ class _Flight:
             yield cell, rows
 
     def _room(self) -> int:
-        return AHEAD * max(2, self._threads())
+        return AHEAD * max(2, self.threads)
 
-    def _threads(self) -> int:
+    @property
+    def threads(self) -> int:
+        """Count the threads that compute now."""
         return sum(worker['nthreads'] for worker in
                    self._client.scheduler_info(n_workers=-1)['workers'].values())
 

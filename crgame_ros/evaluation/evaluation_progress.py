@@ -53,6 +53,8 @@ class EvaluationProgress:
             self._begin_s = self._told_s = now_s
             self._say(f'{tally.total} cells' + (f', {tally.before} of them finished before'
                                                 if tally.before else ''))
+            if not tally.threads:
+                self._say('no worker is connected: waiting for one')
             if tally.dashboard:
                 self._say(f'Dask shows its work at {tally.dashboard}')
         if cell is not None and row is not None and row['status'] != 'ok':

@@ -26,6 +26,9 @@ WIDTH, _ROW, _TOP, _AXIS = 420, 22, 6, 24
 _NAMES, _NUMBERS, _EDGE = 116, 58, 8
 _LONGEST_NAME = 17
 
+# Of the numbers' size; a narrower range has no marks that differ.
+_NARROWEST = 1e-9
+
 
 class PlottedInterval(NamedTuple):
     """
@@ -97,7 +100,9 @@ def _ticks(numbers: Sequence[float], with_zero: bool) -> list[float]:
     if with_zero or not known:
         known.append(0.0)
     low, high = min(known), max(known)
-    if low == high:
-        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
+    size = max(abs(low), abs(high))
+    if high - low <= _NARROWEST * max(size, 1.0):
+        margin = 0.5 * size if size > _NARROWEST else 0.5
+        low, high = low - margin, high + margin
     ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     return [float(np.format_float_positional(tick, 12)) + 0.0 for tick in ticks]

@@ -23,6 +23,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+# Values that differ by no more of the greater one are the same.
+SAME = 1e-12
+
 
 @dataclass(frozen=True)
 class PairedCells:
@@ -48,7 +51,10 @@ class PairedCells:
         """
         with np.errstate(invalid='ignore', divide='ignore'):
             means = sums / counts
-        found = means[self.rows] - means[self.baseline]
+        own, other = means[self.rows], means[self.baseline]
+        found = own - other
+        # The last bits of equal values are no difference.
+        found[np.abs(found) <= SAME * np.maximum(np.abs(own), np.abs(other))] = 0.0
         there = ~np.isnan(found)
         return np.where(there, found, 0.0), there.astype(float)
 

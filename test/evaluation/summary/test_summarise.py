@@ -21,6 +21,7 @@ from pathlib import Path
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.summary.cell_block import CellBlocks
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
+from crgame_ros.evaluation.summary.paired_cells import PairedCells
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Estimate, Summary
 from crgame_ros.evaluation.summary.summary_measures import MEASURES
@@ -299,3 +300,10 @@ def test_what_comes_of_almost_equal_speeds_does_not_make_the_mean() -> None:
     values = ttc.values(np.array([2.0, 9.0, 3e14, math.nan, math.inf]))
     assert np.array_equal(values, [2.0, 9.0, 20.0, math.nan, math.nan], equal_nan=True)
     assert ttc.definition.endswith('greater ones count as 20')
+
+
+def test_last_bits_are_no_difference() -> None:
+    pairs = PairedCells(np.array([0, 1]), np.array([2, 2]), np.empty(0, np.int64))
+    sums = np.array([[2.1399999999999997], [2.14001], [2.14]])
+    found, there = pairs.differences(sums, np.ones((3, 1)))
+    assert found[0] == 0.0 and found[1] == pytest.approx(1e-5) and there.all()

@@ -183,6 +183,14 @@ def test_pictures_are_to_scale() -> None:
     assert np.interp(float(zero), *ticks.T) == pytest.approx(0.0, abs=0.01)
 
 
+@pytest.mark.parametrize('number', [0.0, 1e-16, -3e-13, 5.0, 1e9, -1e300])
+@pytest.mark.parametrize('more', [0.0, 1e-16, 4e-12])
+def test_numbers_that_hardly_differ_can_be_drawn(number: float, more: float) -> None:
+    svg = interval_svg([PlottedInterval('a', number, number, number + more, 'x', 'estimate')],
+                       with_zero=False)
+    assert 'nan' not in svg and 'inf' not in svg
+
+
 def test_the_command_prints_and_writes_the_page(tmp_path: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     folder = many(40, 3).write(tmp_path / 'rows')
