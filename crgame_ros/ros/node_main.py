@@ -22,6 +22,8 @@ import os
 from pathlib import Path
 import signal
 import sys
+import threading
+import time
 from types import FrameType
 from typing import Protocol
 
@@ -31,6 +33,10 @@ PR_SET_PDEATHSIG = 1
 PR_SET_NAME = 15
 # At this signal a node prints what its threads are at.
 TELL_WHERE = signal.SIGUSR1
+
+
+# Who has lost its parent has so long to end in good order; it is looked for so often [s].
+_ALONE, _GRACE_S, _LOOK_S = 'alone', 40.0, 2.0
 
 
 class StopFlag:
@@ -62,6 +68,9 @@ def die_with_parent() -> None:
     """
     Ask the kernel to end this process when the one that started the graph dies.
 
+    It ends in good order, or, where that takes too long because something hangs, at once: nobody
+    else is left to see to it.
+
     Only where that one asked for it (`CRGAME_PARENT_PID`): a node started by hand lives on.
     """
     parent = os.environ.get(PARENT_VARIABLE)
@@ -70,6 +79,16 @@ def die_with_parent() -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != int(parent):
         sys.exit(f'the process {parent} that started the graph is gone')
+    if not any(thread.name == _ALONE for thread in threading.enumerate()):
+        threading.Thread(target=_end_alone, args=(int(parent),), name=_ALONE, daemon=True).start()
+
+
+def _end_alone(parent: int) -> None:
+    """End this process some time after its parent, whatever its main thread waits for."""
+    while os.getppid() == parent:
+        time.sleep(_LOOK_S)
+    time.sleep(_GRACE_S)
+    os._exit(1)
 
 
 def name_process(name: str) -> None:

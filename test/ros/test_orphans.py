@@ -1,0 +1,47 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A node whose parent is gone ends, whatever it hangs in."""
+
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+SCRIPT = """
+import os, signal, time
+from crgame_ros.ros import node_main
+parent = os.getpid()
+if (child := os.fork()):
+    print(child, flush=True)
+    time.sleep(1.0)
+    os._exit(0)
+node_main._GRACE_S, node_main._LOOK_S = 0.5, 0.1
+# As one whose main thread waits for ever does.
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+os.environ[node_main.PARENT_VARIABLE] = str(parent)
+node_main.die_with_parent()
+os.close(1)
+time.sleep(600.0)
+"""
+
+
+def test_who_hangs_ends_some_time_after_its_parent() -> None:
+    done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True)
+    child = Path('/proc') / done.stdout.strip()
+    assert done.returncode == 0, done.stderr
+    until_s = time.monotonic() + 60.0
+    while child.exists() and (child / 'stat').read_text().rpartition(')')[2].split()[0] != 'Z':
+        assert time.monotonic() < until_s, 'it lives on'
+        time.sleep(0.05)
