@@ -148,19 +148,33 @@ class ModelRegistry:
     def _from_file(self, path: Path, attribute: str, label: str) -> Any:
         if not path.is_file():
             raise InputError(f'there is no file {path}', label, 'check the path')
-        module_name = f'crgame_ros_user_{self.kind.replace(" ", "_")}_{path.stem}'
-        spec = importlib.util.spec_from_file_location(module_name, path)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        # Dataclasses and pickling look their module up by name.
-        sys.modules[module_name] = module
         try:
-            spec.loader.exec_module(module)
+            module = module_of_file(
+                path, f'crgame_ros_user_{self.kind.replace(" ", "_")}_{path.stem}')
         except Exception as error:
-            del sys.modules[module_name]
             raise InputError(f'cannot be read ({type(error).__name__}: {error})', label,
                              'mend the file') from error
         return _attribute(module, attribute, label)
+
+
+def module_of_file(path: Path, name: str) -> types.ModuleType:
+    """
+    Run a file as a module.
+
+    :param name: of the module.
+    :raises Exception: whatever the file raises; nothing is left of it then.
+    """
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Dataclasses and pickling look their module up by name.
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception:
+        del sys.modules[name]
+        raise
+    return module
 
 
 def _from_module(target: str, label: str) -> Any:

@@ -127,7 +127,7 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
     :return: its rows as JSON has them: `cell`, `vehicles`, `work`.
     :raises InputError: if something of it cannot be used.
     """
-    start_s, computed_s = time.perf_counter(), time.process_time()
+    computed_s = time.process_time()
     result = run_cell(cell, contents)
     vehicles = vehicle_rows(measured(cell, result), result)
     durations_s = [time_s for record in result.planners.values()
@@ -136,7 +136,6 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
         'cell': outcome_of(result) | _failure(result.planners),
         'vehicles': vehicles,
         'work': {
-            'wall_s': time.perf_counter() - start_s,
             'computing_s': time.process_time() - computed_s,
             'peak_bytes': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
             **({} if not durations_s else {'plan_p50_s': float(np.median(durations_s)),

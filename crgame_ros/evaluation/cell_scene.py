@@ -32,7 +32,7 @@ from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_game import read_recorded_game
 from crgame_ros.recording.recorded_inputs import with_recorded_events
 from crgame_ros.recording.run_cycles import replay_inputs
-from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_folder import folder_name, recording_in
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.writing import write
@@ -121,12 +121,7 @@ def scene_of_run(path: Path, store: ContentStore) -> CellScene:
     np.savez_compressed(stream, intervals_s=inputs.dt_eff_s, **arrays)
     digest = store.put(Content(INPUTS, {INPUTS: stream.getvalue()}))
     return _scene(replace(game, humans=humans, duration=min(game.duration, duration_s)),
-                  recorded.loaded, store, human=_run_name(path), inputs=digest)
-
-
-def _run_name(path: Path) -> str:
-    whole = path.resolve()
-    return whole.parent.name if whole.name.startswith('bag') and whole.parent.name else whole.name
+                  recorded.loaded, store, human=folder_name(path), inputs=digest)
 
 
 def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name: str = '',

@@ -20,7 +20,7 @@ from typing import Any
 
 from crgame_ros import __version__
 from crgame_ros.analysis.tables.column import TableDeclaration
-from crgame_ros.analysis.tables.data_package import PACKAGE_FILE, table_schema
+from crgame_ros.analysis.tables.data_package import PACKAGE_FILE, PROFILE, table_schema
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid
@@ -61,7 +61,7 @@ class EvaluationFolder:
                 'grid': grid.as_dict()}
         write_text(json.dumps(note, indent=1) + '\n', self.path / GRID_FILE)
         package = {
-            '$schema': 'https://datapackage.org/profiles/2.0/datapackage.json',
+            '$schema': PROFILE.format('datapackage'),
             'name': 'evaluation', 'description': 'Cells of an evaluation; SI units and radians.',
             'resources': [_resource(table) for table in TABLES_OF_CELLS]}
         write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n',

@@ -16,15 +16,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-import importlib.util
 from pathlib import Path
-import sys
 from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
 from crgame_ros.policy.observation_spec import ObservationSpec
-from crgame_ros.registry import ModelRegistry, POLICY
+from crgame_ros.registry import ModelRegistry, module_of_file, POLICY
 from crgame_ros.schema.reading import read
 import numpy as np
 from numpy.typing import NDArray
@@ -105,14 +103,8 @@ def load_policy(name: str, where: str = '') -> Policy:
 
 def _called(path: Path, function: str, label: str) -> Any:
     """Run a file as a module of its own, and give what its function gives."""
-    module_name = f'crgame_ros_policy_{path.stem}'
-    spec = importlib.util.spec_from_file_location(module_name, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    # Dataclasses and pickling look their module up by name.
-    sys.modules[module_name] = module
     try:
-        spec.loader.exec_module(module)
+        module = module_of_file(path, f'crgame_ros_policy_{path.stem}')
         load = getattr(module, function, None)
         if not callable(load):
             raise InputError(f'{path.name} has no function "{function}"', label,

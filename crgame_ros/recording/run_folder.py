@@ -48,6 +48,12 @@ def recording_in(path: Path) -> Path:
     return inside if inside.is_dir() and not (path / METADATA_FILE).exists() else path
 
 
+def folder_name(path: Path) -> str:
+    """Name a run by its folder; a recording in one is named by that."""
+    whole = path.resolve()
+    return whole.parent.name if whole.name.startswith('bag') and whole.parent.name else whole.name
+
+
 def bags_of(folder: Path) -> list[Path]:
     """Find a run's recordings in their order: several where the recorder was started again."""
     return sorted((path for path in folder.glob('bag*') if path.is_dir()), key=_order)

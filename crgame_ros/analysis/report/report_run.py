@@ -31,7 +31,7 @@ from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.objects import Role
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_folder import folder_name, recording_in
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import read_run_record, RunRecord
 from crgame_ros.recording.timing_report import timing_report
@@ -126,8 +126,8 @@ def read_report_run(path: Path, epoch: int | None = None,
     try:
         timing = timing_report(bag, log=record.log)
     except CrgameError as error:
-        return measured_run(_name(path), bag, record, None, progress, (str(error),))
-    return measured_run(_name(path), bag, record, timing, progress)
+        return measured_run(folder_name(path), bag, record, None, progress, (str(error),))
+    return measured_run(folder_name(path), bag, record, timing, progress)
 
 
 def measured_run(name: str, bag: Path | None, record: RunRecord,
@@ -177,9 +177,3 @@ def _most_critical(values: FloatArray) -> FloatArray:
         if len(column):
             worst[place] = column.min() if measure.worst < 0 else column.max()
     return worst
-
-
-def _name(path: Path) -> str:
-    """Name a run by its folder; a recording in one is named by that."""
-    whole = path.resolve()
-    return whole.parent.name if whole.name.startswith('bag') and whole.parent.name else whole.name

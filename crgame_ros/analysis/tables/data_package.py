@@ -26,7 +26,7 @@ from crgame_ros.analysis.tables.table_writer import Format, FORMULA_GUARD, NOT_A
 PACKAGE_FILE = 'datapackage.json'
 CREATOR = 'crgame_ros'
 # https://datapackage.org/standard/data-package/, version 2
-_PROFILE = 'https://datapackage.org/profiles/2.0/{}.json'
+PROFILE = 'https://datapackage.org/profiles/2.0/{}.json'
 _MEDIA_TYPES = {'parquet': 'application/vnd.apache.parquet', 'csv': 'text/csv'}
 DESCRIPTION = (
     'Tables of runs of crgame_ros. SI units and radians; positions are in the frame map of the '
@@ -53,7 +53,7 @@ def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str)
     :param name: of the package.
     """
     return {
-        '$schema': _PROFILE.format('datapackage'), 'name': name, 'title': f'Runs: {name}',
+        '$schema': PROFILE.format('datapackage'), 'name': name, 'title': f'Runs: {name}',
         'description': DESCRIPTION, 'createdBy': f'{CREATOR} {__version__}',
         'resources': [_resource(table, file_format) for table in tables]}
 
@@ -61,7 +61,7 @@ def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str)
 def table_schema(declaration: TableDeclaration) -> dict[str, Any]:
     """Give the Table Schema of a table."""
     schema: dict[str, Any] = {
-        '$schema': _PROFILE.format('tableschema'),
+        '$schema': PROFILE.format('tableschema'),
         'fields': [_field(column, column.name in declaration.key)
                    for column in declaration.columns],
         'missingValues': ['', NOT_A_NUMBER], 'primaryKey': list(declaration.key)}

@@ -17,7 +17,6 @@
 import base64
 from dataclasses import replace
 import hashlib
-from html.parser import HTMLParser
 import json
 import re
 
@@ -29,41 +28,8 @@ from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
 from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 from crgame_ros.analysis.scores.score_measures import MEASURES as MEASURES_OF_SCORES
 import numpy as np
+from page_reader import Page
 import pytest
-
-VOID = {'meta', 'link', 'img', 'br'}
-
-
-class Page(HTMLParser):
-    """A page, read."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.texts: list[tuple[tuple[str, ...], str]] = []
-        self._open: list[str] = []
-        self.feed(html)
-        self.close()
-        assert not self._open
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self._open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self._open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.texts.append((tuple(self._open), data))
-
-    def text_of(self, tag: str) -> list[str]:
-        """Give the texts that stand in elements of a kind."""
-        return [text for path, text in self.texts if tag in path]
-
-    def attributes(self, tag: str) -> list[dict[str, str | None]]:
-        """Give the attributes of all elements of a kind."""
-        return [found for name, found in self.elements if name == tag]
 
 
 @pytest.fixture(scope='module')

@@ -17,7 +17,6 @@
 import argparse
 import base64
 import hashlib
-from html.parser import HTMLParser
 import json
 from pathlib import Path
 import re
@@ -36,39 +35,10 @@ from crgame_ros.evaluation.summary.summary_tables import quantity
 from crgame_ros.evaluation.summary.summary_text import summary_text
 from evaluation_rows import Evaluation, many
 import numpy as np
+from page_reader import Page
 import pytest
 
 HOSTILE = '<script>alert(1)</script> | `x` \x1b[31m\n\u202eevil'
-VOID = {'meta', 'link', 'br'}
-
-
-class Page(HTMLParser):
-    """A page, read: its elements, and its text without style."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.text = ''
-        self._open: list[str] = []
-        self.feed(html)
-        self.close()
-        assert not self._open
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self._open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag not in VOID:
-            assert self._open.pop() == tag
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        if 'style' not in self._open:
-            self.text += f'{data}\n'
 
 
 @pytest.fixture
