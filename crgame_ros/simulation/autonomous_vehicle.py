@@ -154,7 +154,14 @@ class AutonomousVehicle:
         if asked is not None:
             asked.told = ego
         early, self._early = self._early, None
-        return None if early is None else self.offer(early, n)
+        if early is None:
+            return None
+        if early.stamp_ns < stamp_ns:
+            # What was perceived for it was never heard, as while a restarted perception is still
+            # being discovered: nobody can tell where the planner took its AV to be.
+            self._answered(self._scheduler.tick_of_stamp(early.stamp_ns))
+            return None
+        return self.offer(early, n)
 
     def offer(self, series: JointSeries, n: int) -> str | None:
         """
@@ -202,8 +209,7 @@ class AutonomousVehicle:
             # The perceived request is on its way to the engine, as it was to the planner.
             self._early = series
             return None
-        if self._busy_since == request_n:
-            self._busy_since = None
+        self._answered(request_n)
         try:
             plan = plan_from_joints(series, self.setup.id, self._scheduler.time_step_ns)
         except InputError as error:
@@ -223,6 +229,10 @@ class AutonomousVehicle:
             self._reference = Reference(states, self._scheduler.time_step_s)
         self.counters.realigned += self._tracker.adopt(states, request_n, n, self.state)
         return None
+
+    def _answered(self, request_n: int | None) -> None:
+        if self._busy_since == request_n:
+            self._busy_since = None
 
     def _in_simulation(self, states: NDArray[np.float64], true: VehicleState,
                        told: VehicleState) -> NDArray[np.float64]:

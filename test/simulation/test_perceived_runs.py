@@ -138,6 +138,22 @@ def test_a_plan_may_come_before_the_perceived_request() -> None:
     assert ego_of(told) != ego_of(true)
 
 
+def test_an_answer_is_dropped_whose_perceived_request_was_never_heard() -> None:
+    """A restarted perception may be discovered by the planner before the engine: no refusal."""
+    setup = perceiving('cut_in', NOISY)
+    simulation, _, told = perceived(setup)
+    av = simulation.avs[0]
+    seat = PlannerSeat(setup, 0, simulation, 0, None)
+    seat.perception = None
+    seat.ask(told)
+    seat.deliver()
+    later_ns = told.stamp_ns + 100_000_000
+    assert av.request_perceived(later_ns, ego_of(told), 10) is None
+    assert (av.counters.accepted, av.counters.refused, av.busy) == (0, 0, False)
+    assert simulation.request_perceived('av0', told) is None
+    assert av.counters.accepted == 0
+
+
 def test_nobody_follows_a_plan_for_a_request_that_was_never_perceived() -> None:
     """Without perception's answer the AV brakes, as without a planner."""
     simulation, true, told = perceived(perceiving('cut_in', NOISY))
