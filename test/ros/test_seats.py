@@ -23,7 +23,8 @@ from crgame_ros.game.game_file import load_game
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.ros_messages import to_joy
-from crgame_ros.ros.seats import COMMAND_DEPTH, GAME, MAX_ORDERS, Seat, Seats
+from crgame_ros.ros.seat import COMMAND_DEPTH, GAME, Seat
+from crgame_ros.ros.seats import MAX_ORDERS, Seats
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from live_peer import Peer
