@@ -23,6 +23,7 @@ import ssl
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
+# At once, of all and of one address; a browser opens six for a page.
 MAX_CONNECTIONS = 256
 MAX_OF_ADDRESS = 128
 # Until the first request, and between two of them [s]
@@ -34,17 +35,9 @@ _log = logging.getLogger(__name__)
 
 
 class Doorkeeper:
-    """
-    Counts the connections of each address and ends those that are kept for nothing.
+    """Counts the connections of each address and ends those that are kept for nothing."""
 
-    :param max_connections: at once.
-    :param max_of_address: at once of one address.
-    """
-
-    def __init__(self, max_connections: int = MAX_CONNECTIONS,
-                 max_of_address: int = MAX_OF_ADDRESS) -> None:
-        self._most = max_connections
-        self._most_of_address = max_of_address
+    def __init__(self) -> None:
         self._of_address: Counter[str] = Counter()
         self._open: dict[asyncio.BaseTransport, _Watched] = {}
 
@@ -67,8 +60,8 @@ class Doorkeeper:
 
     def lets_in(self, transport: asyncio.BaseTransport, watched: '_Watched') -> bool:
         """Count a connection, unless there are too many."""
-        if len(self._open) >= self._most \
-                or self._of_address[watched.address] >= self._most_of_address:
+        if len(self._open) >= MAX_CONNECTIONS \
+                or self._of_address[watched.address] >= MAX_OF_ADDRESS:
             return False
         self._of_address[watched.address] += 1
         self._open[transport] = watched
@@ -178,7 +171,7 @@ class _StrangersMistakes(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:  # noqa: A003
         error = record.exc_info[1] if record.exc_info else None
-        return not isinstance(error, HttpProcessingError | ValueError | UnicodeError)
+        return not isinstance(error, HttpProcessingError)
 
 
 def server_log() -> logging.Logger:

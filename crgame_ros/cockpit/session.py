@@ -235,7 +235,8 @@ def _end_with(writer: asyncio.Task[None], client: Client) -> None:
 
 def _send_promptly(transport: asyncio.WriteTransport) -> None:
     """Hold back no more than one message: what is old is replaced, not sent late."""
-    transport.set_write_buffer_limits(high=0)
+    # With 0, TLS would hold back for ever: it takes an empty buffer for a full one.
+    transport.set_write_buffer_limits(high=1, low=0)
     raw = transport.get_extra_info('socket')
     if raw is not None and hasattr(socket, 'TCP_NOTSENT_LOWAT'):
         raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _KERNEL_UNSENT)

@@ -121,11 +121,25 @@ class Seats {
       asked: (seat.requests ?? []).some(({ client }) => client === me.id),
       offer: seat.offer ?? null,
       offered: connected && seat.offer?.client === me.id,
-      refused: reasonAgainst(this.#store, 'drive', 'take a seat'),
+      refused: this.#refusal(id, seat),
       text: connected ? describeSeat(seat, role, scene?.planners?.[id], me.id)
         : 'Unknown without a connection',
       lost: Boolean(seat.lost || status?.seats_lost?.[id]),
     };
+  }
+
+  /**
+   * Why this person cannot do anything about a seat.
+   *
+   * @param {string} id
+   * @param {Seat} seat
+   */
+  #refusal(id, seat) {
+    const { rights, me } = this.#store;
+    const mine = seat.holder === me.id || seat.offer?.client === me.id;
+    return reasonAgainst(this.#store, 'drive', 'take a seat')
+      || (rights.seat === '' || rights.seat === id || mine ? ''
+        : `Your link is for ${rights.seat}; the driver of ${id} can offer it to you.`);
   }
 
   /**
