@@ -198,8 +198,8 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
                        'crgame.store.seats.hv1.holder_name]') == ['Anna', 'Bert']
     assert 'Traceback' not in launcher.text + '\n'.join(launcher.errors)
 
-    check_recording(graph)
     assert bert.browser.console_errors() == watcher.browser.console_errors() == []
+    check_recording(graph)
 
 
 def crash(person: Person) -> None:
