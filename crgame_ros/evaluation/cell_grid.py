@@ -65,6 +65,7 @@ class CellGrid:
     :param seeds: of everything random.
     :param duration_s: of each cell; None as games say [s]
     :param latency_steps: between a request and its plan.
+    :param commonroad_scores: whether CommonRoad's tools judge each cell, too.
     :param engine: digest of the engine's code.
     """
 
@@ -75,6 +76,7 @@ class CellGrid:
     seeds: tuple[int, ...]
     duration_s: float | None
     latency_steps: int
+    commonroad_scores: bool
     engine: str
 
     def __len__(self) -> int:
@@ -91,7 +93,7 @@ class CellGrid:
                                 scene.scenario, scene.game, scene.human, planner.label,
                                 perception, traffic, seed, scene.values, scene.inputs,
                                 planner.choice, seen, flow, self.duration_s, self.latency_steps,
-                                (self.engine, *self._code(scene, planner)))
+                                self.commonroad_scores, (self.engine, *self._code(scene, planner)))
 
     def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
         return (planner.digest,) if planner.choice is not None else scene.digests
@@ -141,7 +143,7 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
         scenes.append(scene)
         progress((number + 1) / len(places))
     return CellGrid(tuple(scenes), planners, perception, traffic, plan.seed_numbers(),
-                    plan.duration, plan.latency, engine_digest())
+                    plan.duration, plan.latency, plan.commonroad_scores, engine_digest())
 
 
 def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore) -> GridPlanner:

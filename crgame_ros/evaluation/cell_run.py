@@ -115,8 +115,7 @@ def measured(cell: Cell, result: OfflineResult) -> TabulatedRun:
     run = TabulatedRun(cell.key, record, offline=offline_outcome(result))
     found = measure_log(record.log)
     run.criticality.update({item.vehicle_id: item for item in found.report()})
-    # CommonRoad's tools would double the time that a short cell takes.
-    score_vehicles(run, drives_only=True)
+    score_vehicles(run, drives_only=not cell.commonroad_scores)
     return run
 
 
