@@ -31,7 +31,6 @@ from crgame_ros.evaluation.cell_rows import (
     CELLS,
     TABLES_OF_CELLS,
     VEHICLES_OF_CELLS,
-    WORK,
 )
 import pyarrow as pa
 import pyarrow.parquet as pq
