@@ -14,8 +14,10 @@
 # limitations under the License.
 """All cells of an evaluation, one after the other, none held."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, Self
 
 from crgame_ros.errors import InputError
@@ -135,15 +137,29 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
     scenes: list[CellScene] = []
     for number, (make, path) in enumerate(places):
         scene = make(path, store)
-        if any(each.label == scene.label for each in scenes):
-            raise InputError(f'another one is called {scene.label}, too', str(path),
-                             'rename one of them, or evaluate them apart')
         if not scene.digests:
             raise InputError('no AV takes part', str(path), 'leave it out, or name AVs in a game')
         scenes.append(scene)
         progress((number + 1) / len(places))
-    return CellGrid(tuple(scenes), planners, perception, traffic, plan.seed_numbers(),
+    paths = [path for _, path in places]
+    return CellGrid(_told_apart(scenes, paths), planners, perception, traffic, plan.seed_numbers(),
                     plan.duration, plan.latency, plan.commonroad_scores, engine_digest())
+
+
+def _told_apart(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:
+    """Name scenarios with one benchmark id by their files, too; refuse what is still alike."""
+    labels = Counter(scene.label for scene in scenes)
+    named = tuple(
+        replace(scene, scenario=f'{scene.scenario} ({path.stem})')
+        if labels[scene.label] > 1 and scene.label == scene.scenario else scene
+        for scene, path in zip(scenes, paths, strict=True))
+    known: set[str] = set()
+    for scene, path in zip(named, paths, strict=True):
+        if scene.label in known:
+            raise InputError(f'another one is called {scene.label}, too', str(path),
+                             'rename one of them, or evaluate them apart')
+        known.add(scene.label)
+    return named
 
 
 def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore) -> GridPlanner:

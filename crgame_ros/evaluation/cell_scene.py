@@ -54,7 +54,7 @@ class CellScene:
     """
     A game whose files are in a store.
 
-    :param scenario: benchmark id.
+    :param scenario: benchmark id, with the file's name where two files have that id.
     :param game: name of the game's file; empty where there is none.
     :param human: name of the recorded run whose humans drive; empty where there is none.
     :param values: of the game, as its file would have them; files are references to contents.
