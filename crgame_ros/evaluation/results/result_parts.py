@@ -27,7 +27,7 @@ from typing import Any, IO, Self
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.table_writer import TableWriter
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell_rows import (
+from crgame_ros.evaluation.results.cell_rows import (
     CELLS,
     TABLES_OF_CELLS,
     VEHICLES_OF_CELLS,
