@@ -82,6 +82,8 @@ class RunBackend:
         self.state = 'paused'
         self.stalled = False
         self.factor = 1.0
+        # As the status says it.
+        self.drivability: dict[str, dict[str, Any]] = {}
         self.n = self.epoch = 0
         self.messages: list[Mapping[str, Any]] = []
         self._random = np.random.default_rng(1)
@@ -176,7 +178,8 @@ class RunBackend:
             'run': self.state, 't': self.n * self.run.dt_s, 'n': self.n,
             'k': self.n // self.run.steps_per_tick, 'epoch': self.epoch,
             'real_time_factor': self.factor, 'measured_factor': self.factor,
-            'frames_skipped': False, 'timing': None, 'planners': {}, 'drivability': {},
+            'frames_skipped': False, 'timing': None, 'planners': {},
+            'drivability': self.drivability,
             'recording': {'state': 'none', 'messages': 0, 'megabytes': 0, 'text': ''},
             'seats_lost': {}, 'clients': 1})
 
