@@ -115,7 +115,7 @@ const vehicle = (id, more = {}) => ({
 });
 const row = (x, y, yaw, speed, more = {}) => [
   x, y, yaw, speed, 0, more.acceleration ?? 0, more.yaw_rate ?? 0, 0, more.throttle ?? NaN,
-  more.brake ?? NaN, NaN, more.reverse ?? NaN,
+  more.brake ?? NaN, NaN, more.reverse ?? NaN, more.lights ?? NaN,
 ];
 const sceneOf = (vehicles, objects = []) => ({ vehicles, objects });
 const shownOf = (vehicles, objects = [], t = 0) => ({
