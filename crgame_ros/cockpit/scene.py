@@ -15,6 +15,7 @@
 """The scene document: all that the page draws and lists and that stays as it is during a run."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 import math
 from typing import Any
 
@@ -32,6 +33,7 @@ from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.road_surface import lanelet_areas
 from crgame_ros.roads.signs import stop_line_ends
 from crgame_ros.scenario.loading import group_outline, LoadedScenario
+from crgame_ros.vehicle.driver_place import driver_place
 import numpy as np
 from numpy.typing import NDArray
 import shapely
@@ -174,6 +176,7 @@ def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) 
     return {'id': item.id, 'role': role, 'shape': _shape(vehicle.shape),
             'rear_to_center': vehicle.rear_to_center, 'wheelbase': vehicle.wheelbase,
             'max_steering_angle': vehicle.max_steering_angle,
+            'driver_place': asdict(driver_place(vehicle)),
             'perception': None if perception is None else _perception(perception)}
 
 
