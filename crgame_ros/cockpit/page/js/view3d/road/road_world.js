@@ -5,7 +5,7 @@
 import { outlineOf } from '../../outline.js';
 import { localOrigin } from '../local_origin.js';
 
-/** @import { BufferGeometry, Group } from 'three' */
+/** @import { BufferGeometry, FogExp2, Group } from 'three' */
 /** @import { Scene } from '../../messages.js' */
 /** @import { Store } from '../../store.js' */
 
@@ -14,7 +14,9 @@ import { localOrigin } from '../local_origin.js';
 
 /**
  * @typedef {object} RoadWorld
- * @property {Group} group what the scene of three.js gets: z up, metres from `localOrigin(scene)`
+ * @property {Group} group what the scene of three.js gets: z up, metres from `localOrigin(scene)`;
+ *   the lights are in it
+ * @property {FogExp2} fog of the scene of three.js
  * @property {(store: Store, now_ms: number, eye: Point) => void} update called before each
  *   picture, after `store.displayed(now_ms)`; eye is that of the main camera
  * @property {(x: number, y: number) => number} heightAt of the road at a point of the map [m]
@@ -23,6 +25,7 @@ import { localOrigin } from '../local_origin.js';
  * @property {() => void} dispose frees what the graphics card holds
  */
 
+const SKY = 0xdfeaf5;
 const GROUND = 0x6f8a5a;
 const ROAD = 0x4a4e55;
 const GROUND_BELOW_M = 0.03;
@@ -44,9 +47,11 @@ export function createRoadWorld(three, scene) {
     new three.PlaneGeometry(xmax - xmin + MARGIN_M, ymax - ymin + MARGIN_M),
     new three.MeshLambertMaterial({ color: GROUND }));
   ground.position.z = -GROUND_BELOW_M;
-  group.add(ground, road);
+  const sun = new three.DirectionalLight(0xffffff, 2);
+  sun.position.set(-0.4, -0.6, 1);
+  group.add(ground, road, sun, new three.HemisphereLight(SKY, GROUND, 1.6));
   return {
-    group, update() {}, heightAt: () => 0,
+    group, fog: new three.FogExp2(SKY, 0), update() {}, heightAt: () => 0,
     triangles: 2 + (road.geometry.index?.count ?? 0) / 3, drawCalls: 2,
     dispose() {
       for (const mesh of [road, ground]) {
