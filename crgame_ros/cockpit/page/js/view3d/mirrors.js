@@ -26,12 +26,13 @@ const FRAME = 0x14161a;
 
 /** Mirrors of the vehicle whose driver looks. */
 export class Mirrors {
-  #three;
   #overlay;
   #flat;
-  /** @type {ReturnType<Mirrors['_make']>[]} */
+  /** @type {ReturnType<typeof makeGlass>[]} */
   #glasses;
   #next = 0;
+  /** Name of the one that was drawn last; empty before. */
+  drawn = '';
   #width = 1;
   #height = 1;
 
@@ -40,10 +41,9 @@ export class Mirrors {
    * @param {boolean} software whether the processor draws
    */
   constructor(three, software) {
-    this.#three = three;
     this.#overlay = new three.Scene();
     this.#flat = new three.OrthographicCamera(0, 1, 1, 0, -1, 1);
-    this.#glasses = MIRRORS.map((mirror) => this._make(mirror, software));
+    this.#glasses = MIRRORS.map((mirror) => makeGlass(three, this.#overlay, mirror, software));
   }
 
   /**
@@ -93,7 +93,8 @@ export class Mirrors {
    *   the vehicle is
    */
   drawNext(renderer, scene, aim) {
-    const { target, camera, optics } = this.#glasses[this.#next];
+    const { mirror, target, camera, optics } = this.#glasses[this.#next];
+    this.drawn = mirror.name;
     this.#next = (this.#next + 1) % this.#glasses.length;
     if (optics !== null) {
       aim(camera, optics);
@@ -121,32 +122,6 @@ export class Mirrors {
       { name: mirror.name, camera, rectangle: this.#rectangle(mirror) }));
   }
 
-  /** How many there are. */
-  get count() {
-    return this.#glasses.length;
-  }
-
-  /**
-   * @param {Mirror} mirror
-   * @param {boolean} software
-   */
-  _make(mirror, software) {
-    const three = this.#three;
-    const target = new three.WebGLRenderTarget(16, 8, { samples: software ? 0 : 4 });
-    const camera = new three.PerspectiveCamera();
-    camera.rotation.order = 'ZXY';
-    const pane = new three.Mesh(turnedOver(three),
-      new three.MeshBasicMaterial({ map: target.texture, depthTest: false, toneMapped: false }));
-    pane.renderOrder = 1;
-    const frame = new three.Mesh(new three.PlaneGeometry(1, 1),
-      new three.MeshBasicMaterial({ color: FRAME, depthTest: false, toneMapped: false }));
-    this.#overlay.add(frame, pane);
-    /** @type {MirrorCamera|null} */
-    const optics = null;
-    return { mirror, target, camera, pane, frame,
-      optics: /** @type {MirrorCamera|null} */ (optics) };
-  }
-
   /**
    * @param {Mirror} mirror
    * @returns {Rectangle}
@@ -158,6 +133,25 @@ export class Mirrors {
     return { left: x * this.#width - w / 2, bottom: y * this.#height - h / 2, width: w,
       height: h };
   }
+}
+
+/**
+ * @param {Three} three
+ * @param {Scene3} overlay gets the glass and its frame
+ * @param {Mirror} mirror
+ * @param {boolean} software
+ */
+function makeGlass(three, overlay, mirror, software) {
+  const target = new three.WebGLRenderTarget(16, 8, { samples: software ? 0 : 4 });
+  const camera = new three.PerspectiveCamera();
+  const pane = new three.Mesh(turnedOver(three),
+    new three.MeshBasicMaterial({ map: target.texture, depthTest: false, toneMapped: false }));
+  pane.renderOrder = 1;
+  const frame = new three.Mesh(new three.PlaneGeometry(1, 1),
+    new three.MeshBasicMaterial({ color: FRAME, depthTest: false, toneMapped: false }));
+  overlay.add(frame, pane);
+  return { mirror, target, camera, pane, frame,
+    optics: /** @type {MirrorCamera|null} */ (null) };
 }
 
 /** @param {Three} three */
