@@ -248,9 +248,9 @@ def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
         picture.draw(crgame.store.displayed(performance.now()), performance.now(), {
           viewpoint: 'chase', index: 0, aside: 0, height: 0.8, mirrors: false, plans: false });
         const context = document.querySelector('#view3d').getContext('webgl2');
-        const pixels = new Uint8Array(4 * context.drawingBufferWidth * context.drawingBufferHeight);
-        context.readPixels(0, 0, context.drawingBufferWidth, context.drawingBufferHeight,
-          context.RGBA, context.UNSIGNED_BYTE, pixels);
+        const { drawingBufferWidth: width, drawingBufferHeight: height } = context;
+        const pixels = new Uint8Array(4 * width * height);
+        context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, pixels);
         const seen = new Set();
         for (let i = 0; i < pixels.length; i += 4) {
           seen.add(`${pixels[i] >> 4} ${pixels[i + 1] >> 4} ${pixels[i + 2] >> 4}`);
