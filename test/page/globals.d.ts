@@ -8,6 +8,7 @@ import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
 import type { createPerception } from
   '../../crgame_ros/cockpit/page/js/perception/perception.js';
 import type { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import type { View3d } from '../../crgame_ros/cockpit/page/js/view3d/view3d.js';
 import type { World } from '../../crgame_ros/cockpit/page/js/world/world.js';
 
 /** main.js fills it: every part may be missing, because each is loaded by itself. */
@@ -17,6 +18,7 @@ interface Crgame {
   world: World;
   driving?: Driving;
   perception?: ReturnType<typeof createPerception>;
+  view3d?: View3d;
   ready?: boolean;
   [part: string]: unknown;
 }
