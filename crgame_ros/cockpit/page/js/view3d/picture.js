@@ -12,7 +12,6 @@ import { createRoadWorld } from './road/road_world.js';
 
 const NEAR_M = 0.1;
 const FAR_M = 3000;
-const SKY = 0xbcd3e6;
 
 /** Draws what a store shows. */
 export class Picture {
@@ -37,13 +36,9 @@ export class Picture {
     this.#store = store;
     this.#renderer = new three.WebGLRenderer({ canvas, antialias: true });
     this.#scene = new three.Scene();
-    this.#scene.background = new three.Color(SKY);
     this.#camera = new three.PerspectiveCamera(60, 1, NEAR_M, FAR_M);
     this.#camera.up.set(0, 0, 1);
     this.#camera.rotation.order = 'ZXY';
-    const sun = new three.DirectionalLight(0xffffff, 2);
-    sun.position.set(-0.4, -0.6, 1);
-    this.#scene.add(sun, new three.HemisphereLight(0xdfeaf5, 0x6f8a5a, 1.4));
     store.on('scene', (scene) => this.#load(scene));
     if (store.scene !== null) {
       this.#load(store.scene);
@@ -80,6 +75,11 @@ export class Picture {
       frame_ms: performance.now() - begin_ms });
   }
 
+  /** The world around the vehicles; null before there is a scene. */
+  get road() {
+    return this.#road;
+  }
+
   /**
    * The height of the road at a point of the map.
    *
@@ -99,5 +99,6 @@ export class Picture {
     this.#origin = localOrigin(scene);
     this.#road = createRoadWorld(this.#three, scene);
     this.#scene.add(this.#road.group);
+    this.#scene.fog = this.#road.fog;
   }
 }

@@ -27,14 +27,28 @@ export function contrastLeft(distance, visibility) {
 
 // three.js fogs by exp(-(density * depth)^2), along the view's axis and between colours as they
 // are encoded for the screen; air does by exp(-density * distance), between lights.
+const DECLARED = `#ifdef USE_FOG
+  varying vec3 vFromEye;
+#endif`;
 const VERTEX = `#ifdef USE_FOG
-  vFogDepth = length( mvPosition.xyz );
+  vFromEye = mvPosition.xyz;
+#endif`;
+const UNIFORMS = `#ifdef USE_FOG
+  uniform vec3 fogColor;
+  varying vec3 vFromEye;
+  #ifdef FOG_EXP2
+    uniform float fogDensity;
+  #else
+    uniform float fogNear;
+    uniform float fogFar;
+  #endif
 #endif`;
 const FRAGMENT = `#ifdef USE_FOG
+  float fogDepth = length( vFromEye );
   #ifdef FOG_EXP2
-    float fogFactor = 1.0 - exp( - fogDensity * vFogDepth );
+    float fogFactor = 1.0 - exp( - fogDensity * fogDepth );
   #else
-    float fogFactor = smoothstep( fogNear, fogFar, vFogDepth );
+    float fogFactor = smoothstep( fogNear, fogFar, fogDepth );
   #endif
   // A mirror's picture is not encoded, the screen's is.
   if ( linearToOutputTexel( vec4( 0.5 ) ).r > 0.6 ) {
@@ -52,6 +66,8 @@ const FRAGMENT = `#ifdef USE_FOG
  * @param {Three} three the library
  */
 export function fogAsAirDoes(three) {
+  three.ShaderChunk.fog_pars_vertex = DECLARED;
   three.ShaderChunk.fog_vertex = VERTEX;
+  three.ShaderChunk.fog_pars_fragment = UNIFORMS;
   three.ShaderChunk.fog_fragment = FRAGMENT;
 }

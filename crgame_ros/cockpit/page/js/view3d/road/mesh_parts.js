@@ -68,7 +68,7 @@ export class MeshParts {
   }
 
   /**
-   * Add a polygon.
+   * Add a polygon, to be seen from above.
    *
    * @param {number[]} ring flat polygon
    * @param {ArrayLike<number>} faces three indices of its points for each triangle
@@ -81,8 +81,13 @@ export class MeshParts {
     for (let i = 0; i < ring.length; i += 2) {
       this.vertex(ring[i], ring[i + 1], heights(ring[i], ring[i + 1]), color, rank);
     }
-    for (let i = 0; i < faces.length; i += 1) {
-      this.indices.push(first + faces[i]);
+    for (let i = 0; i + 2 < faces.length; i += 3) {
+      const [a, b, c] = [2 * faces[i], 2 * faces[i + 1], 2 * faces[i + 2]];
+      const turn = (ring[b] - ring[a]) * (ring[c + 1] - ring[a + 1])
+        - (ring[b + 1] - ring[a + 1]) * (ring[c] - ring[a]);
+      // Faces are seen from where they go round counterclockwise: from above.
+      const [second, third] = turn > 0 ? [b, c] : [c, b];
+      this.indices.push(first + a / 2, first + second / 2, first + third / 2);
     }
   }
 

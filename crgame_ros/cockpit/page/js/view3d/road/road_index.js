@@ -7,6 +7,8 @@ import { boxOf, contains, outlineOf } from '../../outline.js';
 /** @import { Box, Lanelet } from '../../messages.js' */
 
 const CELL_M = 25;
+// So far beside a road its height is that of the land [m].
+const BESIDE_M = 60;
 
 /** @typedef {{lanelet: Lanelet, ring: number[], box: Box}} Place */
 
@@ -69,24 +71,47 @@ export class RoadIndex {
   }
 
   /**
-   * Give the height of the road, where bridges cross of the highest one.
+   * Tell whether a point lies well within a lanelet that is neither this one nor beside it.
    *
    * @param {number} x
    * @param {number} y
-   * @returns {number} [m], 0 on a flat map, and NaN beside the roads of one with heights
+   * @param {Lanelet} own
+   * @param {number} depth least distance to the other's outline [m]
+   */
+  isWithinAnother(x, y, own, depth) {
+    for (const { lanelet: { id }, ring } of this.near(x, y, 0)) {
+      if (id !== own.id && id !== own.adj_left && id !== own.adj_right
+          && contains(ring, x, y) && distanceToRing(ring, x, y) > depth) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /**
+   * Give the height of the road: where bridges cross of the highest one, beside it of the nearest.
+   *
+   * @param {number} x
+   * @param {number} y
+   * @returns {number} [m], 0 on a flat map, and far from every road
    */
   heightAt(x, y) {
     if (!this.#hasHeights) {
       return 0;
     }
-    let highest = NaN;
-    for (const { lanelet, ring } of this.near(x, y, 0.5)) {
-      if (contains(ring, x, y) || distanceToRing(ring, x, y) < 0.5) {
-        const height = heightOn(lanelet, x, y);
-        highest = Number.isNaN(highest) ? height : Math.max(highest, height);
+    let highest = -Infinity;
+    let least = Infinity;
+    let nearest = 0;
+    for (const { lanelet, ring } of this.near(x, y, BESIDE_M)) {
+      if (contains(ring, x, y)) {
+        highest = Math.max(highest, heightOn(lanelet, x, y));
+      } else if (highest === -Infinity) {
+        const distance = distanceToRing(ring, x, y);
+        [least, nearest] = distance < least ? [distance, heightOn(lanelet, x, y)]
+          : [least, nearest];
       }
     }
-    return highest;
+    return highest === -Infinity ? nearest : highest;
   }
 
   /**
