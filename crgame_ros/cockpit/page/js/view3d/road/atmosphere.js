@@ -27,8 +27,8 @@ const HAZE_M = 250;
 
 /** @type {Record<Environment['light'], Daylight>} */
 const LIGHTS = {
-  day: { zenith: 0x4f86c6, horizon: 0xc9dbe8, fog: 0xc4c9cb, sun: 0xfff4e0, sun_light: 2.3,
-    sun_from: [-0.45, -0.6, 0.75], ground: 0x8d8f78, sky_light: 1.5 },
+  day: { zenith: 0x4f86c6, horizon: 0xc9dbe8, fog: 0xc4c9cb, sun: 0xfff4e0, sun_light: 1.9,
+    sun_from: [-0.45, -0.6, 0.75], ground: 0x9a9c88, sky_light: 2.0 },
   dusk: { zenith: 0x1d2a4d, horizon: 0xb98a72, fog: 0x4d525d, sun: 0xffb27a, sun_light: 0.35,
     sun_from: [-0.9, 0.35, 0.16], ground: 0x3c3a38, sky_light: 0.55 },
 };

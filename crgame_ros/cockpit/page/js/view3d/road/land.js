@@ -17,9 +17,9 @@ const BELOW_M = 0.04;
 // Below roads on hills, which the land's triangles follow by halves only [m].
 const UNDER_HILLS_M = 0.4;
 /** @type {Rgb} */
-const MEADOW = [110, 134, 76];
+const MEADOW = [104, 124, 78];
 /** @type {Rgb} */
-const FIELD = [146, 146, 92];
+const FIELD = [140, 138, 94];
 // Under everything else that is flat.
 const RANK = -2;
 

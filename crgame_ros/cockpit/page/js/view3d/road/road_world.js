@@ -7,11 +7,14 @@ import { Atmosphere } from './atmosphere.js';
 import { buildLand } from './land.js';
 import { geometryOf, grainTexture, paintedMaterial } from './materials.js';
 import { buildRoads } from './road_chunks.js';
+import { placeLights, placeSigns } from './poles.js';
 import { RoadIndex } from './road_index.js';
 import { placeRoadside } from './roadside.js';
 import { Scenery } from './scenery.js';
+import { Signs } from './signs.js';
+import { TrafficLights } from './traffic_lights.js';
 
-/** @import { FogExp2, Group } from 'three' */
+/** @import { FogExp2, Group, Object3D } from 'three' */
 /** @import { Environment, Scene } from '../../messages.js' */
 /** @import { Store } from '../../store.js' */
 
@@ -58,21 +61,31 @@ export function createRoadWorld(three, scene) {
     mesh.matrixAutoUpdate = false;
     return mesh;
   });
-  const scenery = new Scenery(three, placeRoadside(scene, index), origin, heightAt);
-  group.add(atmosphere.group, ...meshes, ...scenery.meshes);
+  const painted = paintedMaterial(three, null);
+  const scenery = new Scenery(three, placeRoadside(scene, index), origin, heightAt, painted);
+  const signs = new Signs(three, placeSigns(scene, index), scene.country, origin, heightAt,
+    painted);
+  const lights = new TrafficLights(three, placeLights(scene, index), origin, heightAt, painted);
+  const standing = [scenery, signs, lights];
+  /** @type {Object3D[]} */
+  const all = [...meshes, ...scenery.meshes, ...signs.meshes, ...lights.meshes];
+  group.add(atmosphere.group, ...all);
   return {
     group, fog: atmosphere.fog, heightAt,
     setEnvironment: (environment) => atmosphere.set(environment),
-    update(store, now_ms, eye) {
+    update(store, _now_ms, eye) {
       scenery.update(eye);
+      signs.update(eye);
+      lights.update(store.signals.states, eye);
     },
     triangles: meshes.reduce((sum, { geometry }) => sum + (geometry.index?.count ?? 0) / 3,
-      atmosphere.triangles + scenery.triangles),
-    drawCalls: meshes.length + scenery.meshes.length + 1,
+      standing.reduce((sum, part) => sum + part.triangles, atmosphere.triangles)),
+    drawCalls: all.length + 1,
     build_ms: performance.now() - begin_ms,
     dispose() {
       atmosphere.dispose();
-      scenery.dispose();
+      standing.forEach((part) => part.dispose());
+      painted.dispose();
       meshes.forEach(({ geometry }) => geometry.dispose());
       material.dispose();
       grain.dispose();
