@@ -29,8 +29,8 @@ const HAZE_M = 250;
 const LIGHTS = {
   day: { zenith: 0x4f86c6, horizon: 0xc9dbe8, fog: 0xc4c9cb, sun: 0xfff4e0, sun_light: 1.9,
     sun_from: [-0.45, -0.6, 0.75], ground: 0x9a9c88, sky_light: 2.0 },
-  dusk: { zenith: 0x1d2a4d, horizon: 0xb98a72, fog: 0x4d525d, sun: 0xffb27a, sun_light: 0.35,
-    sun_from: [-0.9, 0.35, 0.16], ground: 0x3c3a38, sky_light: 0.55 },
+  dusk: { zenith: 0x34466e, horizon: 0xc9ab97, fog: 0x565b66, sun: 0xffa66a, sun_light: 0.5,
+    sun_from: [-0.9, 0.35, 0.09], ground: 0x4c4a48, sky_light: 0.95 },
 };
 
 const SKY_VERTEX = `
@@ -49,7 +49,7 @@ void main() {
   float up = max(toward.z, 0.0);
   vec3 tone = mix(horizon, zenith, pow(up, 0.55));
   float near = max(dot(toward, sunFrom), 0.0);
-  tone += sunTone * (0.28 * pow(near, 24.0) + 4.0 * smoothstep(0.99955, 0.9998, near));
+  tone += sunTone * (0.16 * pow(near, 12.0) + 4.0 * smoothstep(0.99955, 0.9998, near));
   tone = mix(fogTone, tone, exp(-haze / max(up, 0.004)));
   gl_FragColor = vec4(tone, 1.0);
   #include <tonemapping_fragment>

@@ -7,7 +7,7 @@ import { randomFrom } from './random.js';
 
 /** @import { Scene } from '../../messages.js' */
 /** @import { Origin } from '../local_origin.js' */
-/** @import { Rgb } from './mesh_parts.js' */
+/** @import { Heights, Rgb } from './mesh_parts.js' */
 
 // Beyond the map the land goes on for so long [m].
 const MARGIN_M = 1200;
@@ -28,7 +28,7 @@ const RANK = -2;
  *
  * @param {Scene} scene the scene document
  * @param {Origin} origin
- * @returns {MeshParts}
+ * @returns {{parts: MeshParts, heightAt: Heights}} the latter of points within it, [m]
  */
 export function buildLand(scene, origin) {
   const [xmin, ymin, xmax, ymax] = scene.bounds;
@@ -54,7 +54,11 @@ export function buildLand(scene, origin) {
       }
     }
   }
-  return parts;
+  return { parts, heightAt: (x, y) => {
+    const column = Math.min(Math.max(Math.round((x - x0) / cell), 0), count);
+    const row = Math.min(Math.max(Math.round((y - y0) / cell), 0), count);
+    return heights === null ? 0 : heights[row * (count + 1) + column];
+  } };
 }
 
 /**

@@ -5,7 +5,7 @@
 import { collectBoundaries } from '../../world/boundaries.js';
 import { boxOf, outlineOf } from '../../outline.js';
 import { MeshParts } from './mesh_parts.js';
-import { COLOR, pavementOf, RANK, RoadPaint } from './road_paint.js';
+import { COLOR, pavementOf, RANK, reversed, RoadPaint } from './road_paint.js';
 
 /** @import { Box, Lanelet, Scene } from '../../messages.js' */
 /** @import { Origin } from '../local_origin.js' */
@@ -16,6 +16,7 @@ const LEAST_CELL_M = 150;
 const MOST_CELL_M = 450;
 // Along the longer side of a map that is neither small nor large.
 const CELLS = 5;
+const BANK_M = 2;
 
 /** @typedef {(ring: number[]) => ArrayLike<number>} Triangulate flat polygon to index triples */
 
@@ -56,7 +57,11 @@ export function buildRoads(scene, origin, index, heights, triangulate) {
   }
   for (const boundary of collectBoundaries(scene.lanelets)) {
     const lanelet = scene.lanelets[boundary.owner];
-    paint.addBoundary(/** @type {MeshParts} */ (homes.get(lanelet.id)), boundary, lanelet);
+    const parts = /** @type {MeshParts} */ (homes.get(lanelet.id));
+    paint.addBoundary(parts, boundary, lanelet);
+    if (index.hasHeights && !boundary.inner) {
+      addBank(parts, boundary.line, boundary.line === lanelet.left, heights);
+    }
   }
   for (const stop of scene.stop_lines) {
     paint.addStopLine(chunkOf(boxOf(stop.points)), stop);
@@ -75,6 +80,20 @@ function addPavement(parts, lanelet, heights, triangulate) {
   const ring = outlineOf(lanelet);
   parts.addFaces(ring, lanelet.left_z && lanelet.right_z ? ladder(lanelet) : triangulate(ring),
     heights, color, rank);
+}
+
+/**
+ * Close the gap between a road and the land, which lies lower.
+ *
+ * @param {MeshParts} parts
+ * @param {number[]} line bound of a lanelet
+ * @param {boolean} isLeft
+ * @param {Heights} heights
+ */
+function addBank(parts, line, isLeft, heights) {
+  // From the outside one looks to its road.
+  const seen = isLeft ? reversed(line) : line;
+  parts.addWall(seen, (x, y) => heights(x, y) - BANK_M, heights, COLOR.bank);
 }
 
 /**

@@ -7,6 +7,8 @@ import { boxOf, contains, outlineOf } from '../../outline.js';
 /** @import { Box, Lanelet } from '../../messages.js' */
 
 const CELL_M = 25;
+// A bound's own points are on the road, too [m].
+const ON_M = 0.05;
 // So far beside a road its height is that of the land [m].
 const BESIDE_M = 60;
 
@@ -16,11 +18,11 @@ const BESIDE_M = 60;
 export class RoadIndex {
   /** @type {Map<number, Map<number, Place[]>>} */
   #rows = new Map();
-  #hasHeights;
 
   /** @param {Lanelet[]} lanelets */
   constructor(lanelets) {
-    this.#hasHeights = lanelets.some(({ left_z }) => Boolean(left_z));
+    /** Whether the map has heights; else it is flat. */
+    this.hasHeights = lanelets.some(({ left_z }) => Boolean(left_z));
     for (const lanelet of lanelets) {
       const ring = outlineOf(lanelet);
       const place = { lanelet, ring, box: boxOf(ring) };
@@ -96,22 +98,33 @@ export class RoadIndex {
    * @returns {number} [m], 0 on a flat map, and far from every road
    */
   heightAt(x, y) {
-    if (!this.#hasHeights) {
+    if (!this.hasHeights) {
       return 0;
     }
     let highest = -Infinity;
-    let least = Infinity;
-    let nearest = 0;
-    for (const { lanelet, ring } of this.near(x, y, BESIDE_M)) {
-      if (contains(ring, x, y)) {
+    for (const { lanelet, ring } of this.near(x, y, ON_M)) {
+      if (contains(ring, x, y) || distanceToRing(ring, x, y) < ON_M) {
         highest = Math.max(highest, heightOn(lanelet, x, y));
-      } else if (highest === -Infinity) {
-        const distance = distanceToRing(ring, x, y);
-        [least, nearest] = distance < least ? [distance, heightOn(lanelet, x, y)]
-          : [least, nearest];
       }
     }
-    return highest === -Infinity ? nearest : highest;
+    return highest === -Infinity ? this.#heightBeside(x, y) : highest;
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
+  #heightBeside(x, y) {
+    let least = Infinity;
+    let height = 0;
+    for (const { lanelet, ring } of this.near(x, y, BESIDE_M)) {
+      const distance = distanceToRing(ring, x, y);
+      if (distance < least) {
+        least = distance;
+        height = heightOn(lanelet, x, y);
+      }
+    }
+    return height;
   }
 
   /**

@@ -16,11 +16,14 @@ import { paintedPieces, stripOf } from './strips.js';
 /** Of flat things the higher rank is on top. */
 export const RANK = { road: 1, special: 2, seam: 3, line: 4, across: 5 };
 
-/** @type {Record<'road'|'walk'|'cycle'|'parking'|'bus'|'kerb'|'seam'|'white'|'yellow'|'worn', Rgb>} */
+/**
+ * @type {Record<'road'|'walk'|'cycle'|'parking'|'bus'|'kerb'|'seam'|'white'|'yellow'|'worn'
+ *   |'bank', Rgb>}
+ */
 export const COLOR = {
   road: [98, 100, 103], walk: [172, 167, 157], cycle: [139, 84, 72], parking: [112, 111, 110],
   bus: [108, 93, 82], kerb: [178, 176, 170], seam: [66, 67, 70], white: [240, 240, 236],
-  yellow: [232, 186, 60], worn: [158, 159, 158],
+  yellow: [232, 186, 60], worn: [158, 159, 158], bank: [96, 104, 70],
 };
 const KERB_M = { curb: 0.12, lowered: 0.03 };
 const STOP_LINE_M = 0.5;
@@ -235,9 +238,9 @@ function straightened(line) {
 
 /**
  * @param {number[]} line flat polyline
- * @returns {number[]}
+ * @returns {number[]} from its end
  */
-function reversed(line) {
+export function reversed(line) {
   const back = [];
   for (let i = line.length - 2; i >= 0; i -= 2) {
     back.push(line[i], line[i + 1]);

@@ -7,6 +7,7 @@ import { Atmosphere } from './atmosphere.js';
 import { buildLand } from './land.js';
 import { geometryOf, grainTexture, paintedMaterial } from './materials.js';
 import { buildRoads } from './road_chunks.js';
+import { Obstacles } from './obstacles.js';
 import { placeLights, placeSigns } from './poles.js';
 import { RoadIndex } from './road_index.js';
 import { placeRoadside } from './roadside.js';
@@ -56,19 +57,22 @@ export function createRoadWorld(three, scene) {
   const grain = grainTexture(three);
   const material = paintedMaterial(three, grain);
   const roads = buildRoads(scene, origin, index, heightAt, triangulator(three));
-  const meshes = [buildLand(scene, origin), ...roads].map((parts) => {
+  const land = buildLand(scene, origin);
+  const meshes = [land.parts, ...roads].map((parts) => {
     const mesh = new three.Mesh(geometryOf(three, parts), material);
     mesh.matrixAutoUpdate = false;
     return mesh;
   });
   const painted = paintedMaterial(three, null);
-  const scenery = new Scenery(three, placeRoadside(scene, index), origin, heightAt, painted);
+  const scenery = new Scenery(three, placeRoadside(scene, index), origin, land.heightAt, painted);
   const signs = new Signs(three, placeSigns(scene, index), scene.country, origin, heightAt,
     painted);
   const lights = new TrafficLights(three, placeLights(scene, index), origin, heightAt, painted);
+  const obstacles = new Obstacles(three, origin, heightAt, painted);
   const standing = [scenery, signs, lights];
   /** @type {Object3D[]} */
-  const all = [...meshes, ...scenery.meshes, ...signs.meshes, ...lights.meshes];
+  const all = [...meshes, ...scenery.meshes, ...signs.meshes, ...lights.meshes,
+    obstacles.mesh];
   group.add(atmosphere.group, ...all);
   return {
     group, fog: atmosphere.fog, heightAt,
@@ -77,6 +81,7 @@ export function createRoadWorld(three, scene) {
       scenery.update(eye);
       signs.update(eye);
       lights.update(store.signals.states, eye);
+      obstacles.update(store.perceived.occupancy);
     },
     triangles: meshes.reduce((sum, { geometry }) => sum + (geometry.index?.count ?? 0) / 3,
       standing.reduce((sum, part) => sum + part.triangles, atmosphere.triangles)),
@@ -85,6 +90,7 @@ export function createRoadWorld(three, scene) {
     dispose() {
       atmosphere.dispose();
       standing.forEach((part) => part.dispose());
+      obstacles.dispose();
       painted.dispose();
       meshes.forEach(({ geometry }) => geometry.dispose());
       material.dispose();
