@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.events import EventList
 from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -281,6 +282,7 @@ class Game:
     :param objects: objects of the game's own (FS II-A3).
     :param traffic: vehicles that react (FS III); None for none.
     :param occupancy: map of permanent obstacles (FS II-A2).
+    :param environment: light and air, as people see the world.
     """
 
     FORM: ClassVar[Form] = Form(
@@ -301,6 +303,7 @@ class Game:
     objects: Annotated[ObjectList, LeftOut()] = ()
     traffic: TrafficSpec | None = None
     occupancy: Annotated[Path, Advice('name the YAML file of a map')] | None = None
+    environment: EnvironmentSpec | None = None
 
     def _repr_html_(self) -> str:
         """Show it in a notebook as its file says it."""

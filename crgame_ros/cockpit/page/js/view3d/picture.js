@@ -22,7 +22,6 @@ import { standOf } from './vehicle_stand.js';
 
 const NEAR_M = 0.2;
 const FAR_M = 3000;
-const SKY = 0xbcd3e6;
 
 /**
  * What is to be drawn.
@@ -76,7 +75,6 @@ export class Picture {
     this.#quality = new Quality(software, window.devicePixelRatio);
     this.#cost = new FrameCost(this.#renderer.getContext());
     this.#scene = new three.Scene();
-    this.#scene.background = new three.Color(SKY);
     this.#camera = new three.PerspectiveCamera(60, 1, NEAR_M, FAR_M);
     this.#camera.rotation.order = 'ZXY';
     const bodies = new three.Group();
