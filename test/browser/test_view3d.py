@@ -50,8 +50,12 @@ const local = (point) => new Vector3(
   point[0] - picture.origin.x, point[1] - picture.origin.y, point[2]);
 const found = poses.map(({ x, y, yaw, aside, ahead, behind }) => {
   shown.vehicles.set([x, y, yaw]);
-  picture.draw(shown, 0, { viewpoint: 'driver', index: 0, aside, height: tall, mirrors: true,
-    plans: false });
+  const looks = { viewpoint: 'driver', index: 0, aside, height: tall, mirrors: true,
+    plans: false };
+  const before = picture.mirrors.drawn;
+  while (picture.mirrors.drawn === before) {
+    picture.draw(shown, 0, looks);
+  }
   const main = local(ahead).project(picture.camera);
   const { camera } = picture.mirrors.all.find(({ name }) => name === picture.mirrors.drawn);
   const glass = local(behind[picture.mirrors.drawn]).project(camera);
