@@ -92,7 +92,7 @@ test('levels grow with speed as vehicle acoustics has it', () => {
   close(decibel(windLevel(30) / windLevel(3)), 60);
   assert.equal(tyreLevel(0), 0);
   assert.equal(windLevel(0), 0);
-  assert.ok(windLevel(200) <= 0.3);
+  assert.ok(windLevel(200) <= 0.2);
   assert.equal(engineLevel(ELECTRIC, 0, 1), 0);
   for (const train of [CAR, HEAVY, ELECTRIC]) {
     const { idle_rpm: idle, limit_rpm: limit } = train;

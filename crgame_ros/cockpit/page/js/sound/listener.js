@@ -21,8 +21,10 @@ const LONG_M = 7.5;
 // Where a driver's head is: shares of the wheelbase ahead of the rear axle, and of the width left.
 const HEAD_AHEAD = 0.45;
 const HEAD_LEFT = 0.2;
-// Where no pedal is told the throttle is guessed: what holds a speed, and what gains more [s^2/m].
+// Where no pedal is told the throttle is guessed: what holds a speed, less below some [m/s], and
+// what gains more [s^2/m].
 const HOLDING = 0.15;
+const HELD_FROM = 5;
 const THROTTLE_PER_ACCELERATION = 0.25;
 // Of CommonRoad's types those that are no cars; null has no engine.
 /** @type {Record<string, DriveTrain|null|undefined>} */
@@ -99,7 +101,7 @@ export class Listener {
     const train = trainOf(vehicle);
     const along = (rows[at + VEHICLE.acceleration] || 0) * (Math.sign(signed) || 1);
     const pedal = rows[at + VEHICLE.throttle];
-    const throttle = Number.isFinite(pedal) ? pedal : guessThrottle(along);
+    const throttle = Number.isFinite(pedal) ? pedal : guessThrottle(Math.abs(signed), along);
     const reverse = signed < 0 || (signed === 0 && rows[at + VEHICLE.reverse] > 0.5);
     const speed = Math.abs(signed);
     return {
@@ -119,9 +121,10 @@ export class Listener {
     const train = trainOfObject(object);
     const { vx, vy } = objectAt(rows, column);
     const speed = Math.hypot(vx, vy);
+    const throttle = guessThrottle(speed, 0);
     return train === null || !Number.isFinite(speed) ? null : {
-      id: object.id, train, ...this.#engine(object.id, train, speed, HOLDING, false),
-      load: HOLDING, speed, deceleration: 0, lateral: 0, lights: 0,
+      id: object.id, train, ...this.#engine(object.id, train, speed, throttle, false),
+      load: throttle, speed, deceleration: 0, lateral: 0, lights: 0,
     };
   }
 
@@ -167,7 +170,8 @@ export class Listener {
       .filter(({ distance }) => distance < RANGE_M)
       .sort((a, b) => a.distance - b.distance).slice(0, MOST_OTHERS)
       .map((other) => ({ ...other,
-        rpm: this.#engine(other.id, other.train, other.speed, HOLDING, false).rpm }));
+        rpm: this.#engine(other.id, other.train, other.speed, guessThrottle(other.speed, 0), false)
+          .rpm }));
   }
 }
 
@@ -190,9 +194,13 @@ function trainOfObject({ type, role, shape }) {
     : known ?? (shape.length > LONG_M ? HEAVY : CAR);
 }
 
-/** @param {number} acceleration along the motion [m/s^2] */
-function guessThrottle(acceleration) {
-  return Math.min(Math.max(HOLDING + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
+/**
+ * @param {number} speed without a sign [m/s]
+ * @param {number} acceleration along the motion [m/s^2]
+ */
+function guessThrottle(speed, acceleration) {
+  const holding = HOLDING * Math.min(speed / HELD_FROM, 1);
+  return Math.min(Math.max(holding + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
 }
 
 /**
