@@ -5,6 +5,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
+import { VEHICLE, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.js';
 import {
   CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, lockedSpeed_rpm, REVERSE, tone_Hz,
 } from '../../crgame_ros/cockpit/page/js/sound/drive_train.js';
@@ -113,10 +114,12 @@ const vehicle = (id, more = {}) => ({
   id, role: 'human', shape, rear_to_center: 1.3, wheelbase: 2.6, max_steering_angle: 0.9,
   powertrain: 'combustion', perception: null, ...more,
 });
-const row = (x, y, yaw, speed, more = {}) => [
-  x, y, yaw, speed, 0, more.acceleration ?? 0, more.yaw_rate ?? 0, 0, more.throttle ?? NaN,
-  more.brake ?? NaN, NaN, more.reverse ?? NaN,
-];
+const row = (x, y, yaw, speed, more = {}) => {
+  const values = { x, y, yaw, speed, acceleration: 0, yaw_rate: 0, ...more };
+  const columns = Object.entries(VEHICLE);
+  return Array.from({ length: VEHICLE_WIDTH },
+    (_, i) => values[columns.find(([, column]) => column === i)?.[0] ?? ''] ?? NaN);
+};
 const sceneOf = (vehicles, objects = []) => ({ vehicles, objects });
 const shownOf = (vehicles, objects = [], t = 0) => ({
   t, vehicles: new Float64Array(vehicles.flat()), objects: new Float64Array(objects.flat()),
