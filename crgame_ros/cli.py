@@ -67,6 +67,8 @@ TOOLS = (
           'crgame_ros.occupancy.occupancy_command'),
     _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',
           'crgame_ros.waypoints.waypoint_command'),
+    _Tool('cockpit-3d', "fetch what the page's 3D view is drawn with",
+          'crgame_ros.cockpit.three_command'),
     _Tool('schema', 'what a game file and other files may say, for editors',
           'crgame_ros.schema_command'))
 DESCRIPTION = """\

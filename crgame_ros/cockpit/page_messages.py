@@ -86,14 +86,15 @@ def _input(message: Mapping[str, Any]) -> dict[str, Any]:
             raise _wrong('away', 'is not true')
         return {'seat': seat, 'away': True}
     reverse = _flag(message, 'reverse') if 'reverse' in message else False
+    hands: dict[str, Any] = {'seat': seat, 'reverse': reverse}
+    if 'lights' in message:
+        hands['lights'] = [_as_flag(each, 'lights') for each in _list(message, 'lights', 4)]
     if given == ['keys']:
         keys = _list(message, 'keys', 4)
-        return {'seat': seat, 'keys': [_as_flag(key, 'keys') for key in keys],
-                'reverse': reverse}
+        return {**hands, 'keys': [_as_flag(key, 'keys') for key in keys]}
     axes = _list(message, 'axes', 3)
     lows = (0.0, 0.0, -1.0)
-    return {'seat': seat, 'reverse': reverse,
-            'axes': [_axis(axis, low) for axis, low in zip(axes, lows, strict=True)]}
+    return {**hands, 'axes': [_axis(axis, low) for axis, low in zip(axes, lows, strict=True)]}
 
 
 def _seat(message: Mapping[str, Any]) -> dict[str, Any]:

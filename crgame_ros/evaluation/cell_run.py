@@ -27,10 +27,10 @@ from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.evaluation.cell import Cell
-from crgame_ros.evaluation.cell_rows import outcome_of, vehicle_rows
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
 from crgame_ros.evaluation.evaluation_plan import OWN
+from crgame_ros.evaluation.results.cell_rows import outcome_of, vehicle_rows
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import parse_game
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -115,8 +115,7 @@ def measured(cell: Cell, result: OfflineResult) -> TabulatedRun:
     run = TabulatedRun(cell.key, record, offline=offline_outcome(result))
     found = measure_log(record.log)
     run.criticality.update({item.vehicle_id: item for item in found.report()})
-    # CommonRoad's tools would double the time that a short cell takes.
-    score_vehicles(run, drives_only=True)
+    score_vehicles(run, drives_only=not cell.commonroad_scores)
     return run
 
 

@@ -209,6 +209,8 @@ class DrivabilitySpec:
     :param collision: whether contacts are looked for.
     :param road: whether vehicles have to stay on the road.
     :param stop: whether a human's violation ends the run.
+    :param contact: what a contact does to a vehicle that a person drives: `through` lets it
+        drive on through what it touches; `stop` lets it stand at once, and only drive away.
     """
 
     FORM: ClassVar[Form] = _SEE
@@ -216,6 +218,7 @@ class DrivabilitySpec:
     collision: bool = True
     road: bool = True
     stop: bool = False
+    contact: Literal['through', 'stop'] = 'through'
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import type { createPerception } from
   '../../crgame_ros/cockpit/page/js/perception/perception.js';
 import type { Sound } from '../../crgame_ros/cockpit/page/js/sound/sound.js';
 import type { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import type { View3d } from '../../crgame_ros/cockpit/page/js/view3d/view3d.js';
 import type { World } from '../../crgame_ros/cockpit/page/js/world/world.js';
 
 /** main.js fills it: every part may be missing, because each is loaded by itself. */
@@ -19,6 +20,7 @@ interface Crgame {
   driving?: Driving;
   perception?: ReturnType<typeof createPerception>;
   sound?: Sound;
+  view3d?: View3d;
   ready?: boolean;
   [part: string]: unknown;
 }

@@ -5,7 +5,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { VEHICLE, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.js';
 import {
   CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, lockedSpeed_rpm, REVERSE, tone_Hz,
 } from '../../crgame_ros/cockpit/page/js/sound/drive_train.js';
@@ -114,12 +113,10 @@ const vehicle = (id, more = {}) => ({
   id, role: 'human', shape, rear_to_center: 1.3, wheelbase: 2.6, max_steering_angle: 0.9,
   powertrain: 'combustion', perception: null, ...more,
 });
-const row = (x, y, yaw, speed, more = {}) => {
-  const values = { x, y, yaw, speed, acceleration: 0, yaw_rate: 0, ...more };
-  const columns = Object.entries(VEHICLE);
-  return Array.from({ length: VEHICLE_WIDTH },
-    (_, i) => values[columns.find(([, column]) => column === i)?.[0] ?? ''] ?? NaN);
-};
+const row = (x, y, yaw, speed, more = {}) => [
+  x, y, yaw, speed, 0, more.acceleration ?? 0, more.yaw_rate ?? 0, 0, more.throttle ?? NaN,
+  more.brake ?? NaN, NaN, more.reverse ?? NaN, more.lights ?? NaN,
+];
 const sceneOf = (vehicles, objects = []) => ({ vehicles, objects });
 const shownOf = (vehicles, objects = [], t = 0) => ({
   t, vehicles: new Float64Array(vehicles.flat()), objects: new Float64Array(objects.flat()),
@@ -135,11 +132,13 @@ test('a driver hears the own vehicle, and who is near', () => {
   ];
   const scene = sceneOf([vehicle('hv0'), vehicle('av0', { powertrain: 'electric' })], objects);
   const shown = shownOf(
-    [row(0, 0, 0, 20, { throttle: 0.5, acceleration: 1, yaw_rate: 0.1 }), row(10, -4, 0, 25)],
+    [row(0, 0, 0, 20, { throttle: 0.5, acceleration: 1, yaw_rate: 0.1, lights: 1 }),
+      row(10, -4, 0, 25, { lights: 4 })],
     [[-20, 4, 0, 18, 0, 0], [5, 5, 0, 1, 0, 0], [5, -5, 0, 0, 0, 0], Array(6).fill(NaN)]);
   const { own, others } = listener.hear(scene, shown, 'hv0');
   assert.equal(own.train, CAR);
   assert.equal(own.load, 0.5);
+  assert.deepEqual([own, ...others].map(({ lights }) => lights), [1, 4, 0]);
   close(own.deceleration, -1);
   close(own.lateral, 2);
   assert.deepEqual(others.map(({ id, train }) => [id, train]), [['av0', ELECTRIC], ['1', HEAVY]]);

@@ -25,6 +25,7 @@ const PARTS = [
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
   ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
+  ['./view3d/view3d.js', 'createView3d', '#stage', 'view3d'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
 

@@ -261,8 +261,9 @@ export {};
 /**
  * What the page sends.
  *
- * @typedef {{away: true}|{keys: number[], reverse: number}
- *   |{axes: number[], reverse: number}} Hands
+ * @typedef {{away: true}|{keys: number[], reverse: number, lights: number[]}
+ *   |{axes: number[], reverse: number, lights: number[]}} Hands  `lights`: which of LIGHT_BUTTONS
+ *   are held
  * @typedef {'start'|'pause'|'step'|'reset'|'stop'} RunAction
  * @typedef {{type: 'input', seat: string} & Hands} InputMessage
  * @typedef {{type: 'layers', predictions?: boolean, perception?: string,

@@ -13,8 +13,6 @@ import { arrival, RANGE_M } from './hearing.js';
 
 /** So many others are heard at once: the nearest. */
 export const MOST_OTHERS = 6;
-/** What the column `lights` of a vehicle says, bit by bit. */
-export const LIGHTS = Object.freeze({ left: 1, right: 2, horn: 4 });
 
 // A vehicle that is longer is a lorry or a bus [m].
 const LONG_M = 7.5;
@@ -43,7 +41,7 @@ const TYPES = {
  * @property {number} speed without a sign [m/s]
  * @property {number} deceleration against the motion [m/s^2]
  * @property {number} lateral acceleration, to the left [m/s^2]
- * @property {number} lights bits of LIGHTS
+ * @property {number} lights bits of LIGHT
  */
 
 /**
@@ -107,7 +105,7 @@ export class Listener {
     return {
       id: vehicle.id, train, ...this.#engine(vehicle.id, train, speed, throttle, reverse),
       load: throttle, speed, deceleration: -along,
-      lateral: signed * (rows[at + VEHICLE.yaw_rate] || 0), lights: lightsOf(rows, at),
+      lateral: signed * (rows[at + VEHICLE.yaw_rate] || 0), lights: rows[at + VEHICLE.lights] || 0,
     };
   }
 
@@ -155,7 +153,7 @@ export class Listener {
     scene.vehicles.forEach((vehicle, index) => {
       all.push({ id: vehicle.id, train: trainOf(vehicle),
         source: centreOf(vehicle, vehicles, index),
-        lights: lightsOf(vehicles, index * VEHICLE_WIDTH) });
+        lights: vehicles[index * VEHICLE_WIDTH + VEHICLE.lights] || 0 });
     });
     scene.objects.forEach((object, column) => {
       const train = trainOfObject(object);
@@ -201,15 +199,6 @@ function trainOfObject({ type, role, shape }) {
 function guessThrottle(speed, acceleration) {
   const holding = HOLDING * Math.min(speed / HELD_FROM, 1);
   return Math.min(Math.max(holding + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
-}
-
-/**
- * @param {Float64Array} rows
- * @param {number} at where the vehicle's row begins
- */
-function lightsOf(rows, at) {
-  const column = /** @type {Record<string, number|undefined>} */ (VEHICLE).lights;
-  return column === undefined ? 0 : rows[at + column] || 0;
 }
 
 /**

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Somebody who passes by: engine, tyres and horn, from a side, from afar, shifted in pitch. */
 
+import { LIGHT } from '../lights.js';
 import { tone_Hz } from './drive_train.js';
 import { attenuation } from './hearing.js';
 import { Horn } from './horn.js';
 import { engineLevel, tyreLevel } from './levels.js';
-import { LIGHTS } from './listener.js';
 import { engineWave, mainPartial, makeFilter, makeGain, playNoise, Value } from './voices.js';
 
 /** @import { Other } from './listener.js' */
@@ -100,7 +100,7 @@ export class OtherVoice {
     this.#rate.to(doppler, when);
     this.#engineGain.to(ENGINE * engineLevel(train, rpm, LOAD), when);
     this.#tyreGain.to(TYRES * tyreLevel(speed), when);
-    this.#horn.update((lights & LIGHTS.horn) !== 0, doppler, when);
+    this.#horn.update((lights & LIGHT.horn) !== 0, doppler, when);
     this.#pan.to(ASIDE * pan, when);
     this.#level.to(attenuation(distance), when);
   }
