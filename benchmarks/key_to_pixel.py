@@ -79,8 +79,9 @@ class Blocks:
         press(browser, 'keyDown', THROTTLE)
         # A loaded machine takes a while to begin anew.
         wanted = 'hv0' if sound else ''
-        browser.wait_for("const { run, t } = crgame.store.status; return run === 'running' && t > 1"
-                         f" && (crgame.sound.heard?.own.id ?? '') === '{wanted}'")
+        browser.wait_for('const { run, t } = crgame.store.status;'
+                         "const heard = crgame.sound.heard?.own.id ?? '';"
+                         f"return run === 'running' && t > 1 && heard === '{wanted}'")
         offset_s = browser.driver.execute_script('return crgame.store.scene.time.clock_offset_s')
         before_s, used_s = time.monotonic(), processor_s(browser)
         _, picture_ms = measure_keys(browser, self._probe, self._trials, offset_s)

@@ -63,6 +63,8 @@ TOOLS = (
           'crgame_ros.evaluation.evaluate_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',
           'crgame_ros.analysis.validate_command'),
+    _Tool('new', 'a game file for any scenario, with seats for several people',
+          'crgame_ros.new_command'),
     _Tool('rasterize', 'draw curbs and obstacles of a scenario as an occupancy map',
           'crgame_ros.occupancy.occupancy_command'),
     _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',

@@ -20,11 +20,16 @@ import hmac
 import ipaddress
 import secrets
 import socket
+import ssl
 from urllib.parse import urlsplit
 
+from crgame_ros.cockpit.invitations import Invitations, UNKNOWN
+from crgame_ros.cockpit.machine_addresses import reachable_addresses
+from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
 from crgame_ros.errors import InputError
 
 TOKEN_BYTES = 24
+WITH_TOKEN = 'Open the address with the token that the cockpit printed when it started.'
 _LOOPBACK_NAMES = ('localhost', '127.0.0.1', '[::1]')
 
 
@@ -36,16 +41,20 @@ class Access:
     :param host: address or name to listen on.
     :param port: the port; `listen` may move to a later one.
     :param token: secret that everybody has to show; None lets everybody on this machine in.
+    :param tls: None is plain HTTP.
+    :param invitations: links by which alone people are let in; None for the token.
     :raises InputError: if there is no token where other machines can connect, or it is short.
     """
 
     host: str
     port: int
     token: str | None = None
+    tls: ssl.SSLContext | None = None
+    invitations: Invitations | None = None
 
     def __post_init__(self) -> None:
         """Refuse to be open to other machines without a token."""
-        if self.token is None and not is_loopback(self.host):
+        if self.token is None and self.invitations is None and not is_loopback(self.host):
             raise InputError('is open to other machines without a token', f'address {self.host}',
                              'make it with Access.guarded')
         if self.token is not None and len(self.token) < 16:
@@ -56,16 +65,38 @@ class Access:
         """Ask nothing of this machine, and a new random token where others can connect."""
         return cls(host, port, None if is_loopback(host) else new_token())
 
+    @property
+    def refusal(self) -> str:
+        """Say to somebody without a cookie what to do."""
+        return WITH_TOKEN if self.invitations is None else UNKNOWN
+
     def at_port(self, port: int) -> 'Access':
         """Give the same at another port."""
         return replace(self, port=port)
 
     @property
-    def url(self) -> str:
-        """Give the address to open in a browser, with the token."""
-        host = f'[{self.host}]' if ':' in self.host else self.host
+    def asks(self) -> bool:
+        """Whether anything is asked of those who come."""
+        return self.token is not None or self.invitations is not None
+
+    @property
+    def urls(self) -> list[str]:
+        """Give the addresses to open in a browser, with the token."""
         query = f'?token={self.token}' if self.token is not None else ''
-        return f'http://{host}:{self.port}/{query}'
+        return [self._address(host) + query for host in reachable_addresses(self.host)]
+
+    @property
+    def url(self) -> str:
+        """Give the first of these addresses."""
+        return self.urls[0]
+
+    def link(self, token: str) -> str:
+        """Give the address with a token that lets one browser in."""
+        return f'{self._address(reachable_addresses(self.host)[0])}?token={token}'
+
+    def _address(self, host: str) -> str:
+        name = f'[{host}]' if ':' in host else host
+        return f'{"http" if self.tls is None else "https"}://{name}:{self.port}/'
 
     def allows_host(self, host: str, port: int) -> bool:
         """
@@ -76,13 +107,37 @@ class Access:
         :param host: the header.
         :param port: at which the request arrived.
         """
-        if self.token is not None:
+        if self.asks:
             # Whoever knows the token was told the address: it may be any name of this machine.
             return bool(host)
         name, _, given = host.lower().rpartition(':') if _has_port(host) else (
             host.lower(), '', '80')
         listened = f'[{self.host}]' if ':' in self.host else self.host.lower()
         return given == str(port) and name in (*_LOOPBACK_NAMES, listened)
+
+    def rights(self, cookie: str | None) -> Rights | None:
+        """
+        Give what a browser may do.
+
+        :param cookie: that it shows.
+        :return: None if it is not let in.
+        """
+        if self.invitations is not None:
+            return self.invitations.rights(cookie)
+        return ALL_RIGHTS if self.knows(cookie) else None
+
+    def exchange(self, token: str, cookie: str | None) -> str:
+        """
+        Exchange the token of an address for a cookie.
+
+        :param cookie: that the browser shows.
+        :raises InputError: with a sentence for people, if it is not let in.
+        """
+        if self.invitations is not None:
+            return self.invitations.exchange(token, cookie)
+        if self.token is None or not self.knows(token):
+            raise InputError(WITH_TOKEN)
+        return self.token
 
     def knows(self, token: str | None) -> bool:
         """Tell whether a token is the right one, in a time that does not depend on it."""

@@ -58,16 +58,23 @@ class Backend(Protocol):
         """
 
     def joined(self, client: 'Client') -> None:
-        """Take note of a new client; it has been sent the documents."""
+        """
+        Take note of a new client; it has been sent the documents.
+
+        Called again when it has said who it is, or what of its rights it wants to use.
+        """
 
     def left(self, client: 'Client') -> None:
         """Take note that a client's connection ended, for whatever reason: at once, and once."""
 
-    async def load_game(self, path: Path) -> str:
+    async def load_game(self, path: Path, client: 'Client | None' = None, *,
+                        takes_seat: bool = False) -> str:
         """
         Take a game file at a reset.
 
         :param path: a game that has been loaded and checked.
+        :param client: who has chosen it; None for a program that is no page.
+        :param takes_seat: whether this person shall drive, if the game leaves a seat to a page.
         :return: what was done, for people.
         :raises CrgameError: if it cannot be taken.
         """

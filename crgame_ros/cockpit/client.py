@@ -18,9 +18,11 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+import secrets
 from typing import Protocol
 
 from aiohttp import WSMsgType
+from crgame_ros.cockpit.rights import ALL_RIGHTS
 
 MAX_WAITING = 256
 MAX_WAITING_BYTES = 16 * 2 ** 20
@@ -99,6 +101,18 @@ class Client:
                  unsent: Callable[[], int]) -> None:
         self.id = client_id
         self.name = name
+        # The same whenever the same page comes back: seats are kept for it.
+        self.person = f'p{secrets.token_hex(8)}'
+        self.key = ''
+        # What the link or the address grants, and what of it the page wants to use.
+        self.granted = self.rights = ALL_RIGHTS
+        self.browser = ''
+        self.address = ''
+        self.device = ''
+        # As the page has measured it [ms]; None before.
+        self.round_trip_ms: float | None = None
+        # When its last message came, steady clock [s]
+        self.heard_s = 0.0
         # Set by the backend: whether the client holds a seat.
         self.drives = False
         self.wants_predictions = False

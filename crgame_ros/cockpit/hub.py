@@ -16,6 +16,8 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+import hashlib
+import hmac
 import json
 import math
 from types import MappingProxyType
@@ -23,8 +25,15 @@ from typing import Any
 
 from crgame_ros import __version__
 from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
 
 MAX_CLIENTS = 32
+# Of one address: more would be the room of others.
+MAX_OF_ADDRESS = 16
+# Pages speak every second, hidden ones every minute: who is silent for longer gives way to
+# somebody who comes, or is no page [s].
+GIVES_WAY_S = 5.0
+SILENT_S = 180.0
 # A new scene makes them void.
 SCENE = 'scene'
 
@@ -54,10 +63,49 @@ class Hub:
         """Give the clients that are connected now, by their id."""
         return MappingProxyType(self._clients)
 
-    @property
-    def is_full(self) -> bool:
-        """Whether nobody more is let in."""
-        return len(self._clients) >= MAX_CLIENTS
+    def make_room(self, address: str, now_s: float) -> bool:
+        """
+        Make sure that one more can be let in: whoever is silent and does not drive gives way.
+
+        :param address: from which somebody comes.
+        :param now_s: steady clock [s].
+        :return: false if there is no room.
+        """
+        present = [client for client in self._clients.values() if not client.dropped]
+        own = [client for client in present if client.address == address]
+        if len(present) < MAX_CLIENTS and len(own) < MAX_OF_ADDRESS:
+            return True
+        idle = [client for client in (own if len(own) >= MAX_OF_ADDRESS else present)
+                if not client.drives and now_s - client.heard_s > GIVES_WAY_S]
+        if not idle:
+            return False
+        min(idle, key=lambda client: client.heard_s).drop('gives way')
+        return True
+
+    def client_with_key(self, key: str) -> Client | None:
+        """Find the page that has a key."""
+        given = key.encode('utf-8', 'surrogatepass')
+        return next((client for client in self._clients.values() if client.key
+                     and hmac.compare_digest(client.key.encode(), given)), None)
+
+    def identify(self, client: Client, key: str, *, fresh: bool) -> bool:
+        """
+        Take a page for the one that had a key before.
+
+        :param fresh: whether it is a new tab, which must not be taken for one that is open.
+        :return: whether it is; its older connection is dropped then.
+        """
+        other = self.client_with_key(key)
+        accepted = other is None or other is client or not fresh
+        if accepted:
+            client.key = key
+            # Others are told this, and cannot come back with it.
+            client.person = f'p{hashlib.sha256(key.encode()).hexdigest()[:16]}'
+            if other is not None and other is not client:
+                other.key = ''
+                other.drop('came back')
+        self.tell_rights(client, accepted)
+        return accepted
 
     def set_document(self, kind: str, content: Mapping[str, Any]) -> None:
         """
@@ -87,6 +135,10 @@ class Hub:
         for client in tuple(self._clients.values()) if only is None else (only,):
             client.put_event(text)
 
+    def tell_rights(self, client: Client, accepted: bool = True) -> None:
+        """Tell a page what its person may do, and whether it was taken for whom it says."""
+        self.send_event('you', {'rights': _rights(client), 'accepted': accepted}, only=client)
+
     def send_frame(self, slot: str, frame: bytes, *,
                    only_if: Callable[[Client], bool] | None = None) -> None:
         """
@@ -107,18 +159,24 @@ class Hub:
             if frame.only_if is not None and frame.only_if(client):
                 client.put_frame(slot, frame.data)
 
-    def add(self, abort: Callable[[], None], unsent: Callable[[], int]) -> Client:
+    def add(self, abort: Callable[[], None], unsent: Callable[[], int], *,
+            rights: Rights = ALL_RIGHTS, address: str = '', now_s: float = 0.0) -> Client:
         """
         Let a client in, and give it what the others have.
 
         :param abort: ends its connection at once.
         :param unsent: gives the bytes that its connection holds back.
+        :param rights: what its person may do.
+        :param address: from which it has come.
+        :param now_s: steady clock [s].
         """
         self._count += 1
         client = Client(f'c{self._count}', f'Guest {self._count}', abort, unsent)
+        client.granted = client.rights = rights
+        client.address, client.heard_s = address, now_s
         client.put_event(_encode('hello', {
             'client': client.id, 'name': client.name, 'mode': self._mode,
-            'version': __version__}))
+            'version': __version__, 'rights': _rights(client)}))
         for kind, text in self._documents.items():
             client.put_document(kind, text)
         for slot, frame in self._frames.items():
@@ -140,6 +198,14 @@ class Hub:
         """
         for client in tuple(self._clients.values()):
             client.check_stall(now_s)
+            if now_s - client.heard_s > SILENT_S:
+                client.drop('says nothing')
+
+
+def _rights(client: Client) -> dict[str, Any]:
+    rights, granted = client.rights, client.granted
+    return {'role': rights.role, 'directs': rights.directs, 'drives': rights.drives,
+            'seat': rights.seat, 'may_direct': granted.directs, 'may_drive': granted.drives}
 
 
 def _encode(kind: str, content: Mapping[str, Any]) -> bytes:

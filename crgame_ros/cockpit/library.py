@@ -164,6 +164,11 @@ class Library:
         text = json.loads(answer)['text'].encode()
         return await asyncio.to_thread(self._store_game, text)
 
+    def is_upload(self, entry_id: str) -> bool:
+        """Tell whether somebody has sent an entry."""
+        entry = self._entries.get(entry_id)
+        return entry is not None and entry.kind == 'upload'
+
     async def close(self) -> None:
         """End what still runs."""
         await self._reader.close()

@@ -22,7 +22,9 @@ from typing import Any
 
 from aiohttp import web
 from crgame_ros.cockpit.backend import Backend
+from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Choice, Library
+from crgame_ros.cockpit.request_rights import actor
 from crgame_ros.errors import CrgameError, InputError
 
 MAX_VEHICLES = 1000
@@ -33,19 +35,21 @@ _log = logging.getLogger(__name__)
 Answer = Callable[[web.Request], Awaitable[web.Response]]
 
 
-def add_routes(app: web.Application, library: Library | None, backend: Backend) -> None:
+def add_routes(app: web.Application, library: Library | None, backend: Backend,
+               hub: Hub) -> None:
     """
     Add /api/scenarios, preview, upload and load.
 
     :param library: None answers that there is nothing to choose.
     :param backend: takes the game that is loaded.
+    :param hub: knows the pages that ask.
     """
     if library is None:
         for method, path in (('GET', 'scenarios'), ('GET', 'preview'), ('POST', 'upload'),
                              ('POST', 'load')):
             app.router.add_route(method, f'/api/{path}', _nothing)
         return
-    routes = _Routes(library, backend)
+    routes = _Routes(library, backend, hub)
     app.router.add_get('/api/scenarios', _refusable(routes.scenarios))
     app.router.add_get('/api/preview', _refusable(routes.preview))
     app.router.add_post('/api/upload', _refusable(routes.upload))
@@ -60,28 +64,36 @@ def add_routes(app: web.Application, library: Library | None, backend: Backend) 
 
 class _Routes:
 
-    def __init__(self, library: Library, backend: Backend) -> None:
+    def __init__(self, library: Library, backend: Backend, hub: Hub) -> None:
+        self._hub = hub
         self._library = library
         self._backend = backend
         # Two bodies in memory at most: this and the one that is being read for check.
         self._receiving = asyncio.Semaphore(2)
 
-    async def scenarios(self, _: web.Request) -> web.Response:
+    async def scenarios(self, request: web.Request) -> web.Response:
+        actor(request, self._hub, 'load')
         return web.json_response(await self._library.listing())
 
     async def preview(self, request: web.Request) -> web.Response:
+        actor(request, self._hub, 'load')
         content = await self._library.preview(request.query.get('id', '')[:MAX_TEXT])
         return web.Response(body=content, content_type='application/json', charset='utf-8')
 
     async def upload(self, request: web.Request) -> web.Response:
+        actor(request, self._hub, 'load')
         async with self._receiving:
             data = await _body(request, self._library.max_upload_bytes)
             title = request.query.get('name', '')[:MAX_TEXT]
             return web.json_response({'id': await self._library.upload(data, title)})
 
     async def load(self, request: web.Request) -> web.Response:
-        path = await self._library.write_game(_choice(await request.read()))
-        return web.json_response({'ok': True, 'text': await self._backend.load_game(path)})
+        client = actor(request, self._hub, 'load')
+        choice = _choice(await request.read())
+        path = await self._library.write_game(choice)
+        text = await self._backend.load_game(
+            path, client, takes_seat=self._library.is_upload(choice.id))
+        return web.json_response({'ok': True, 'text': text})
 
 
 def _refusable(handler: Answer) -> Answer:

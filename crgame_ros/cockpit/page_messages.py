@@ -21,11 +21,14 @@ import re
 from typing import Any
 import unicodedata
 
+from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.errors import InputError
 
 MAX_BYTES = 64 * 1024
 MAX_NAME = 40
 MAX_EVENT = 100
+MAX_DEVICE = 60
+MAX_DELAY_MS = 60_000.0
 REAL_TIME_FACTORS = (0.1, 10.0)
 ACTIONS = ('start', 'pause', 'step', 'reset', 'stop')
 # Rounding of a calibrated axis in the page.
@@ -35,6 +38,7 @@ _MAX_ID = 2 ** 53
 _VEHICLE = re.compile(r'(hv|av)[0-9]{1,3}')
 _AV = re.compile(r'av[0-9]{1,3}')
 _CLIENT = re.compile(r'c[0-9]{1,9}')
+_KEY = re.compile(r'[0-9a-f]{32}')
 # Control and format characters, surrogates, private use, unassigned, line and paragraph breaks:
 # they hide or reorder what others read. Angle brackets and ampersands are for mark-up only.
 _HIDDEN = frozenset({'Cc', 'Cf', 'Cs', 'Co', 'Cn', 'Zl', 'Zp'})
@@ -105,10 +109,24 @@ def _hand_over(message: Mapping[str, Any]) -> dict[str, Any]:
     return {**_seat(message), 'to': _matching(message, 'to', _CLIENT)}
 
 
+def _claim(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {**_seat(message), 'device': _words(message, 'device')}
+
+
+def _answer(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {**_seat(message), 'accept': _flag(message, 'accept')}
+
+
+def _ready(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {**_seat(message), 'ready': _flag(message, 'ready')}
+
+
 def _control(message: Mapping[str, Any]) -> dict[str, Any]:
     action = message.get('action')
     if action not in ACTIONS:
         raise _wrong('action', f'is none of {", ".join(ACTIONS)}')
+    if 'all' in message:
+        return {'action': action, 'all': _flag(message, 'all'), 'id': _id(message)}
     return {'action': action, 'id': _id(message)}
 
 
@@ -140,6 +158,23 @@ def _name(message: Mapping[str, Any]) -> dict[str, Any]:
     return {'name': cleaned}
 
 
+def _person(message: Mapping[str, Any]) -> dict[str, Any]:
+    key = message.get('key')
+    if not isinstance(key, str) or _KEY.fullmatch(key) is None:
+        raise _wrong('key', 'is none of 32 hexadecimal digits')
+    return {'key': key, 'fresh': _flag(message, 'fresh')}
+
+
+def _role(message: Mapping[str, Any]) -> dict[str, Any]:
+    if message.get('role') not in ROLES:
+        raise _wrong('role', f'is none of {", ".join(ROLES)}')
+    return {'role': message['role'], 'id': _id(message)}
+
+
+def _device(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {'device': _words(message, 'device')}
+
+
 def _layers(message: Mapping[str, Any]) -> dict[str, Any]:
     """Read those of the layers that are named: the others stay as they are."""
     named: dict[str, Any] = {
@@ -158,11 +193,18 @@ def _sound(message: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _ping(message: Mapping[str, Any]) -> dict[str, Any]:
-    return {'t': _number(message.get('t'), 't')}
+    delay_ms = message.get('round_trip_ms')
+    if delay_ms is None:
+        return {'t': _number(message.get('t'), 't')}
+    delay_ms = _number(delay_ms, 'round_trip_ms')
+    if not 0.0 <= delay_ms <= MAX_DELAY_MS:
+        raise _wrong('round_trip_ms', f'is not from 0 to {MAX_DELAY_MS:g}')
+    return {'t': _number(message.get('t'), 't'), 'round_trip_ms': delay_ms}
 
 
 _READERS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
-    'input': _input, 'claim': _seat, 'release': _seat, 'ask': _seat, 'hand_over': _hand_over,
+    'input': _input, 'claim': _claim, 'release': _seat, 'ask': _seat, 'hand_over': _hand_over,
+    'answer': _answer, 'ready': _ready, 'person': _person, 'role': _role, 'device': _device,
     'control': _control, 'rate': _rate, 'planner': _planner, 'trigger': _trigger,
     'name': _name, 'layers': _layers, 'sound': _sound, 'ping': _ping}
 
@@ -205,6 +247,14 @@ def _axis(value: Any, low: float) -> float:
     if not low - _AXIS_TOLERANCE <= number <= 1.0 + _AXIS_TOLERANCE:
         raise _wrong('axes', f'holds a value outside {low:g} to 1')
     return min(max(number, low), 1.0)
+
+
+def _words(message: Mapping[str, Any], field: str) -> str:
+    """Read a text for others to read; empty where there is none."""
+    value = message.get(field, '')
+    if not isinstance(value, str):
+        raise _wrong(field, 'is no text')
+    return clean_text(value, MAX_DEVICE)
 
 
 def _flag(message: Mapping[str, Any], field: str) -> bool:

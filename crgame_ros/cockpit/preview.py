@@ -35,6 +35,7 @@ import traceback
 from typing import Any, BinaryIO
 
 from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
@@ -167,7 +168,9 @@ def _scenario(path: Path, source: str) -> LoadedScenario:
 def _setup(path: Path, kind: str) -> Setup:
     if kind == 'game':
         return build_setup(load_game(path))
-    game = Game(path, humans=(HumanSpec('hv0'),))
+    # Whoever has sent a file drives in it, from where they have sent it.
+    human = HumanSpec('hv0', driver=COCKPIT if kind == UPLOAD else HumanSpec.driver)
+    game = Game(path, humans=(human,))
     return build_setup(game, _scenario(path, UPLOAD if kind == UPLOAD else path.name))
 
 

@@ -279,7 +279,8 @@ class ReplayBackend:
     def left(self, client: 'Client') -> None:
         """Do nothing."""
 
-    async def load_game(self, path: Path) -> str:
+    async def load_game(self, path: Path, client: 'Client | None' = None, *,
+                        takes_seat: bool = False) -> str:
         """
         Refuse: no simulation runs.
 

@@ -75,6 +75,7 @@ class RunStatus:
         self.reason = ''
         self.stays = False
         self.awaited: list[str] = []
+        self.countdown_s = 0
         self.timing: dict[str, Any] | None = None
         self.planners: dict[str, dict[str, Any]] = {}
         self.drivability: dict[str, dict[str, Any]] = {}
@@ -142,7 +143,8 @@ class RunStatus:
         """Give what the status document says of the run's health."""
         over = self.run == 'ended'
         return {'run': self.run, 'reason': self.reason, 'stays': self.stays,
-                'awaited': self.awaited, 'contacts': self.contacts,
+                'awaited': self.awaited, 'countdown_s': self.countdown_s,
+                'contacts': self.contacts,
                 'departures': self.departures,
                 'real_time_factor': self.real_time_factor, 'recording': self.recording,
                 'timing': self.timing, 'planners': self.planners,
@@ -175,6 +177,7 @@ class RunStatus:
         if text == 'ended':
             self._calm()
         self.awaited = [item for item in values.get('awaited', '').split(',') if item]
+        self.countdown_s = int(_number(values.get('countdown_s')) or 0)
         self.real_time_factor = _number(values.get('real_time_factor')) or 1.0
 
     def _take_traffic(self, level: int, text: str, _: Mapping[str, str], t: float) -> None:

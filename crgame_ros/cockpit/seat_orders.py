@@ -12,23 +12,25 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Orders about seats that `/seats` has not answered yet."""
+"""Orders about seats that are on their way to the simulation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from crgame_ros.driver.source import COCKPIT
+from crgame_ros.game.seat_documents import SeatDemand, SeatTenant
 
 # An order that is published while the simulation loads another game reaches nobody [s].
 AGAIN_S = 0.5
 GIVE_UP_S = 10.0
 
 Seats = Mapping[str, Mapping[str, str]]
+Tenants = Mapping[str, SeatTenant]
 
 
 @dataclass
 class _Order:
-    source: str
+    demand: SeatDemand
     ordered_s: float
     sent_s: float
 
@@ -47,42 +49,55 @@ class SeatOrders:
         """Tell whether an order about a seat is on its way."""
         return seat in self._orders
 
-    def note(self, seat: str, source: str, seats: Seats, now_s: float) -> None:
+    def note(self, demand: SeatDemand, seats: Seats, tenants: Tenants, now_s: float) -> None:
         """
-        Remember an order that is sent now.
+        Remember an order that is sent now: somebody takes a seat, or gives it back.
 
-        :param source: cockpit, or game: back to the driver or planner of the game.
         :param seats: what `/seats` says; what is already so needs no answer.
+        :param tenants: who is in the seats.
         :param now_s: steady clock [s].
         """
-        if seat in self._orders or not _is_so(source, seats.get(seat)):
-            self._orders[seat] = _Order(source, now_s, now_s)
+        seat = demand.seat
+        if seat in self._orders or not _is_so(demand, seats.get(seat), tenants.get(seat)):
+            self._orders[seat] = _Order(demand, now_s, now_s)
 
-    def answered(self, seats: Seats) -> None:
+    def answered(self, seats: Seats, tenants: Tenants) -> None:
         """Take what `/seats` says anew."""
-        self._orders = {seat: order for seat, order in self._orders.items()
-                        if seat in seats and not _is_so(order.source, seats[seat])}
+        self._orders = {
+            seat: order for seat, order in self._orders.items()
+            if seat in seats and not _is_so(order.demand, seats[seat], tenants.get(seat))
+            and not _is_in_vain(order.demand, tenants.get(seat))}
 
-    def due(self, now_s: float) -> list[tuple[str, str]]:
+    def due(self, now_s: float) -> list[SeatDemand]:
         """
-        Give the orders (seat, source) to send again, and forget those without an answer.
+        Give the orders to send again, and forget those without an answer.
 
         :param now_s: steady clock [s].
         """
         self._orders = {seat: order for seat, order in self._orders.items()
                         if now_s - order.ordered_s < GIVE_UP_S}
         due = []
-        for seat, order in self._orders.items():
+        for order in self._orders.values():
             if now_s - order.sent_s >= AGAIN_S:
                 order.sent_s = now_s
-                due.append((seat, order.source))
+                due.append(order.demand)
         return due
 
 
-def _is_so(source: str, entry: Mapping[str, str] | None) -> bool:
+def _is_so(demand: SeatDemand, entry: Mapping[str, str] | None,
+           tenant: SeatTenant | None) -> bool:
     """Tell whether a seat is as ordered."""
     if entry is None:
         return False
     drives = entry['source'] == COCKPIT
-    # Given back in a game whose driver is the cockpit, the seat stays the cockpit's.
-    return drives if source == COCKPIT else not drives or entry['driver'] == COCKPIT
+    if demand.source == COCKPIT:
+        return drives and (demand.person is None or (
+            tenant is not None and tenant.here and tenant.person.id == demand.person.id))
+    # Given back in a game whose driver is the cockpit, the seat stays the cockpit's, and empty.
+    return not drives or (entry['driver'] == COCKPIT and tenant is None)
+
+
+def _is_in_vain(demand: SeatDemand, tenant: SeatTenant | None) -> bool:
+    """Tell whether somebody at another cockpit was quicker."""
+    return demand.source == COCKPIT and demand.person is not None and tenant is not None \
+        and tenant.here and tenant.person.id not in (demand.person.id, demand.displaced)

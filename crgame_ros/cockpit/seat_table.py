@@ -12,94 +12,21 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Who in the browser holds which seat, and what their hands make of it."""
+"""Which seats the clients of this server hold, and what the page is told of all seats."""
 
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
+import math
 from pathlib import PurePath
 from typing import Any
 
-from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
-from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
+from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.game.seat_documents import SeatTenant
 
-# A page repeats its input every 50 ms; silent for longer, it counts as gone [s].
-SILENCE_S = 0.2
-# What the page says of the lever and the horn: which of left, right, hazard and horn are held.
-_LIGHTS = LightButtons(*(frozenset({i}) for i in range(4)))
-
-
-class HeldSeat:
-    """
-    A seat that somebody in the browser holds.
-
-    Keys go through the keyboard filter (CRG 18-19) in simulation time, axes are taken as the
-    page calibrated them (CRG 17).
-
-    :param seat_id: the vehicle.
-    :param holder: id of the client.
-    """
-
-    def __init__(self, seat_id: str, holder: str) -> None:
-        self.id = seat_id
-        self.holder = holder
-        self.requests: list[str] = []
-        self._cycles = KeyboardCycles()
-        self._lever = IndicatorLever(_LIGHTS)
-        self._keys: KeyState | None = None
-        self._axes: DriverCommand | None = None
-        self._heard_s = 0.0
-        self.away = True
-
-    def take(self, message: Mapping[str, Any], now_s: float) -> None:
-        """
-        Take an input message of the holder, already checked.
-
-        :param now_s: steady clock [s]
-        """
-        self._heard_s = now_s
-        reverse = bool(message.get('reverse'))
-        keys, axes = message.get('keys'), message.get('axes')
-        self.away = keys is None and axes is None
-        self._lever.hold(i for i, held in enumerate(message.get('lights', ())) if held)
-        if self.away:
-            self.let_go()
-        elif axes is not None:
-            throttle, brake, steering = axes
-            self._keys, self._axes = None, DriverCommand(throttle, brake, steering, reverse)
-        elif keys is not None:
-            throttle, brake, left, right = map(bool, keys)
-            self._keys, self._axes = KeyState(throttle, brake, left, right, reverse), None
-
-    def let_go(self) -> None:
-        """Take the hands off everything at once."""
-        self.away = True
-        self._keys = self._axes = None
-        self._cycles.reset()
-        self._lever.hold(())
-
-    def is_silent(self, now_s: float) -> bool:
-        """Tell whether the page has not been heard for too long."""
-        return not self.away and now_s - self._heard_s > SILENCE_S
-
-    def command(self, n: int, dt_s: float) -> DriverCommand:
-        """
-        Give the command of cycle n; while nobody is there it is released, but for the indicators.
-
-        :param dt_s: length of a cycle in simulation time [s]
-        """
-        command = RELEASED
-        if self._axes is not None:
-            command = self._axes
-        elif self._keys is not None:
-            if n < self._cycles.cycle:
-                # A new run has begun.
-                self._cycles.reset()
-            command = self._cycles.command(n, self._keys, dt_s)
-        self._lever.turn(command.steering)
-        return command._replace(lights=self._lever.lights)
+# So long the seat of somebody whose connection has broken is kept for them [s].
+KEEP_S = 60.0
 
 
 def _people(clients: Iterable[str], names: Mapping[str, str]) -> list[dict[str, str]]:
@@ -119,36 +46,74 @@ class SeatTable:
 
     :param seats: what `/seats` says: source and driver by vehicle.
     :param held: the seats that somebody here holds.
+    :param tenants: what `/seats` says of the people in the seats, here and at other cockpits.
+    :param absent_s: since when those who are not here are absent, by seat; steady clock [s].
     """
 
     seats: dict[str, dict[str, str]] = field(default_factory=dict)
     held: dict[str, HeldSeat] = field(default_factory=dict)
+    tenants: dict[str, SeatTenant] = field(default_factory=dict)
+    absent_s: dict[str, float] = field(default_factory=dict)
 
-    def update(self, seats: Mapping[str, Mapping[str, str]],
-               awaited: Container[str] = ()) -> list[HeldSeat]:
+    def update(self, seats: Mapping[str, Mapping[str, str]], awaited: Container[str] = (),
+               tenants: Mapping[str, SeatTenant] | None = None) -> list[HeldSeat]:
         """
         Take what `/seats` says.
 
         :param awaited: seats about which an order is on its way: what is said of them is old.
+        :param tenants: who is in the seats; None leaves them as they were.
         :return: the seats that somebody outside has taken away, which are no longer held.
         """
         self.seats = {name: dict(entry) for name, entry in seats.items()}
+        if tenants is not None:
+            self.tenants = dict(tenants)
         gone = [item for name, item in self.held.items()
-                if name not in self.seats or (
-                    name not in awaited and self.seats[name]['source'] != COCKPIT)]
+                if name not in self.seats or (name not in awaited and self._is_taken(item))]
         for item in gone:
             del self.held[item.id]
         return gone
+
+    def _is_taken(self, item: HeldSeat) -> bool:
+        tenant = self.tenants.get(item.id)
+        return self.seats[item.id]['source'] != COCKPIT or (
+            tenant is not None and tenant.here and tenant.person.id != item.person)
+
+    def note_absent(self, lost: Mapping[str, bool], now_s: float) -> None:
+        """
+        Take note of who has gone: their connection has ended, or their whole cockpit.
+
+        :param lost: seats whose driver is silent.
+        :param now_s: steady clock [s]
+        """
+        gone = {name for name, tenant in self.tenants.items() if name not in self.held
+                and (not tenant.here or lost.get(name, False))}
+        self.absent_s = {name: self.absent_s.get(name, now_s) for name in gone}
+
+    def kept_for(self, seat: str, now_s: float) -> float:
+        """Give for how long a seat is still kept for who has gone [s]; 0 if it is not."""
+        if seat in self.held or seat not in self.absent_s:
+            return 0.0
+        return max(0.0, self.absent_s[seat] + KEEP_S - now_s)
 
     def seat_of(self, client: str) -> HeldSeat | None:
         """Find the seat that a client holds."""
         return next((item for item in self.held.values() if item.holder == client), None)
 
-    def claim(self, client: str, seat: str, names: Mapping[str, str]) -> HeldSeat:
+    def seat_kept_for(self, person: str) -> str | None:
+        """Find the seat that a person had, and may come back to."""
+        return next((name for name, tenant in self.tenants.items()
+                     if tenant.person.id == person and name in self.seats
+                     and self.seats[name]['source'] == COCKPIT), None)
+
+    def claim(self, client: str, seat: str, names: Mapping[str, str], *, person: str = '',
+              may_displace: bool = True, now_s: float = 0.0) -> HeldSeat:
         """
         Give a free seat to a client; one that it held before has to be left first.
 
         :param names: of the clients by id, for messages.
+        :param person: id of the client's person.
+        :param may_displace: whether it may take a seat that is kept for somebody who has gone.
+        :param now_s: steady clock [s]
         :raises InputError: if there is no such seat or somebody holds it.
         """
         self._known(seat)
@@ -157,8 +122,21 @@ class SeatTable:
             raise InputError(f'{names.get(holder.holder, "somebody")} has the seat', seat,
                              'ask for it')
         if holder is None:
-            holder = self.held[seat] = HeldSeat(seat, client)
+            self._check_tenant(seat, person, may_displace, now_s)
+            holder = self.held[seat] = HeldSeat(seat, client, person)
         return holder
+
+    def _check_tenant(self, seat: str, person: str, may_displace: bool, now_s: float) -> None:
+        tenant = self.tenants.get(seat)
+        if tenant is None or tenant.person.id == person or self.seats[seat]['source'] != COCKPIT:
+            return
+        name = tenant.person.name or 'somebody'
+        if seat not in self.absent_s:
+            raise InputError(f'{name} drives in another cockpit', seat, 'ask them')
+        left_s = self.kept_for(seat, now_s)
+        if left_s > 0.0 and not may_displace:
+            raise InputError(f'the seat is kept for {name}', seat,
+                             f'it is free in {math.ceil(left_s)} s, or when a director takes it')
 
     def release(self, client: str, seat: str) -> HeldSeat | None:
         """
@@ -175,18 +153,42 @@ class SeatTable:
             raise InputError('somebody else has the seat', seat, 'ask for it')
         if holder is None and entry.get('source') != COCKPIT:
             raise InputError('nobody here has the seat', seat)
+        if holder is None and seat in self.tenants and seat not in self.absent_s:
+            raise InputError(f'{self.tenants[seat].person.name} drives in another cockpit', seat)
         return self.held.pop(seat, None)
 
-    def hand_over(self, client: str, seat: str, to: str) -> HeldSeat:
+    def offer(self, client: str, seat: str, to: str) -> HeldSeat:
         """
-        Hand a seat to another client.
+        Offer a seat to another client, who accepts it or declines; to oneself: withdraw that.
 
         :raises InputError: if the client does not hold it.
         """
-        holder = self._of(client, seat)
-        other = self.held[seat] = HeldSeat(seat, to)
-        other.requests = [item for item in holder.requests if item != to]
-        return other
+        holder = self.holding(client, seat)
+        holder.offered_to = None if to == client else to
+        return holder
+
+    def accept(self, client: str, seat: str, person: str = '') -> HeldSeat:
+        """
+        Take a seat that was offered.
+
+        :return: the seat as it was held.
+        :raises InputError: if it is not offered to this client (any more).
+        """
+        before = self._offered(client, seat)
+        after = self.held[seat] = HeldSeat(seat, client, person)
+        after.requests = [item for item in before.requests if item != client]
+        return before
+
+    def decline(self, client: str, seat: str) -> HeldSeat:
+        """
+        Leave a seat that was offered to who has it.
+
+        :raises InputError: if it is not offered to this client (any more).
+        """
+        holder = self._offered(client, seat)
+        holder.offered_to = None
+        holder.requests = [item for item in holder.requests if item != client]
+        return holder
 
     def ask(self, client: str, seat: str) -> HeldSeat:
         """
@@ -204,37 +206,55 @@ class SeatTable:
 
     def left(self, client: str) -> HeldSeat | None:
         """
-        Forget a client that is gone: its car is stopped, and anybody may claim the seat.
+        Forget a client that is gone: its car is stopped.
 
         :return: the seat that it held.
         """
         for item in self.held.values():
             item.requests = [other for other in item.requests if other != client]
+            if item.offered_to == client:
+                item.offered_to = None
         seat = self.seat_of(client)
         if seat is not None:
             del self.held[seat.id]
         return seat
 
-    def document(self, names: Mapping[str, str], lost: Mapping[str, bool]) -> dict[str, Any]:
+    def document(self, names: Mapping[str, str], lost: Mapping[str, bool],
+                 now_s: float = 0.0) -> dict[str, Any]:
         """
         Give the seats for the page.
 
-        :param names: of the clients by id.
+        :param names: of the clients that may drive, by id.
         :param lost: seats whose driver is silent.
+        :param now_s: steady clock [s]
         """
-        seats: dict[str, Any] = {}
-        for name, entry in self.seats.items():
-            held = self.held.get(name)
-            seats[name] = {
-                'source': entry.get('source', ''), 'driver': short_source(entry.get('driver', '')),
-                'holder': None if held is None else held.holder,
-                'holder_name': None if held is None else names.get(held.holder, ''),
-                'requests': [] if held is None else _people(held.requests, names),
-                'others': [] if held is None else _people(
-                    (item for item in names if item != held.holder
-                     and item not in held.requests), names),
-                'lost': lost.get(name, False)}
-        return {'seats': seats}
+        return {'seats': {name: self._entry(name, names, lost, now_s) for name in self.seats}}
+
+    def _entry(self, name: str, names: Mapping[str, str], lost: Mapping[str, bool],
+               now_s: float) -> dict[str, Any]:
+        entry, held, tenant = self.seats[name], self.held.get(name), self.tenants.get(name)
+        content: dict[str, Any] = {
+            'source': entry.get('source', ''), 'driver': short_source(entry.get('driver', '')),
+            'holder': None, 'holder_name': None, 'requests': [], 'others': [], 'kept': None,
+            'offer': None, 'ready': tenant is not None and tenant.here and tenant.ready,
+            'device': '', 'lost': lost.get(name, False)}
+        if held is not None:
+            content |= {
+                'holder': held.holder, 'holder_name': names.get(held.holder, ''),
+                'requests': _people(held.requests, names),
+                'others': _people((item for item in names if item != held.holder
+                                   and item not in held.requests), names)}
+            if held.offered_to is not None:
+                content['offer'], = _people([held.offered_to], names)
+        elif tenant is not None and entry.get('source') == COCKPIT:
+            left_s = math.ceil(self.kept_for(name, now_s))
+            if name not in self.absent_s:
+                content |= {'holder': tenant.person.id, 'holder_name': tenant.person.name}
+            elif left_s:
+                content['kept'] = {'name': tenant.person.name, 'for_s': left_s}
+        if tenant is not None and content['holder'] is not None:
+            content['device'] = tenant.person.device
+        return content
 
     def _known(self, seat: str) -> dict[str, str]:
         if seat not in self.seats:
@@ -242,7 +262,19 @@ class SeatTable:
                              'it has ' + ', '.join(self.seats))
         return self.seats[seat]
 
-    def _of(self, client: str, seat: str) -> HeldSeat:
+    def _offered(self, client: str, seat: str) -> HeldSeat:
+        self._known(seat)
+        holder = self.held.get(seat)
+        if holder is None or holder.offered_to != client:
+            raise InputError('the seat is not offered to you any more', seat)
+        return holder
+
+    def holding(self, client: str, seat: str) -> HeldSeat:
+        """
+        Give the seat that a client holds.
+
+        :raises InputError: if it does not.
+        """
         self._known(seat)
         holder = self.held.get(seat)
         if holder is None or holder.holder != client:

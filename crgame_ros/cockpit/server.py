@@ -23,16 +23,22 @@ from typing import cast
 
 from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
-from crgame_ros.cockpit import library_routes, page_files
+from crgame_ros.cockpit import invite_routes, library_routes, page_files
 from crgame_ros.cockpit.access import Access, is_own_origin
 from crgame_ros.cockpit.backend import Backend, ReplayControls
+from crgame_ros.cockpit.doorkeeper import Doorkeeper, server_log, WatchedSite
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_files import PageFile
+from crgame_ros.cockpit.request_rights import RIGHTS
 from crgame_ros.cockpit.session import Session
 from crgame_ros.errors import InputError
 
 HUB = web.AppKey('hub', Hub)
+KEEPER = web.AppKey('keeper', Doorkeeper)
+ACCESS = web.AppKey('access', Access)
+# How long a browser keeps what it got for its token [s].
+COOKIE_S = 12 * 3600
 PORTS_TRIED = 20
 SHUTDOWN_S = 0.8
 _STALL_CHECK_S = 0.5
@@ -61,9 +67,10 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     :raises CrgameError: if the page or Plotly is not installed.
     """
     hub = Hub(backend.mode)
+    keeper = Doorkeeper()
     sessions: set[Session] = set()
-    app = web.Application(middlewares=[_guard(access)], client_max_size=_JSON_BYTES)
-    app[HUB] = hub
+    app = web.Application(middlewares=[_guard(access, keeper)], client_max_size=_JSON_BYTES)
+    app[HUB], app[KEEPER], app[ACCESS] = hub, keeper, access
     app.cleanup_ctx.append(_running(backend, hub))
     app.on_response_prepare.append(_add_headers)
 
@@ -81,7 +88,8 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     app.on_shutdown.append(close_all)
     app.router.add_get('/ws', connect)
     _add_page(app, page_files.read_page(page))
-    library_routes.add_routes(app, library, backend)
+    library_routes.add_routes(app, library, backend, hub)
+    invite_routes.add_routes(app, access, hub)
     if backend.mode == 'replay':
         app.add_routes(cast(ReplayControls, backend).routes())
     return app
@@ -99,12 +107,14 @@ async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRun
     """
     # No log of requests: the first address holds the token.
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN_S,
-                           keepalive_timeout=30.0, lingering_time=1.0, auto_decompress=False)
+                           keepalive_timeout=30.0, lingering_time=1.0, auto_decompress=False,
+                           logger=server_log())
     try:
         await runner.setup()
         for candidate in range(port, port + PORTS_TRIED if port else 1):
             try:
-                await web.TCPSite(runner, host, candidate).start()
+                await WatchedSite(runner, host, candidate, app[KEEPER],
+                                  app[ACCESS].tls).start()
             except OSError as error:
                 if error.errno != errno.EADDRINUSE:
                     raise InputError(f'cannot listen ({error.strerror})', f'{host}:{candidate}',
@@ -122,28 +132,42 @@ async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRun
         raise
 
 
-def _guard(access: Access) -> Middleware:
+def _guard(access: Access, keeper: Doorkeeper) -> Middleware:
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
-        sockname = request.get_extra_info('sockname')
-        if sockname is None:
-            raise ConnectionResetError
-        refusal = _refusal(access, request, sockname[1])
-        if refusal:
-            return web.Response(status=403, text=f'{refusal}\n')
-        if access.token is None:
-            return await handler(request)
-        cookie = f'crgame-{sockname[1]}'
-        if request.path == '/' and 'token' in request.query:
-            if access.knows(request.query['token']):
-                answer = web.Response(status=303, headers={'Location': '/'})
-                answer.set_cookie(cookie, access.token, httponly=True, samesite='Strict')
-                return answer
-        elif access.knows(request.cookies.get(cookie)):
-            return await handler(request)
-        return web.Response(status=403, text='Open the address with the token that the cockpit '
-                            'printed when it started.\n')
+        transport = request.transport
+        keeper.begins(transport)
+        try:
+            return await _answer(access, request, handler)
+        finally:
+            keeper.ends(transport)
     return guard
+
+
+async def _answer(access: Access, request: web.Request,
+                  handler: Handler) -> web.StreamResponse:
+    sockname = request.get_extra_info('sockname')
+    if sockname is None:
+        raise ConnectionResetError
+    refusal = _refusal(access, request, sockname[1])
+    if refusal:
+        return web.Response(status=403, text=f'{refusal}\n')
+    name = f'crgame-{sockname[1]}'
+    cookie = request.cookies.get(name)
+    if access.asks and request.path == '/' and 'token' in request.query:
+        try:
+            cookie = access.exchange(request.query['token'], cookie)
+        except InputError as error:
+            return web.Response(status=403, text=f'{error}\n')
+        answer = web.Response(status=303, headers={'Location': '/'})
+        answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
+                          secure=access.tls is not None, max_age=COOKIE_S)
+        return answer
+    rights = access.rights(cookie)
+    if rights is None:
+        return web.Response(status=403, text=f'{access.refusal}\n')
+    request[RIGHTS] = rights
+    return await handler(request)
 
 
 def _refusal(access: Access, request: web.Request, port: int) -> str:

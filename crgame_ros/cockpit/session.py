@@ -26,6 +26,8 @@ from crgame_ros.cockpit import page_messages
 from crgame_ros.cockpit.backend import Backend
 from crgame_ros.cockpit.client import Client, Sound, TokenBucket
 from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.request_rights import browser_of, granted
+from crgame_ros.cockpit.rights import refusal_of
 from crgame_ros.errors import CrgameError, InputError
 
 MESSAGES_PER_S = 400.0
@@ -75,10 +77,15 @@ class Session:
             return self.socket
         self._transport = transport
         _send_promptly(transport)
-        if self._hub.is_full:
+        peer = transport.get_extra_info('peername')
+        address = str(peer[0]) if peer else ''
+        now_s = asyncio.get_running_loop().time()
+        if not self._hub.make_room(address, now_s):
             await self.close(WSCloseCode.TRY_AGAIN_LATER, 'too many pages are open')
             return self.socket
-        client = self._hub.add(transport.abort, transport.get_write_buffer_size)
+        client = self._hub.add(transport.abort, transport.get_write_buffer_size,
+                               rights=granted(request), address=address, now_s=now_s)
+        client.browser = browser_of(request)
         writer = asyncio.create_task(client.write(self.socket))
         writer.add_done_callback(lambda task: _end_with(task, client))
         self._worker = asyncio.create_task(self._work(client))
@@ -134,7 +141,8 @@ class Session:
             if message.type in (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED,
                                 WSMsgType.ERROR):
                 return WSCloseCode.OK, ''
-            if not self._bucket.take(loop.time()):
+            client.heard_s = loop.time()
+            if not self._bucket.take(client.heard_s):
                 return (WSCloseCode.POLICY_VIOLATION,
                         f'more than {MESSAGES_PER_S:g} messages a second')
             if message.type is WSMsgType.PING:
@@ -153,7 +161,11 @@ class Session:
         except InputError as error:
             self._blame(client, error)
             return
+        refusal = refusal_of(client.rights, message)
         match message['type']:
+            case _ if refusal and self._backend.mode == 'live':
+                if 'id' in message:
+                    self._reply(client, message, False, refusal)
             case 'input':
                 try:
                     await self._backend.command(client, message)
@@ -170,7 +182,18 @@ class Session:
                 self._hub.send_wanted(client)
             case 'sound':
                 client.sound = Sound(message['on'], message['volume'], message['rumble'])
+            case 'person':
+                self._hub.identify(client, message['key'], fresh=message['fresh'])
+                self._backend.joined(client)
+            case 'role':
+                client.rights = client.granted.narrowed(message['role'])
+                self._hub.tell_rights(client)
+                self._backend.joined(client)
+                self._reply(client, message, True, f'you are a {client.rights.role}')
+            case 'device':
+                client.device = message['device']
             case 'ping':
+                client.round_trip_ms = message.get('round_trip_ms', client.round_trip_ms)
                 self._hub.send_event('pong', {'t': message['t']}, only=client)
             case _:
                 await self._ask(client, message)
@@ -214,7 +237,8 @@ def _end_with(writer: asyncio.Task[None], client: Client) -> None:
 
 def _send_promptly(transport: asyncio.WriteTransport) -> None:
     """Hold back no more than one message: what is old is replaced, not sent late."""
-    transport.set_write_buffer_limits(high=0)
+    # With 0, TLS would hold back for ever: it takes an empty buffer for a full one.
+    transport.set_write_buffer_limits(high=1, low=0)
     raw = transport.get_extra_info('socket')
     if raw is not None and hasattr(socket, 'TCP_NOTSENT_LOWAT'):
         raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _KERNEL_UNSENT)

@@ -80,7 +80,8 @@ class EnvironmentBackend:
     def left(self, client: Client) -> None:
         """Do nothing."""
 
-    async def load_game(self, path: Any) -> str:
+    async def load_game(self, path: Any, client: Any = None, *,
+                        takes_seat: bool = False) -> str:
         """
         Refuse: the environment has its game.
 

@@ -31,6 +31,7 @@ Without arguments: the cut-in game, driven by its script. A game file (YAML) say
 --scenario alone works on any CommonRoad file: you are placed near the first AV, each planning
 problem becomes an AV, recorded obstacles play back. In an exported run its own human plays back as
 well, and you are placed only with --driver."""
+_NAMED_DRIVER = re.compile(r'(hv[0-9]{1,3})=(.+)')
 PROBLEM_HELP = ('only this planning problem becomes an AV, where the game names no AVs; give it '
                 'again for the next (default: all; of those that start on one spot the first)')
 EPILOG = """\
@@ -58,6 +59,7 @@ class RunRequest:
     :param game: game file, if any.
     :param scenario: CommonRoad file instead of the game's.
     :param driver: driver source of the first human.
+    :param drivers: driver sources of humans by their ids.
     :param planners: planners of the AVs in their order; a single one serves all.
     :param problems: planning problems that become AVs, where the game names none; all of them
         where empty, of those that start on one spot the first.
@@ -66,6 +68,10 @@ class RunRequest:
     :param headless: without the cockpit.
     :param port: of the cockpit's page; the next free one when it is taken.
     :param listen: address on which the page is served beyond this machine, with a token.
+    :param token: ask for a token on this machine too.
+    :param open_cockpit: let people in by links alone, which let one browser in each, over TLS.
+    :param certificate: PEM file for TLS, instead of one that is made.
+    :param key: of the certificate.
     :param replay: recording to show in the page; nothing is simulated then.
     :param realtime_priority: SCHED_FIFO for the simulation.
     :param namespace: of all nodes, topics and services.
@@ -76,6 +82,7 @@ class RunRequest:
     game: Path | None = None
     scenario: Path | None = None
     driver: str | None = None
+    drivers: tuple[tuple[str, str], ...] = ()
     planners: tuple[str, ...] = ()
     duration_s: float | None = None
     rate_hz: float | None = None
@@ -83,6 +90,10 @@ class RunRequest:
     headless: bool = False
     port: int = 8080
     listen: str | None = None
+    token: bool = False
+    open_cockpit: bool = False
+    certificate: Path | None = None
+    key: Path | None = None
     replay: Path | None = None
     realtime_priority: bool = False
     out: Path | None = None
@@ -104,7 +115,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add = parser.add_argument
     add('game', nargs='?', type=Path, metavar='GAME.yaml', help='game file (scenarios/*.yaml)')
     add('--scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
-    add('--driver', metavar='SOURCE', help="who drives the first human's vehicle")
+    add('--driver', action='append', default=[], metavar='[hvN=]SOURCE', dest='drivers',
+        help="who drives the first human's vehicle, or that of hvN; may be given again")
     add('--planner', action='append', default=[], metavar='NAME', dest='planners',
         help='planner of the AVs; give it again for the next AV')
     add('--problem', action='append', type=int, default=[], metavar='ID', dest='problems',
@@ -122,8 +134,18 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--listen', metavar='ADDRESS',
         help='serve the page to other machines too, for instance on 0.0.0.0; who comes needs the '
         'token in the printed address')
+    add('--token', action='store_true',
+        help='ask for the token in the printed address on this machine too, where others work on '
+        'it')
+    add('--open-cockpit', action='store_true',
+        help='let other people in on purpose: over TLS, by printed links to direct, to drive each '
+        'seat and to watch, which let one browser in each; on all addresses, or that of --listen')
+    add('--certificate', type=Path, metavar='FILE',
+        help='PEM file for TLS, with --key (default: --open-cockpit makes one by openssl)')
+    add('--key', type=Path, metavar='FILE', help='PEM file with the key of the certificate')
     add('--replay', type=Path, metavar='BAG',
-        help='show a recording in the page instead of running a game; goes with --port, --listen')
+        help='show a recording in the page instead of running a game; goes with --port, --listen '
+        'and --token')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--namespace', type=_namespace, default='/', metavar='/NAME',
@@ -145,12 +167,51 @@ def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunReq
     values = vars(build_parser(program).parse_args(list(arguments)))
     values['planners'] = tuple(values['planners'])
     values['problems'] = tuple(values['problems'])
+    values['driver'], values['drivers'] = read_drivers(values['drivers'])
     request = RunRequest(**values)
     if request.replay is not None and request != RunRequest(
-            port=request.port, listen=request.listen, replay=request.replay):
+            port=request.port, listen=request.listen, token=request.token,
+            replay=request.replay):
         raise InputError('shows a recording and runs no game', '--replay',
-                         'give nothing but --port and --listen with it')
+                         'give nothing but --port, --listen and --token with it')
+    _check_opening(request)
     return request
+
+
+def cockpit_host(request: RunRequest) -> str:
+    """Give the address on which the page is served."""
+    return request.listen or ('0.0.0.0' if request.open_cockpit else '127.0.0.1')
+
+
+def read_drivers(values: Sequence[str]) -> tuple[str | None, tuple[tuple[str, str], ...]]:
+    """
+    Read what `--driver` says, each time that it is given.
+
+    :param values: SOURCE, or hvN=SOURCE.
+    :return: the source of the first human, and those of humans by their ids.
+    :raises InputError: if one is named twice.
+    """
+    first: str | None = None
+    named: dict[str, str] = {}
+    for value in values:
+        match = _NAMED_DRIVER.fullmatch(value)
+        if match is None:
+            first = value
+        elif match[1] in named:
+            raise InputError(f'names {match[1]} twice', '--driver', 'give it once')
+        else:
+            named[match[1]] = match[2]
+    return first, tuple(named.items())
+
+
+def _check_opening(request: RunRequest) -> None:
+    if (request.certificate is None) != (request.key is None):
+        raise InputError('a certificate and its key belong together', '--certificate',
+                         'give --certificate and --key')
+    opened = request.open_cockpit or request.token or request.certificate is not None
+    if request.headless and opened:
+        raise InputError('there is no page', '--headless',
+                         'leave it out, or --open-cockpit, --token and --certificate')
 
 
 def _positive(text: str) -> float:

@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 import os
+import shutil
 import sys
 
 from crgame_ros.errors import CrgameError
@@ -46,9 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         request = parse_arguments(sys.argv[1:] if arguments is None else arguments)
         if request.replay is not None:
+            from crgame_ros.cockpit.access import new_token
             from crgame_ros.cockpit.replay_server import serve_replay
             return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
-                                say=say)
+                                new_token() if request.token else None, say=say)
         require_ros()
         plan = plan_run(request)
         compile_now()
@@ -62,6 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 load(shared_modules(specs, plan))
                 code = Graph(specs, say, Roster(plan.roster), finisher, request.namespace).run()
         finally:
+            shutil.rmtree(plan.private, ignore_errors=True)
             plan.roster.unlink(missing_ok=True)
             plan.claim.unlink(missing_ok=True)
         with writing(say):

@@ -19,7 +19,7 @@ import json
 from pathlib import Path
 
 from crgame_ros.driver.source import COCKPIT, is_replay
-from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.launcher.node_process import NodeSpec
 from crgame_ros.launcher.run_plan import RunPlan
 from crgame_ros.planner.planner_registry import BUILT_IN, EXTERNAL
@@ -109,12 +109,21 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
     request = plan.request
     viewers = [NodeSpec('marker_node', 'marker_node', nice=VIEWER_NICE, restart=True)]
     if not request.headless:
+        seats = ', '.join(f'"{human.id}"' for human in plan.setup.humans)
         viewers.append(NodeSpec('cockpit_node', 'cockpit_node', {
-            'port': str(request.port), 'listen': f'"{request.listen or "127.0.0.1"}"',
+            'port': str(request.port), 'listen': f'"{cockpit_host(request)}"',
+            'token': str(request.token).lower(),
+            'open_cockpit': str(request.open_cockpit).lower(),
+            'certificate': _path(request.certificate), 'key': _path(request.key),
+            'private': f'"{plan.private}"', 'seats': f'[{seats}]',
             'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
             'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"'},
             nice=COMPANION_NICE, restart=True))
     return viewers
+
+
+def _path(path: Path | None) -> str:
+    return '""' if path is None else f'"{path.resolve()}"'
 
 
 class Roster:

@@ -14,7 +14,7 @@
 # limitations under the License.
 """From a request to a checked plan of the run: game, vehicles and folder."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -23,12 +23,13 @@ import os
 from pathlib import Path
 
 from crgame_ros.cockpit.access import check_address
+from crgame_ros.cockpit.opening import check_certificate
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.game.game_file import dump_game, load_game
-from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.paths import check_room, default_game, numbered
 from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
 from crgame_ros.policy.policy_file import load_policy
@@ -83,6 +84,11 @@ class RunPlan:
         return self.folder / '.roster.json'
 
     @property
+    def private(self) -> Path:
+        """Name the folder of links and certificate, for its owner alone, while the run goes on."""
+        return self.folder / '.private'
+
+    @property
     def bag(self) -> Path:
         """Name the recording."""
         return self.folder / 'bag'
@@ -101,7 +107,8 @@ def effective_game(request: RunRequest, game: Game | None = None) -> Game:
         game = load_game(request.game)
     elif request.scenario is not None:
         # The human of an exported run is a recording in it: the same cast drives again.
-        alone = request.driver is None and plays_its_humans(request.scenario)
+        alone = request.driver is None and not request.drivers \
+            and plays_its_humans(request.scenario)
         game = Game(request.scenario, humans=() if alone else (HumanSpec('hv0'),))
     else:
         game = load_game(default_game())
@@ -117,7 +124,21 @@ def effective_game(request: RunRequest, game: Game | None = None) -> Game:
             raise InputError('the game has no human', '--driver', 'leave it out')
         first = replace(game.humans[0], driver=_from_here(request.driver))
         game = replace(game, humans=(first, *game.humans[1:]))
+    if request.drivers:
+        game = _with_drivers(game, dict(request.drivers))
     return _with_limits(game, request)
+
+
+def _with_drivers(game: Game, drivers: Mapping[str, str]) -> Game:
+    """Take over who drives whom."""
+    known = {human.id for human in game.humans}
+    unknown = sorted(drivers.keys() - known)
+    if unknown:
+        raise InputError(f'the game has no {unknown[0]}', '--driver', 'it has '
+                         + (', '.join(sorted(known)) or 'no human'))
+    return replace(game, humans=tuple(
+        replace(human, driver=_from_here(drivers[human.id])) if human.id in drivers else human
+        for human in game.humans))
 
 
 def _with_limits(game: Game, request: RunRequest) -> Game:
@@ -219,7 +240,8 @@ def _check_run(request: RunRequest, setup: Setup) -> None:
             load_policy(human.driver.removeprefix(POLICY), human.id).check_pedals(human.id)
     _check_swaps(setup)
     if not request.headless:
-        check_address(request.listen or '127.0.0.1', request.port)
+        check_certificate(request.certificate, request.key)
+        check_address(cockpit_host(request), request.port)
 
 
 def _plan_in(folder: Path, request: RunRequest, setup: Setup) -> RunPlan:
@@ -230,6 +252,7 @@ def _plan_in(folder: Path, request: RunRequest, setup: Setup) -> RunPlan:
         scenario.write_bytes(guard.encode(setup.loaded.xml_text))
         setup = replace(setup, game=replace(setup.game, scenario=scenario))
     plan = RunPlan(request, setup, folder)
+    plan.private.mkdir(mode=0o700)
     plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
     return plan
 

@@ -15,10 +15,12 @@
 """cockpit_node: the page in which people drive, see everything and steer the run."""
 
 import asyncio
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.library import Library
+from crgame_ros.cockpit.opening import Opening
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.nodes.cockpit.cockpit_backend import LiveBackend
 from crgame_ros.paths import scenarios_directory
@@ -35,12 +37,11 @@ class CockpitNode(Node):
     def __init__(self) -> None:
         super().__init__('cockpit_node')
         declare = self.declare_parameter
-        self._port: int = declare('port', 8080, ParameterDescriptor(
-            description='port of the page; the next free one when it is taken', read_only=True,
-            integer_range=[IntegerRange(from_value=1, to_value=65535, step=1)])).value
-        self._host: str = declare('listen', '127.0.0.1', ParameterDescriptor(
-            description='address to listen on; beyond this machine everybody needs the token of '
-            'the printed address', read_only=True)).value
+        # Removed at the end.
+        self._private = ExitStack()
+        self._opening = self._declare_opening()
+        self._seats: list[str] = declare('seats', ['hv0'], ParameterDescriptor(
+            description='seats for which open_cockpit makes links', read_only=True)).value
         self._folders: list[str] = declare('folders', [''], ParameterDescriptor(
             description="folders of games and scenarios beside the package's own",
             read_only=True)).value
@@ -51,21 +52,50 @@ class CockpitNode(Node):
             description='folder for uploaded scenarios and for the games that people choose',
             read_only=True)).value
 
+    def _declare_opening(self) -> Opening:
+        declare = self.declare_parameter
+
+        def text(name: str, default: str, what: str) -> str:
+            return str(declare(name, default, ParameterDescriptor(
+                description=what, read_only=True)).value)
+
+        def flag(name: str, what: str) -> bool:
+            return bool(declare(name, False, ParameterDescriptor(
+                description=what, read_only=True)).value)
+
+        port: int = declare('port', 8080, ParameterDescriptor(
+            description='port of the page; the next free one when it is taken', read_only=True,
+            integer_range=[IntegerRange(from_value=1, to_value=65535, step=1)])).value
+        certificate = text('certificate', '', 'PEM file for TLS; plain HTTP if empty')
+        key = text('key', '', 'PEM file with the key of the certificate')
+        return Opening(
+            text('listen', '127.0.0.1', 'address to listen on; beyond this machine everybody '
+                 'needs the token of the printed address'), port,
+            flag('token', 'ask for a token on this machine too'),
+            flag('open_cockpit', 'let people in by links that let one browser in each, over TLS'),
+            Path(certificate) if certificate else None, Path(key) if key else None,
+            Path(text('private', '', 'folder that only its owner can read, in which links and '
+                      'certificate outlive this node; a new one if empty')
+                 or self._private.enter_context(TemporaryDirectory(prefix='crgame_'))))
+
     def run(self, stop: StopFlag) -> None:
         """Serve until asked to stop."""
-        asyncio.run(self._serve(stop))
+        with self._private:
+            asyncio.run(self._serve(stop))
 
     async def _serve(self, stop: StopFlag) -> None:
         folders = [('crgame_ros', scenarios_directory())]
         folders += [(Path(item).name, Path(item)) for item in self._folders if item]
         work = Path(self._work)
-        access = Access.guarded(self._host, self._port)
+        opening = self._opening
+        access = opening.access()
         app = create_app(LiveBackend(self, Path(self._runs) if self._runs else None), access,
                          Library(folders, work / 'uploads', work / 'games'))
-        runner, port = await listen(app, self._host, self._port)
-        if port != self._port:
-            self.get_logger().warning(f'port {self._port} is taken')
-        print(f'the cockpit is at {access.at_port(port).url}', flush=True)
+        runner, port = await listen(app, opening.host, opening.port)
+        if port != opening.port:
+            self.get_logger().warning(f'port {opening.port} is taken')
+        for line in opening.lines(access.at_port(port), self._seats):
+            print(line, flush=True)
         try:
             while not stop.requested:
                 await asyncio.sleep(LOOK_S)

@@ -27,7 +27,7 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
-from crgame_ros.ros.seats import GAME
+from crgame_ros.ros.seat import GAME
 from crgame_ros.ros.spinning import prompt_executor, spin
 from crgame_ros.ros.trusted_code import trust_code
 from diagnostic_msgs.msg import DiagnosticStatus

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from crgame_ros.game.events import FiredEvent
+from crgame_ros.recording.recorded_drivers import read_drivers, RecordedDriver
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
 from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
@@ -41,6 +42,7 @@ class RunRecord:
         follows its plan.
     :param fired: events that took effect, in order.
     :param orders: of the seats, in order; an offline run has none.
+    :param drivers: who drove, in order; an offline run does not say it.
     """
 
     log: RunLog
@@ -48,6 +50,7 @@ class RunRecord:
     commands: NDArray[np.float64]
     fired: tuple[FiredEvent, ...]
     orders: tuple[SeatOrder, ...] = ()
+    drivers: tuple[RecordedDriver, ...] = ()
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -74,11 +77,13 @@ def record_of_log(path: Path, log: RunLog) -> RunRecord:
     vehicles = [item.id for item in log.vehicles]
     fired = read_run_events(path, log.game.epoch).fired
     orders = read_seat_orders(path, log.game.epoch)
+    drivers = read_drivers(path, log.game.epoch)
     if log.cycles is None:
         return RunRecord(log, np.empty(0, dtype=np.int64),
-                         np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired, orders)
+                         np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired, orders,
+                         drivers)
     ns = log.cycles.column('n').astype(np.int64)
-    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders)
+    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders, drivers)
 
 
 def run_record_of(result: OfflineResult) -> RunRecord:

@@ -14,167 +14,33 @@
 # limitations under the License.
 """Who drives what in a live run: one source a seat, changed by orders on /seats/order."""
 
-from collections.abc import MutableMapping
+from collections.abc import Iterator, MutableMapping
+from dataclasses import replace
 import json
 from typing import TYPE_CHECKING
 
 from crgame_ros.driver.source import COCKPIT, parse_source
-from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
+from crgame_ros.game.seat_documents import (
+    MAX_SOURCE_LENGTH,
+    ORDER_TOPIC,
+    parse_demand,
+    seat_entry,
+    SeatDemand,
+    SeatTenant,
+)
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, SHARED_DEPTH
-from crgame_ros.ros.ros_messages import from_joy
-from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.ros.seat import GAME, PLANNER, Seat
+from crgame_ros.ros.seat_spells import Driven
+from crgame_ros.vehicle.driver_command import DriverCommand
 
 if TYPE_CHECKING:  # The driver's process needs neither, and they take half a second to load.
-    from crgame_ros.driver.replay_driver import ReplayDriver
     from crgame_ros.recording.recorded_inputs import RecordedInputs
     from crgame_ros.simulation.engine import Simulation
     from crgame_ros.simulation.setup import Setup
 
-NS = 1e-9
-# The driver that the game names, an AV's planner, and the recorded take-over of one; anything
-# else names a driver of its own.
-GAME = 'game'
-PLANNER = 'planner'
-REPLAY = 'replay'
-MAX_SOURCE_LENGTH = 40
-# Commands of its driver that a seat takes in one cycle.
-COMMAND_DEPTH = 10
 # Orders read in one cycle: a flood must not cost it.
 MAX_ORDERS = 10
-# A page with somebody's hands on the controls says so every 50 ms [ns].
-PRESENT_NS = 500_000_000
-
-
-class Seat:
-    """
-    One vehicle's seat: the latest command of its source, and how old it is on the steady clock.
-
-    :param vehicle_id: whose seat.
-    :param driver: who drives it by the game, a driver source or the AV's planner.
-    :param home: source by which the game's driver speaks.
-    :param commands: where the commands come from.
-    :param clock_offset_ns: simulation time of step 0; older commands are of a run before [ns]
-    :param recording: drives while nobody else has the seat, cycle by cycle, whenever that comes.
-    """
-
-    def __init__(self, vehicle_id: str, driver: str, home: str, commands: PolledSubscription,
-                 clock_offset_ns: int, recording: 'ReplayDriver | None' = None) -> None:
-        self.id = vehicle_id
-        self.driver = driver
-        self.home = home
-        self.source = home
-        self.commands = commands
-        # Decided before a command takes a place among those of a cycle.
-        commands.wanted = self._is_for_us
-        self.recording = recording
-        # Whether an AV is driven as it was while somebody had taken it over.
-        self.taken_over_again = False
-        self._where = f'/{vehicle_id}/driver_command'
-        self._watchdog = SeatWatchdog()
-        self._last = RELEASED
-        self._heard_ns: int | None = None
-        self._clock_offset_ns = clock_offset_ns
-        self.malformed = 0
-        self.outdated = 0
-        # Commands of others, who have not got the seat.
-        self.passed_over = 0
-
-    @property
-    def losses(self) -> int:
-        """How often the driver has fallen silent."""
-        return self._watchdog.losses
-
-    @property
-    def lost(self) -> bool:
-        """Whether the driver is silent now."""
-        return self._watchdog.lost and self.source != PLANNER
-
-    @property
-    def told_source(self) -> str:
-        """Whose commands the vehicle obeys, as /seats says it."""
-        return REPLAY if self.taken_over_again and self.source == PLANNER else self.source
-
-    def obey(self, source: str, now_ns: int) -> None:
-        """
-        Take commands from another source; what was commanded last holds until it speaks.
-
-        Not so after a loss: the pedals that the lost driver held must not come back.
-        """
-        if self.source == PLANNER:
-            self._watchdog.reset()
-            self._last = RELEASED
-        elif self._watchdog.lost:
-            self._last = RELEASED
-        self.source = source
-        self._heard_ns = now_ns
-
-    def forgive(self, now_ns: int) -> None:
-        """Count silence from now on: a pause is no loss; who was lost before it still is."""
-        if self._heard_ns is not None and not self._watchdog.lost:
-            self._heard_ns = now_ns
-
-    def _is_for_us(self, stamp_ns: int, source: str) -> bool:
-        if (source or GAME) != self.source:
-            self.passed_over += 1
-            return False
-        if stamp_ns < self._clock_offset_ns:
-            self.outdated += 1
-            return False
-        return True
-
-    def listen(self, now_ns: int) -> bool:
-        """Take the latest command that has come; tell whether there was any so far."""
-        for _ in range(COMMAND_DEPTH):
-            try:
-                message = self.commands.take()
-            except InputError:
-                self.malformed += 1
-                continue
-            if message is None:
-                break
-            try:
-                self._last = from_joy(message, self._where)
-                self._heard_ns = now_ns
-            except InputError:
-                self.malformed += 1
-        return self._heard_ns is not None
-
-    @property
-    def repeats_recording(self) -> bool:
-        """Whether a recording drives, or will: messages are not for such a seat."""
-        return self.recording is not None and self.source == self.home
-
-    def repeats(self, n: int) -> bool:
-        """Tell whether cycle n is driven as in the recording."""
-        return self.recording is not None and self.repeats_recording and self.recording.drives(n)
-
-    def awaits_driver(self, now_ns: int) -> bool:
-        """Tell whether the seat is the cockpit's by the game, and no hands are on its controls."""
-        if self.home != COCKPIT or self.source != COCKPIT:
-            return False
-        self.listen(now_ns)
-        return self._heard_ns is None or now_ns - self._heard_ns > PRESENT_NS
-
-    def command(self, now_ns: int, dt_s: float, speed: float, n: int = 0) -> DriverCommand | None:
-        """
-        Give the command for this cycle; released, then gentle braking, after a loss.
-
-        :param n: the cycle, which only a recording needs to know.
-        :return: None for an AV that nobody has taken over.
-        """
-        recording = self.recording if self.repeats_recording else None
-        self.taken_over_again = self.source == PLANNER and self.repeats(n)
-        if self.source == PLANNER and not self.taken_over_again:
-            return None
-        if recording is not None:
-            self._last, self._heard_ns = recording.command(n, dt_s), now_ns
-        else:
-            self.listen(now_ns)
-        if self._heard_ns is None:
-            self._heard_ns = now_ns
-        age_s = (now_ns - self._heard_ns) * NS
-        return self._watchdog.filter(self._last, age_s, dt_s, speed)
 
 
 class Seats:
@@ -186,16 +52,19 @@ class Seats:
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param sources: what people ordered so far, by seat; outlives a reset.
     :param recorded: what drives seats as in a recording; None for nothing.
+    :param tenants: who is in which seat; outlives a reset.
     """
 
     def __init__(self, endpoints: Endpoints, setup: 'Setup', clock_offset_ns: int,
                  sources: MutableMapping[str, str],
-                 recorded: 'RecordedInputs | None' = None) -> None:
+                 recorded: 'RecordedInputs | None' = None,
+                 tenants: MutableMapping[str, SeatTenant] | None = None) -> None:
         drivers = {} if recorded is None else recorded.drivers
         self._intervals_s: list[float] = [] if recorded is None or recorded.intervals_s is None \
             else recorded.intervals_s.tolist()
         self._orders = endpoints.polled('/seats/order')
         self._sources = sources
+        self._tenants = {} if tenants is None else tenants
         self.humans = [
             Seat(human.id, human.driver, _home(human.driver),
                  endpoints.polled('/<v>/driver_command', human.id, depth=SHARED_DEPTH,
@@ -210,6 +79,10 @@ class Seats:
         self._taken_over_again: list[bool] = []
         for seat in self.all:
             seat.source = sources.get(seat.id, seat.home)
+            tenant = self._tenants.get(seat.id)
+            if tenant is not None and seat.source == COCKPIT:
+                # Who was ready for the run before says so anew.
+                seat.tenant = replace(tenant, ready=False)
 
     @property
     def slots(self) -> list[PolledSubscription]:
@@ -240,10 +113,23 @@ class Seats:
         """Name the seats whose driver must come before the run can begin."""
         return tuple(seat.id for seat in self.humans if seat.awaits_driver(now_ns))
 
+    @property
+    def of_cockpits(self) -> list[Seat]:
+        """The seats that the game leaves to people at pages, and that nobody else has taken."""
+        return [seat for seat in self.humans if seat.home == seat.source == COCKPIT]
+
     def document(self) -> str:
         """Write /seats."""
-        return json.dumps({seat.id: {'source': seat.told_source, 'driver': seat.driver}
+        return json.dumps({seat.id: seat_entry(seat.told_source, seat.driver, seat.tenant)
                            for seat in self.all})
+
+    def driven(self) -> Iterator[Driven]:
+        """Give what each seat is driven by, but for AVs that follow their plans."""
+        for seat in self.all:
+            if seat.told_source != PLANNER:
+                person = None if seat.tenant is None or not seat.tenant.here \
+                    else seat.tenant.person
+                yield seat.id, seat.told_source, seat.driver, person
 
     def repetition_changed(self) -> bool:
         """Tell whether a recorded take-over of an AV has begun or ended since the last call."""
@@ -270,30 +156,63 @@ class Seats:
         return changed, refusals
 
     def _obey(self, text: str, now_ns: int) -> bool:
-        try:
-            order = json.loads(text)
-            name, source = order['seat'], order['source']
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
-            raise InputError('is no order', '/seats/order', 'give seat and source') from error
-        seat = next((item for item in self.all if item.id == name), None)
+        demand = parse_demand(text)
+        seat = next((item for item in self.all if item.id == demand.seat), None)
         if seat is None:
-            raise InputError(f'there is no seat {str(name)[:MAX_SOURCE_LENGTH]!r}', '/seats/order',
+            raise InputError(f'there is no seat {demand.seat[:MAX_SOURCE_LENGTH]!r}', ORDER_TOPIC,
                              'it has ' + ', '.join(item.id for item in self.all))
-        if not isinstance(source, str) or not 0 < len(source) <= MAX_SOURCE_LENGTH \
-                or not source.isprintable():
-            raise InputError('the source is no name', '/seats/order', 'give game or a driver')
+        before = (seat.source, seat.tenant)
+        if demand.source is None:
+            self._seat_person(seat, demand)
+        elif demand.source == COCKPIT:
+            self._take_by_cockpit(seat, demand, now_ns)
+        else:
+            self._take(seat, demand.source, now_ns)
+        return (seat.source, seat.tenant) != before
+
+    def _take(self, seat: Seat, source: str, now_ns: int) -> None:
+        """Let another source have a seat."""
         if source == PLANNER != seat.home:
-            raise InputError(f'{seat.id} has no planner', '/seats/order', 'give game')
+            raise InputError(f'{seat.id} has no planner', ORDER_TOPIC, 'give game')
         if source in (GAME, PLANNER):
             # Given back for good: in a game to come its own driver has the seat.
             source = seat.home
             self._sources.pop(seat.id, None)
         else:
             self._sources[seat.id] = source
-        if source == seat.source:
-            return False
-        seat.obey(source, now_ns)
-        return True
+        self._tenants.pop(seat.id, None)
+        seat.tenant = None
+        if source != seat.source:
+            seat.obey(source, now_ns)
+
+    def _take_by_cockpit(self, seat: Seat, demand: SeatDemand, now_ns: int) -> None:
+        """Put a person at a page into a seat, unless another one was quicker."""
+        sits = None if seat.tenant is None else seat.tenant.person
+        taker = demand.person
+        if sits is not None and (taker is None or sits.id not in (taker.id, demand.displaced)):
+            raise InputError(f'{sits.name or "somebody"} has {seat.id}', ORDER_TOPIC,
+                             'ask for it')
+        if seat.source != COCKPIT:
+            self._take(seat, COCKPIT, now_ns)
+        if taker is not None:
+            same = seat.tenant is not None and seat.tenant.person.id == taker.id
+            self._settle(seat, replace(seat.tenant, person=taker, here=True)
+                         if same and seat.tenant is not None else SeatTenant(taker))
+
+    def _seat_person(self, seat: Seat, demand: SeatDemand) -> None:
+        """Take what is said of the person in a seat."""
+        tenant = seat.tenant
+        if tenant is None:
+            raise InputError(f'nobody has {seat.id}', ORDER_TOPIC, 'claim it')
+        if demand.left is not None and demand.left == tenant.person.id:
+            self._settle(seat, replace(tenant, here=False, ready=False))
+        elif demand.person is not None and demand.person.id == tenant.person.id:
+            self._settle(seat, replace(
+                tenant, person=demand.person,
+                ready=tenant.ready if demand.ready is None else demand.ready))
+
+    def _settle(self, seat: Seat, tenant: SeatTenant) -> None:
+        seat.tenant = self._tenants[seat.id] = tenant
 
 
 def _home(driver: str) -> str:

@@ -150,7 +150,7 @@ OpenBrowser = Callable[..., Browser]
 
 @contextmanager
 def open_browser(profile: Path, width: int = WIDTH, height: int = HEIGHT, *,
-                 sound: bool = False) -> Iterator[Browser]:
+                 sound: bool = False, trusting: bool = False) -> Iterator[Browser]:
     """
     Start Chromium, and end it.
 
@@ -158,6 +158,7 @@ def open_browser(profile: Path, width: int = WIDTH, height: int = HEIGHT, *,
     :param width: of the page [CSS px]
     :param height: of the page [CSS px]
     :param sound: let pages make sounds without a click
+    :param trusting: open pages whose certificate nobody has signed
     """
     from selenium import webdriver
     from selenium.webdriver.chrome.options import Options
@@ -169,6 +170,7 @@ def open_browser(profile: Path, width: int = WIDTH, height: int = HEIGHT, *,
         options.add_argument(flag)
     if sound:
         options.add_argument('--autoplay-policy=no-user-gesture-required')
+    options.accept_insecure_certs = trusting
     options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
     # A proxy of the machine is not for pages on this machine.
     environment = {key: value for key, value in os.environ.items()

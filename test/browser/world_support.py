@@ -128,7 +128,8 @@ class RunBackend:
     def left(self, client: Client) -> None:
         pass
 
-    async def load_game(self, path: Path) -> str:
+    async def load_game(self, path: Path, client: Client | None = None, *,
+                        takes_seat: bool = False) -> str:
         raise NotImplementedError
 
     def send_plan(self, vehicle: int, points: FloatArray) -> None:

@@ -90,7 +90,8 @@ class PumpBackend:
     def left(self, client: Client) -> None:
         self.gone.append(client.id)
 
-    async def load_game(self, path: Path) -> str:
+    async def load_game(self, path: Path, client: Client | None = None, *,
+                        takes_seat: bool = False) -> str:
         self.games.append(path)
         return 'loaded'
 

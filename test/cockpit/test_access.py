@@ -47,7 +47,10 @@ def test_each_token_is_new() -> None:
 
 def test_the_address_carries_the_token() -> None:
     assert LOCAL.at_port(8003).url == 'http://127.0.0.1:8003/'
-    assert OPEN.url == f'http://0.0.0.0:8000/?token={TOKEN}'
+    assert OPEN.url.endswith(f':8000/?token={TOKEN}')
+    # What others can open, which 0.0.0.0 is not.
+    assert not any('0.0.0.0' in url for url in OPEN.urls)
+    assert Access('192.0.2.7', 8000, TOKEN).url == f'http://192.0.2.7:8000/?token={TOKEN}'
     assert Access('::1', 80).url == 'http://[::1]:80/'
 
 

@@ -74,7 +74,9 @@ async def test_a_new_client_gets_hello_then_documents_and_the_newest_frames() ->
     sink = await received(add(hub))
     assert sink.texts == [
         {'type': 'hello', 'client': 'c1', 'name': 'Guest 1', 'mode': 'live',
-         'version': __version__},
+         'version': __version__, 'rights': {
+             'role': 'director and driver', 'directs': True, 'drives': True, 'seat': '',
+             'may_direct': True, 'may_drive': True}},
         {'type': 'scene', 'id': 2}, {'type': 'seats', 'seats': {}}]
     assert sink.frames == [b'new']
 

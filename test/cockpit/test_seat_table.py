@@ -14,11 +14,13 @@
 # limitations under the License.
 """Seats in the browser: who holds them, and what hands, silence and absence become."""
 
+from crgame_ros.cockpit.held_seat import HeldSeat, SILENCE_S
 from crgame_ros.cockpit.seat_orders import AGAIN_S, GIVE_UP_S, SeatOrders
-from crgame_ros.cockpit.seat_table import HeldSeat, SeatTable, SILENCE_S
+from crgame_ros.cockpit.seat_table import KEEP_S, SeatTable
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_seats_document
+from crgame_ros.game.seat_documents import SeatDemand, SeatPerson, SeatTenant
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 import pytest
 
@@ -51,18 +53,91 @@ def test_a_seat_is_held_by_one(table: SeatTable) -> None:
     assert table.document(NAMES, {})['seats']['av0']['holder'] is None
 
 
-def test_hand_over(table: SeatTable) -> None:
-    """Only the holder hands over; the new one has it with the other requests, hands off."""
+def test_a_seat_is_given_away_with_the_consent_of_who_gets_it(table: SeatTable) -> None:
+    """Only the holder offers; until it is accepted nothing changes; then hands off."""
     first = table.claim('c1', 'hv0', NAMES)
     first.take(THROTTLE, 0.0)
     table.ask('c2', 'hv0')
     table.ask('c3', 'hv0')
     with pytest.raises(InputError, match='hv0: you do not have the seat; claim it first'):
-        table.hand_over('c2', 'hv0', 'c3')
-    second = table.hand_over('c1', 'hv0', 'c2')
-    assert table.held['hv0'] is second and second.holder == 'c2'
-    assert second.requests == ['c3']
+        table.offer('c2', 'hv0', 'c3')
+    table.offer('c1', 'hv0', 'c2')
+    assert table.document(NAMES, {})['seats']['hv0']['offer'] == {'client': 'c2', 'name': 'Bob'}
+    with pytest.raises(InputError, match='not offered to you any more'):
+        table.accept('c3', 'hv0')
+    assert table.held['hv0'] is first and first.command(0, DT).throttle > 0.0
+    assert table.accept('c2', 'hv0', 'p2') is first
+    second = table.held['hv0']
+    assert (second.holder, second.person, second.requests) == ('c2', 'p2', ['c3'])
     assert second.command(0, DT) == RELEASED
+
+
+def test_an_offer_is_declined_withdrawn_or_ends_with_who_was_to_get_it(table: SeatTable) -> None:
+    """In each case the seat stays where it is."""
+    held = table.claim('c1', 'hv0', NAMES)
+    for end in (lambda: table.decline('c2', 'hv0'), lambda: table.offer('c1', 'hv0', 'c1'),
+                lambda: table.left('c2')):
+        table.offer('c1', 'hv0', 'c2')
+        end()
+        assert held.offered_to is None and table.held['hv0'] is held
+        with pytest.raises(InputError, match='not offered to you any more'):
+            table.accept('c2', 'hv0')
+
+
+def _driven(person: str = 'p1', here: bool = True) -> tuple[dict, dict[str, SeatTenant]]:
+    return _seats('cockpit'), {'hv0': SeatTenant(SeatPerson(person, 'Ada'), here)}
+
+
+def test_a_seat_is_kept_for_who_has_gone(table: SeatTable) -> None:
+    """For a minute nobody but its driver and a director gets it, then everybody."""
+    seats, tenants = _driven(here=False)
+    table.update(seats, (), tenants)
+    table.note_absent({}, 100.0)
+    assert table.document(NAMES, {}, 110.5)['seats']['hv0']['kept'] == {
+        'name': 'Ada', 'for_s': 50}
+    with pytest.raises(InputError, match='the seat is kept for Ada; it is free in 50 s'):
+        table.claim('c2', 'hv0', NAMES, person='p2', may_displace=False, now_s=110.0)
+    assert table.seat_kept_for('p1') == 'hv0' and table.seat_kept_for('p2') is None
+    for person, may, now_s in (('p1', False, 110.0), ('p2', True, 110.0),
+                               ('p2', False, 100.0 + KEEP_S)):
+        assert table.claim('c2', 'hv0', NAMES, person=person, may_displace=may,
+                           now_s=now_s).person == person
+        del table.held['hv0']
+
+
+def test_two_cockpits_agree(table: SeatTable) -> None:
+    """Who drives at the other one has the seat here too, until they fall silent."""
+    seats, tenants = _driven()
+    table.update(seats, (), tenants)
+    table.note_absent({'hv0': False}, 100.0)
+    entry = table.document(NAMES, {})['seats']['hv0']
+    assert (entry['holder'], entry['holder_name']) == ('p1', 'Ada')
+    with pytest.raises(InputError, match='Ada drives in another cockpit'):
+        table.claim('c2', 'hv0', NAMES, person='p2')
+    with pytest.raises(InputError, match='Ada drives in another cockpit'):
+        table.release('c2', 'hv0')
+    # That cockpit was killed: nobody said that they have gone.
+    table.note_absent({'hv0': True}, 100.0)
+    assert table.document(NAMES, {})['seats']['hv0']['holder'] is None
+    assert table.claim('c2', 'hv0', NAMES, person='p2').holder == 'c2'
+    # And who is quicker at the other one takes it away.
+    assert [item.id for item in table.update(seats, (), tenants)] == ['hv0']
+
+
+def test_an_order_in_vain_is_not_repeated() -> None:
+    """The simulation gave the seat to somebody at another cockpit."""
+    orders = SeatOrders()
+    demand = SeatDemand('hv0', 'cockpit', SeatPerson('p2'))
+    orders.note(demand, _seats('game'), {}, 0.0)
+    seats, tenants = _driven()
+    orders.answered(seats, tenants)
+    assert 'hv0' not in orders
+    displacing = SeatDemand('hv0', 'cockpit', SeatPerson('p2'), 'p1')
+    orders.note(displacing, seats, tenants, 0.0)
+    orders.answered(seats, tenants)
+    assert 'hv0' in orders
+    orders.answered(*_driven('p2'))
+    assert 'hv0' not in orders
 
 
 def test_release_gives_back(table: SeatTable) -> None:
@@ -90,7 +165,7 @@ def test_a_client_that_is_gone_leaves_nothing(table: SeatTable) -> None:
 def test_unknown_seat_lists_what_there_is(table: SeatTable) -> None:
     """As everywhere: what was wrong and what would be right."""
     for act in (lambda: table.claim('c1', 'hv7', NAMES), lambda: table.release('c1', 'hv7'),
-                lambda: table.ask('c1', 'hv7'), lambda: table.hand_over('c1', 'hv7', 'c2')):
+                lambda: table.ask('c1', 'hv7'), lambda: table.offer('c1', 'hv7', 'c2')):
         with pytest.raises(InputError, match='hv7: there is no such seat; it has hv0, av0'):
             act()
 
@@ -166,10 +241,10 @@ def test_what_was_said_before_an_order_arrived_takes_nothing_away(table: SeatTab
     """While the answer is awaited the seat stays held; with it, /seats has the last word."""
     orders = SeatOrders()
     table.claim('c1', 'hv0', NAMES)
-    orders.note('hv0', 'cockpit', table.seats, 0.0)
+    orders.note(SeatDemand('hv0', 'cockpit'), table.seats, {}, 0.0)
     for source, awaited, held in (('game', True, True), ('cockpit', False, True),
                                   ('game', False, False)):
-        orders.answered(_seats(source))
+        orders.answered(_seats(source), {})
         table.update(_seats(source), orders)
         assert ('hv0' in orders, 'hv0' in table.held) == (awaited, held)
 
@@ -177,13 +252,14 @@ def test_what_was_said_before_an_order_arrived_takes_nothing_away(table: SeatTab
 def test_orders_are_repeated_and_given_up(table: SeatTable) -> None:
     """Every half second for ten: a reset that loads a big map hears nothing for seconds."""
     orders = SeatOrders()
-    orders.note('hv0', 'cockpit', table.seats, 100.0)
+    taken, given = SeatDemand('hv0', 'cockpit'), SeatDemand('hv0', 'game')
+    orders.note(taken, table.seats, {}, 100.0)
     assert orders.due(100.0 + 0.9 * AGAIN_S) == []
-    assert orders.due(100.0 + AGAIN_S) == [('hv0', 'cockpit')]
+    assert orders.due(100.0 + AGAIN_S) == [taken]
     assert orders.due(100.0 + 1.9 * AGAIN_S) == []
     # The later order is the one that counts.
-    orders.note('hv0', 'game', table.seats, 101.0)
-    assert orders.due(101.0 + AGAIN_S) == [('hv0', 'game')]
+    orders.note(given, table.seats, {}, 101.0)
+    assert orders.due(101.0 + AGAIN_S) == [given]
     assert orders.due(101.0 + GIVE_UP_S) == [] and 'hv0' not in orders
 
 
@@ -193,11 +269,12 @@ def test_orders_are_repeated_and_given_up(table: SeatTable) -> None:
 def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: str) -> None:
     """For the simulation says nothing when nothing changes."""
     orders = SeatOrders()
-    orders.note('hv0', ordered, _seats(source, driver), 0.0)
+    demand = SeatDemand('hv0', ordered)
+    orders.note(demand, _seats(source, driver), {}, 0.0)
     assert 'hv0' not in orders
-    orders.note('hv0', ordered, {}, 0.0)
+    orders.note(demand, {}, {}, 0.0)
     assert 'hv0' in orders
-    orders.answered(_seats(source, driver))
+    orders.answered(_seats(source, driver), {})
     assert 'hv0' not in orders
 
 

@@ -215,18 +215,34 @@ async def test_names_layers_and_sound_are_kept() -> None:
 
 
 @in_loop
-async def test_no_more_than_32_pages_are_let_in() -> None:
+async def test_an_address_gets_no_more_than_its_share_and_silent_pages_give_way() -> None:
     async with cockpit(backend=PumpBackend(period_s=0.1)) as running:
-        sockets = [await running.join() for _ in range(hub.MAX_CLIENTS)]
+        sockets = [await running.join() for _ in range(hub.MAX_OF_ADDRESS)]
         late = await running.join()
         assert await close_code(late) == 1013
-        assert len(running.backend.present) == hub.MAX_CLIENTS
-        await sockets[0].close()
-        await wait_until(lambda: not running.hub.is_full, 'a free place')
+        clients = list(running.hub.clients.values())
+        assert len(running.backend.present) == len(clients) == hub.MAX_OF_ADDRESS
+        # They have said nothing for a while, but for one; the longest silent one drives.
+        for age_s, client in enumerate(reversed(clients)):
+            client.heard_s -= 2.0 * hub.GIVES_WAY_S + age_s
+        clients[0].drives = True
+        await sockets[2].send_json({'type': 'ping', 't': 1})
+        await next_text(sockets[2], 'pong')
         again = await running.join()
         await next_text(again, 'hello')
-        for socket in [*sockets[1:], again]:
+        await wait_until(lambda: running.backend.gone == ['c2'], 'the longest silent one to go')
+        for socket in [*sockets, again]:
             await socket.close()
+
+
+@in_loop
+async def test_who_says_nothing_is_no_page() -> None:
+    async with cockpit(backend=PumpBackend(period_s=0.1)) as running:
+        socket = await running.join()
+        await next_text(socket, 'hello')
+        running.hub.clients['c1'].heard_s -= hub.SILENT_S
+        await wait_until(lambda: running.backend.gone == ['c1'], 'it to go')
+        await socket.close()
 
 
 @in_loop

@@ -4,6 +4,7 @@
 
 import type { Connection } from '../../crgame_ros/cockpit/page/js/connection.js';
 import type { Driving } from '../../crgame_ros/cockpit/page/js/driving/driving.js';
+import type { createPerson } from '../../crgame_ros/cockpit/page/js/person.js';
 import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
 import type { createPerception } from
   '../../crgame_ros/cockpit/page/js/perception/perception.js';
@@ -18,6 +19,7 @@ interface Crgame {
   connection: Connection;
   world: World;
   driving?: Driving;
+  person?: ReturnType<typeof createPerson>;
   perception?: ReturnType<typeof createPerception>;
   sound?: Sound;
   view3d?: View3d;

@@ -23,7 +23,8 @@ from crgame_ros.game.game_file import load_game
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.ros_messages import to_joy
-from crgame_ros.ros.seats import COMMAND_DEPTH, GAME, MAX_ORDERS, Seat, Seats
+from crgame_ros.ros.seat import COMMAND_DEPTH, GAME, Seat
+from crgame_ros.ros.seats import MAX_ORDERS, Seats
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from live_peer import Peer
@@ -244,3 +245,46 @@ def test_a_recording_drives_by_the_step(table: Table) -> None:
     assert [command.throttle > 0.0 for command in after] == [True] * 45 + [False] * 56
     assert after[-1] == DriverCommand(0.0, 0.15)
     assert seats.interval_s(100) is None and not seat.losses
+
+
+def _demand(table: Table, **fields: object) -> tuple[bool, list[str]]:
+    """Send an order about hv0 and give what came of it: whether anything changed, refusals."""
+    table.orders.publish(String(data=json.dumps({'seat': 'hv0', **fields})))
+    told: list[tuple[bool, list[str]]] = []
+
+    def obeyed() -> bool:
+        told.append(table.seats.take_orders(0))
+        return told[-1] != (False, [])
+    wait_until(obeyed, 'the order')
+    return told[-1]
+
+
+def test_of_two_cockpits_the_first_gets_the_seat(table: Table) -> None:
+    """Who names the person that they displace gets it; who thinks it free comes too late."""
+    ada, bob = {'id': 'p1', 'name': 'Ada'}, {'id': 'p2', 'name': 'Bob'}
+    assert _demand(table, source='cockpit', person=ada) == (True, [])
+    assert _demand(table, source='cockpit', person=bob)[1] == [
+        '/seats/order: Ada has hv0; ask for it']
+    assert _demand(table, source='cockpit')[1] == ['/seats/order: Ada has hv0; ask for it']
+    assert _demand(table, person=ada, ready=True) == (True, []) and table.human.ready
+    assert _demand(table, left='p1') == (True, []) and not table.human.ready
+    entry = json.loads(table.seats.document())['hv0']
+    assert (entry['source'], entry['here']) == ('cockpit', False)
+    assert entry['person']['name'] == 'Ada'
+    assert _demand(table, source='cockpit', person=bob, displaced='p1') == (True, [])
+    assert [item[:2] + (item[3],) for item in table.seats.driven()] == [
+        ('hv0', 'cockpit', table.human.tenant.person)]  # type: ignore[union-attr]
+    # What is said of somebody else, by whomever, changes nothing.
+    table.orders.publish(String(data=json.dumps({'seat': 'hv0', 'left': 'p1'})))
+    assert _demand(table, source='game') == (True, [])
+    assert 'person' not in json.loads(table.seats.document())['hv0']
+
+
+@pytest.mark.parametrize('person', [
+    {'name': 'x'}, {'id': ''}, {'id': 7}, {'id': 'p1', 'name': 'x' * 81},
+    {'id': 'p1', 'device': 'a\nb'}, {'id': 'p1', 'role': None}, [], 'p1'])
+def test_people_that_cannot_be_shown_are_refused(table: Table, person: object) -> None:
+    """Any peer may order: what it says goes into pages and recordings."""
+    changed, refusals = _demand(table, source='cockpit', person=person)
+    assert not changed and len(refusals) == 1 and refusals[0].startswith('/seats/order: ')
+    assert table.human.source == GAME

@@ -33,6 +33,10 @@ def run_section(run: ReportRun) -> Section:
     html = table('The run', (), [(label, value) for label, value in _facts(run)], 'facts')
     html += table('Who was driven', ('vehicle', 'driven by', 'type', 'length × width [m]',
                                      'planning problem', 'sees'), _vehicles(run), 'vehicles')
+    people = list(_people(run))
+    if people:
+        html += table('Who drove', ('vehicle', 'who', 'took part as', 'device', 'browser',
+                                    'steps', 'input delay [ms]'), people, 'people')
     if run.notices:
         items = ''.join(f'<li>{free(text)}</li>' for text in run.notices)
         html += f'<div class="notices"><p>Of the recording:</p><ul>{items}</ul></div>'
@@ -120,6 +124,19 @@ def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
             yield (named(run, item.id), f'planner {free(av.planner)}{options}', free(item.type),
                    size, str(av.planning_problem),
                    'everything' if av.perception is None else 'what its sensors do')
+
+
+def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
+    """Say who was in the seats of cockpits; games whose people sat elsewhere have none."""
+    last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
+    for spell, delay_ms in run.record.drivers:
+        person = spell.person
+        if person is not None:
+            until_n = last_n if spell.until_n is None else spell.until_n
+            yield (named(run, spell.seat), free(person.name or NOTHING),
+                   free(person.role or NOTHING), free(person.device or NOTHING),
+                   free(person.browser or NOTHING), f'{spell.from_n} to {until_n}',
+                   NOTHING if delay_ms is None else number(delay_ms, 0))
 
 
 def named(run: ReportRun, vehicle: str) -> str:

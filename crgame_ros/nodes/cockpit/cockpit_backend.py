@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The cockpit of a live run: what pages ask for becomes messages to the graph."""
+"""The live run behind the page: everything the page shows and orders, in one asyncio task."""
 
 import asyncio
 from collections.abc import Mapping
@@ -22,21 +22,16 @@ from typing import Any, Literal
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
-from crgame_ros.cockpit.seat_orders import SeatOrders
-from crgame_ros.cockpit.seat_table import HeldSeat, SeatTable
-from crgame_ros.driver.source import COCKPIT
-from crgame_ros.errors import InputError
-from crgame_ros.game.documents import parse_seats_document
+from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.nodes.cockpit.cockpit_feed import CockpitFeed
 from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.nodes.cockpit.people_feed import PeopleFeed
+from crgame_ros.nodes.cockpit.seat_desk import SeatDesk
 from crgame_ros.nodes.cockpit.sound_report import SoundReport
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.ros_messages import to_joy
-from crgame_ros.ros.seats import GAME
 from crgame_ros.ros.spinning import attempt
-from crgame_ros.vehicle.driver_command import DriverCommand
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 
 # Half a cycle at 100 Hz: a state is passed on, and answered with a command, well within it [s].
 PERIOD_S = 0.004
@@ -47,6 +42,10 @@ IDLE_PERIOD_S = 0.05
 SERVE_PERIOD_S = 0.1
 # Of one line about messages that cannot be read: peers repeat them [s].
 COMPLAIN_S = 1.0
+# In which a game that somebody uploaded has to begin, for them to get its seat [s].
+BEGINS_WITHIN_S = 60.0
+_DEEDS = {'start': 'started the run', 'pause': 'paused the run', 'step': 'stepped through the run',
+          'reset': 'reset the run', 'stop': 'stopped the run'}
 
 
 class LiveBackend:
@@ -66,24 +65,23 @@ class LiveBackend:
         self._orders = CockpitOrders(node, self._endpoints)
         self._sound_report = SoundReport(self._endpoints.diagnostics)
         self._seat_slot = self._endpoints.polled('/seats')
-        self._commands: dict[str, Publisher] = {}
-        self._table = SeatTable()
-        self._awaited = SeatOrders()
-        self._driven_n = 0
         self._served_s = 0.0
         self._lost: dict[str, bool] = {}
         self._pump: asyncio.Task[None] | None = None
+        # Who gets the seat of a game to come, after which epoch, and until when.
+        self._expected: tuple[Client, int, float] | None = None
 
     async def start(self, hub: Hub) -> None:
         """Begin to pass the run on."""
         self._hub = hub
         self._feed = CockpitFeed(self._endpoints, hub, self._runs)
+        self._desk = SeatDesk(self._node, self._endpoints, self._orders, hub, self._feed)
+        self._people = PeopleFeed(self._endpoints, hub, self._desk.table)
         self._pump = asyncio.create_task(self._run())
 
     async def stop(self) -> None:
         """Let go of every seat and end."""
-        for seat in list(self._table.held.values()):
-            self._let_go(seat)
+        self._desk.close()
         if self._pump is not None:
             self._pump.cancel()
             await asyncio.gather(self._pump, return_exceptions=True)
@@ -93,14 +91,14 @@ class LiveBackend:
         """Pass the run on until stopped; no part ends it or keeps the others from their work."""
         while True:
             attempt(self._node, self._pass_on)
-            attempt(self._node, self._drive)
+            attempt(self._node, self._desk.drive)
             if time.monotonic() - self._served_s >= SERVE_PERIOD_S:
                 self._served_s = time.monotonic()
                 attempt(self._node, self._serve)
             await asyncio.sleep(self._period_s())
 
     def _period_s(self) -> float:
-        if self._table.held:
+        if self._desk.table.held:
             return PERIOD_S
         return WATCH_PERIOD_S if self._hub.clients else IDLE_PERIOD_S
 
@@ -109,80 +107,46 @@ class LiveBackend:
             self._node.get_logger().error(problem[:500], throttle_duration_sec=COMPLAIN_S)
         message = self._seat_slot.latest()
         if message is not None:
-            self._take_seats(message.data)
+            try:
+                self._desk.take_seats(message.data)
+            except InputError as error:
+                self._node.get_logger().warning(str(error), throttle_duration_sec=COMPLAIN_S)
         if self._lost != self._feed.status.seats_lost:
             self._lost = dict(self._feed.status.seats_lost)
-            self._show_seats()
+            self._desk.show()
 
     def _serve(self) -> None:
         self._orders.serve()
-        for seat, source in self._awaited.due(time.monotonic()):
-            self._orders.order_seat(seat, source)
-        self._table.update(self._table.seats, self._awaited)
+        self._seat_who_chose()
         # People come and change their names.
-        self._show_seats()
+        self._desk.serve()
+        self._people.tell(time.monotonic())
         if self._feed.scenario is not None:
             self._sound_report.tell(
-                self._table.held.values(), self._hub.clients,
+                self._desk.table.held.values(), self._hub.clients,
                 self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 
-    def _drive(self) -> None:
-        """Send the command of each held seat for a new cycle; let go of silent ones."""
-        now_s = time.monotonic()
-        new_cycle, self._driven_n = self._feed.n != self._driven_n, self._feed.n
-        for seat in self._table.held.values():
-            if seat.is_silent(now_s):
-                self._let_go(seat)
-            elif new_cycle and not seat.away:
-                self._publish(seat)
-
-    def _let_go(self, seat: HeldSeat) -> None:
-        """Say once that the hands are off; then silence, on which the seat's watchdog brakes."""
-        seat.let_go()
-        self._publish(seat)
-
-    def _publish(self, seat: HeldSeat) -> None:
+    def _seat_who_chose(self) -> None:
+        """Put whoever uploaded the game that has begun into its seat."""
         scenario = self._feed.scenario
-        if scenario is None or self._table.seats.get(seat.id, {}).get('source') != COCKPIT:
+        if self._expected is None or scenario is None:
             return
-        scheduler = scenario.game.scheduler
-        command: DriverCommand = seat.command(self._feed.n, scheduler.dt_s)
-        self._commands[seat.id].publish(
-            to_joy(command, scheduler.stamp_ns(self._feed.n), COCKPIT))
-
-    def _take_seats(self, text: str) -> None:
-        try:
-            seats = parse_seats_document(text)
-        except InputError as error:
-            self._node.get_logger().warning(str(error), throttle_duration_sec=COMPLAIN_S)
-            return
-        self._awaited.answered(seats)
-        self._table.update(seats, self._awaited)
-        # Ahead of the first claim: a new publisher takes a while to be discovered.
-        for name in seats.keys() - self._commands.keys():
-            self._commands[name] = self._endpoints.publisher('/<v>/driver_command', name)
-        for name in self._commands.keys() - seats.keys():
-            self._node.destroy_publisher(self._commands.pop(name))
-        self._show_seats()
-
-    def _show_seats(self) -> None:
-        names = {client.id: client.name for client in self._hub.clients.values()}
-        self._hub.set_document(
-            'seats', self._table.document(names, self._feed.status.seats_lost))
-        for client in self._hub.clients.values():
-            client.drives = self._table.seat_of(client.id) is not None
-            self._feed.pace(client)
+        client, epoch, until_s = self._expected
+        if scenario.game.epoch > epoch:
+            self._expected = None
+            if client.id in self._hub.clients:
+                self._desk.claim_for(client)
+        elif time.monotonic() > until_s:
+            self._expected = None
 
     def joined(self, client: Client) -> None:
-        """Set the pace of a new page."""
+        """Set the pace of a new page, and give who has come back their seat."""
         self._feed.pace(client)
+        self._desk.joined(client)
 
     def left(self, client: Client) -> None:
         """Take the hands of a page that is gone off the controls, at once."""
-        seat = self._table.left(client.id)
-        if seat is not None:
-            self._let_go(seat)
-        self._show_seats()
+        self._desk.left(client)
 
     async def command(self, client: Client, message: Mapping[str, Any]) -> str:
         """
@@ -192,33 +156,46 @@ class LiveBackend:
         """
         kind = message['type']
         if kind == 'input':
-            return self._input(client, message)
+            return self._desk.input(client, message)
         if kind == 'control':
-            return await self._orders.control(message['action'])
+            return await self._control(client, message['action'], bool(message.get('all')))
         if kind == 'rate':
             await self._orders.set_parameter('real_time_factor', float(message['factor']))
+            self._announce(client, f'set the speed of time to × {message["factor"]:g}')
             return f'real-time factor {message["factor"]:g}'
         if kind == 'planner':
             self._known_av(message['av'])
-            return await self._orders.run_planner(message['av'], message['run'])
+            text = await self._orders.run_planner(message['av'], message['run'])
+            self._announce(client, f'let the planner of {message["av"]} go on' if message['run']
+                           else f'stopped the planner of {message["av"]}')
+            return text
         if kind == 'trigger':
-            return self._trigger(message['event'])
-        return self._seat_order(kind, client, message)
+            return self._trigger(client, message['event'])
+        return self._desk.order(client, message)
 
-    def _input(self, client: Client, message: Mapping[str, Any]) -> str:
-        seat = self._table.held.get(message['seat'])
-        if seat is None or seat.holder != client.id:
-            raise InputError('you do not have the seat', message['seat'], 'claim it first')
-        seat.take(message, time.monotonic())
-        self._publish(seat)
-        return ''
+    async def _control(self, client: Client, action: str, for_all: bool) -> str:
+        """Steer the run; the start of who sits among several in its seats is their readiness."""
+        seat = self._desk.gate_seat(client)
+        if action == 'start' and seat is not None and not (for_all and client.rights.directs) \
+                and (len(self._desk.cockpit_seats) > 1 or not client.rights.directs):
+            return self._desk.order(client, {'type': 'ready', 'seat': seat, 'ready': True})
+        if not client.rights.directs:
+            raise CrgameError('only a director can start this run; a driver in its seat says '
+                              'that they are ready')
+        return await self._steer(client, action)
 
-    def _trigger(self, event: str) -> str:
+    async def _steer(self, client: Client, action: str) -> str:
+        text = await self._orders.control(action)
+        self._announce(client, _DEEDS[action])
+        return text
+
+    def _trigger(self, client: Client, event: str) -> str:
         scenario = self._feed.scenario
         events = () if scenario is None else scenario.game.events
         if event not in {item.name for item in events}:
             raise InputError('is no event of this game', event[:40])
         self._orders.trigger(event)
+        self._announce(client, f'triggered {event}')
         return f'{event}: triggered'
 
     def _known_av(self, av: str) -> None:
@@ -226,58 +203,28 @@ class LiveBackend:
         if scenario is None or scenario.game.av(av) is None:
             raise InputError('takes no part in this game', av)
 
-    def _seat_order(self, kind: str, client: Client, message: Mapping[str, Any]) -> str:
-        seat, names = message['seat'], {
-            other.id: other.name for other in self._hub.clients.values()}
-        if kind == 'claim':
-            before = self._table.seat_of(client.id)
-            self._table.claim(client.id, seat, names)
-            if before is not None and before.id != seat:
-                self._release(client, before.id)
-            self._order(seat, COCKPIT)
-            text = f'you drive {seat}'
-        elif kind == 'release':
-            self._release(client, seat)
-            text = f'{seat} is given back'
-        elif kind == 'hand_over':
-            text = self._hand_over(client, seat, message['to'], names)
-        elif kind == 'ask':
-            self._table.ask(client.id, seat)
-            text = f'{names.get(self._table.held[seat].holder, "")} was asked for {seat}'
-        else:
-            raise InputError('cannot be done in a live run', str(kind))
-        self._show_seats()
-        return text
+    def _announce(self, actor: Client | None, deed: str) -> None:
+        """Tell the others, and the recording, who has done what."""
+        name = 'somebody without a page' if actor is None else actor.name
+        self._endpoints.diagnostics.publish(
+            'cockpit_node: order', DiagnosticStatus.OK, f'{name} {deed}',
+            {'person': '' if actor is None else actor.person})
+        for client in tuple(self._hub.clients.values()):
+            if client is not actor:
+                self._hub.send_event('notice', {'level': 'info', 'text': f'{name} {deed}'},
+                                     only=client)
 
-    def _hand_over(self, client: Client, seat: str, to: str, names: Mapping[str, str]) -> str:
-        if to not in names:
-            raise InputError('is not here any more', to)
-        held = self._table.held.get(seat)
-        taken = self._table.seat_of(to)
-        self._table.hand_over(client.id, seat, to)
-        if held is not None:
-            self._let_go(held)
-        if taken is not None and taken.id != seat:
-            self._let_go(taken)
-            self._table.held.pop(taken.id, None)
-            self._order(taken.id, GAME)
-        return f'{names[to]} drives {seat}'
-
-    def _release(self, client: Client, seat: str) -> None:
-        held = self._table.release(client.id, seat)
-        if held is not None:
-            self._let_go(held)
-        self._order(seat, GAME)
-
-    def _order(self, seat: str, source: str) -> None:
-        self._orders.order_seat(seat, source)
-        self._awaited.note(seat, source, self._table.seats, time.monotonic())
-
-    async def load_game(self, path: Path) -> str:
+    async def load_game(self, path: Path, client: Client | None = None, *,
+                        takes_seat: bool = False) -> str:
         """
         Begin a game: it is taken at a reset.
 
         :raises CrgameError: if the simulation refuses it.
         """
         await self._orders.set_parameter('game', str(path))
-        return await self._orders.control('reset')
+        if client is not None and takes_seat:
+            epoch = -1 if self._feed.scenario is None else self._feed.scenario.game.epoch
+            self._expected = (client, epoch, time.monotonic() + BEGINS_WITHIN_S)
+        text = await self._orders.control('reset')
+        self._announce(client, 'chose what is run')
+        return text

@@ -118,7 +118,7 @@ class CockpitFeed:
             for work in (self._poll_documents, self._poll_plans, self._poll_perception,
                          self._poll_texts, self._poll_criticality, self._poll_diagnostics):
                 _read(work, problems)
-        for work in (self._poll_commands, self._poll_states, self._poll_objects):
+        for work in (self._poll_commands, self.poll_states, self._poll_objects):
             _read(work, problems)
         # The page holds its picture still in a pause: it must not learn of it late.
         if now_s - self._status_s >= STATUS_PERIOD_S or self.status.run != self._told_run:
@@ -178,7 +178,8 @@ class CockpitFeed:
         if table.epoch == self.scenario.game.epoch:
             self._commands = table.commands_of(self._vehicle_ids)[-1]
 
-    def _poll_states(self) -> None:
+    def poll_states(self) -> None:
+        """Pass on the newest states, if there are any."""
         message: JointTrajectory | None = self._states.latest()
         frames = self._frames
         if message is None or frames is None or (place := frames.place_of(message)) is None:
@@ -277,4 +278,4 @@ def _read(work: Callable[[], None], problems: list[str]) -> None:
     try:
         work()
     except UNREADABLE as error:
-        problems.append(f'{work.__name__[len("_poll_"):]}: {error}')
+        problems.append(f'{work.__name__.strip("_").removeprefix("poll_")}: {error}')

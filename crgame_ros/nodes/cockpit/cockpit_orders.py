@@ -15,10 +15,10 @@
 """Orders of the page to the graph: services, parameters, triggers and seats."""
 
 import asyncio
-import json
 from typing import Any
 
 from crgame_ros.errors import CrgameError
+from crgame_ros.game.seat_documents import demand_text, SeatDemand
 from crgame_ros.ros.endpoints import Endpoints
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
@@ -65,9 +65,9 @@ class CockpitOrders:
         """Fire an event of the game."""
         self._triggers.publish(String(data=event))
 
-    def order_seat(self, seat: str, source: str) -> None:
-        """Order who drives a vehicle."""
-        self._seat_orders.publish(String(data=json.dumps({'seat': seat, 'source': source})))
+    def order_seat(self, demand: SeatDemand) -> None:
+        """Order who drives a vehicle, or tell of who does."""
+        self._seat_orders.publish(String(data=demand_text(demand)))
 
     async def control(self, action: str) -> str:
         """

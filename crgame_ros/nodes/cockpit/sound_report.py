@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping
 import time
 
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.seat_table import HeldSeat
+from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.ros.diagnostics import Diagnostics
 from diagnostic_msgs.msg import DiagnosticStatus
 

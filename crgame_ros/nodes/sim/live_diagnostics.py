@@ -20,7 +20,7 @@ from functools import partial
 
 from crgame_ros.nodes.sim.sim_inputs import SimInputs
 from crgame_ros.nodes.sim.sim_outputs import SimOutputs
-from crgame_ros.ros.seats import Seat
+from crgame_ros.ros.seat import Seat
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation
 from diagnostic_msgs.msg import DiagnosticStatus

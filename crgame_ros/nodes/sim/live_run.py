@@ -23,6 +23,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
 from crgame_ros.nodes.sim.outcome import Outcome
 from crgame_ros.nodes.sim.pacer import NS_PER_S, Pacer
+from crgame_ros.nodes.sim.ready_gate import ReadyGate
 from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
 from crgame_ros.nodes.sim.run_state import RunState
 from crgame_ros.nodes.sim.sim_control import SimControl
@@ -33,6 +34,7 @@ from crgame_ros.nodes.sim.step_watch import StepWatch
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics
 from crgame_ros.ros.node_main import StopFlag
+from crgame_ros.ros.seat_spells import SeatSpells
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.late_step import Phase
@@ -69,7 +71,7 @@ class LiveRun:
         self._epoch = epoch
         self._outputs = SimOutputs(node, setup)
         self._inputs = SimInputs(
-            node, setup, clock_offset_ns, control.seat_sources, recorded)
+            node, setup, clock_offset_ns, control.seat_sources, recorded, control.seat_tenants)
         scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
         feed = None if setup.traffic is None else RemoteTraffic(
             self._inputs.take_agents, setup.traffic, scheduler)
@@ -90,13 +92,15 @@ class LiveRun:
         self._setup = setup
         self._stop = StopFlag()
         self._reason = ''
+        self._spells = SeatSpells(epoch)
 
     def run(self, stop: StopFlag) -> Outcome:
         """Run until the game's end, a reset or a stop."""
         self._stop = stop
         self._outputs.publish_documents(
             self._epoch, self.simulation.scheduler.clock_offset_ns,
-            self._control.real_time_factor, self._inputs.seats.document())
+            self._control.real_time_factor)
+        self._publish_seats()
         result = self.simulation.begin()
         if self._epoch:
             self._settle()
@@ -169,12 +173,11 @@ class LiveRun:
                 heard.close()
 
     def _wait_at(self, gate: StartGate) -> Outcome | None:
-        control = self._control
+        control, people = self._control, ReadyGate(self._inputs.seats, self._control)
         while True:
             now_ns = time.monotonic_ns()
             is_open = gate.is_open(now_ns, control.planner_timeout_s)
-            control.awaited = self._inputs.seats.awaited(now_ns)
-            if is_open and not control.stands_still and not control.awaited:
+            if people.opens(now_ns, is_open):
                 return None
             self._state.tell('paused' if is_open and control.stands_still else 'waiting')
             self._executor.spin_once(timeout_sec=0.005)
@@ -238,13 +241,17 @@ class LiveRun:
         """Obey who is to drive what, and which planners are to go or stop."""
         changed, refusals = self._inputs.seats.take_orders(now_ns)
         if changed:
-            self._outputs.publish_seats(self._inputs.seats.document())
+            self._publish_seats()
         for refusal in refusals:
             self._node.get_logger().warning(refusal, throttle_duration_sec=1.0)
             self._diagnostics.order_refused(refusal)
         for av_id, running in self._inputs.planner_orders.items():
             self.simulation.set_planner_running(av_id, running)
         self._inputs.planner_orders.clear()
+
+    def _publish_seats(self) -> None:
+        self._spells.note(self.simulation.n, self._inputs.seats.driven())
+        self._outputs.publish_seats(self._inputs.seats.document(), self._spells.document())
 
     def _take_triggers(self) -> None:
         """Hand the events over that somebody triggered since the last tick."""
@@ -300,7 +307,7 @@ class LiveRun:
         causes, late_in = watch.explain(self._pacer.due_ns, cycle.step_error_s, factor)
         commands = inputs.seats.commands(start_ns, cycle.dt_eff_s, simulation)
         if inputs.seats.repetition_changed():
-            outputs.publish_seats(inputs.seats.document())
+            self._publish_seats()
         if simulation.scheduler.is_tick(simulation.n + 1):
             self._take_triggers()
         watch.mark(Phase.STEP)

@@ -54,13 +54,15 @@ class RunState:
 
         :param reason: why it has ended.
         """
-        now_ns, news = time.monotonic_ns(), (state, reason, self._control.awaited)
+        now_ns, news = time.monotonic_ns(), (
+            state, reason, self._control.awaited, self._control.countdown_s)
         if news != self._told or now_ns - self._told_ns > NS_PER_S:
             self._told, self._told_ns = news, now_ns
             self._diagnostics.run_state(state, {
                 'real_time_factor': self._control.real_time_factor, 'reason': reason,
                 'stays': self._control.stays and reason != SIGNAL,
-                'awaited': ','.join(self._control.awaited)})
+                'awaited': ','.join(self._control.awaited),
+                'countdown_s': self._control.countdown_s})
 
     def stand(self) -> None:
         """Begin to stand still: those who listen now have seen this world."""

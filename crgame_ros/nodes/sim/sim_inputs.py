@@ -20,6 +20,7 @@ from functools import partial
 from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.seat_documents import SeatTenant
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.messages.request_head import request_head
@@ -48,15 +49,18 @@ class SimInputs:
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param seat_sources: who was ordered to drive what, by seat.
     :param recorded: what drives seats as in a recording; None for nothing.
+    :param tenants: who is in which seat.
     """
 
     def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
                  seat_sources: MutableMapping[str, str],
-                 recorded: 'RecordedInputs | None' = None) -> None:
+                 recorded: 'RecordedInputs | None' = None,
+                 tenants: MutableMapping[str, SeatTenant] | None = None) -> None:
         self._node = node
         self._clock_offset_ns = clock_offset_ns
         endpoints = Endpoints(node)
-        self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources, recorded)
+        self.seats = Seats(
+            endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
         # Orders to a planner to go or stop, until the loop takes them.
         self.planner_orders: dict[str, bool] = {}
         self._services = [

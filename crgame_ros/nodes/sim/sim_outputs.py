@@ -119,7 +119,7 @@ class SimOutputs:
         self._cycle = endpoints.publisher('/timing/cycle')
         self._latched = {name: endpoints.publisher(name) for name in (
             '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
-            '/scenario/signals', '/vehicles/signals', '/seats')}
+            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers')}
         self._diagnostics = endpoints.diagnostics
         # Where perception stands between, it makes the plan request of the true one.
         self._request_topics = {
@@ -152,9 +152,8 @@ class SimOutputs:
             MultiArrayDimension(label='cycles'),
             MultiArrayDimension(label=','.join(self.rows.columns), size=width, stride=width)]
 
-    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float,
-                          seats: str) -> None:
-        """Publish what describes the run: scenario, game, objects and seats."""
+    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float) -> None:
+        """Publish what describes the run: scenario, game and objects."""
         setup = self._setup
         self._epoch = epoch
         self._vehicle_lights = None
@@ -163,14 +162,14 @@ class SimOutputs:
                  '/scenario/events': events_document(epoch, ()),
                  '/scenario/game': game_document(
                      setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
-                     real_time_factor=factor),
-                 '/seats': seats}
+                     real_time_factor=factor)}
         for name, text in texts.items():
             self._latched[name].publish(String(data=text))
 
-    def publish_seats(self, seats: str) -> None:
-        """Publish who drives what."""
+    def publish_seats(self, seats: str, drivers: str) -> None:
+        """Publish who drives what now, and who has driven so far."""
         self._latched['/seats'].publish(String(data=seats))
+        self._latched['/seats/drivers'].publish(String(data=drivers))
 
     def publish_events(self, fired: Sequence[FiredEvent]) -> None:
         """Publish the events that have taken effect so far."""

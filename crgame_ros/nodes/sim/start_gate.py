@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Sequence
 from crgame_ros.nodes.sim.sim_inputs import SimInputs
 from crgame_ros.nodes.sim.sim_outputs import SimOutputs
 from crgame_ros.ros.heard_topics import HeardTopics
-from crgame_ros.ros.seats import GAME
+from crgame_ros.ros.seat import GAME
 from crgame_ros.simulation.engine import Simulation, StepResult
 
 NS_PER_S = 1_000_000_000

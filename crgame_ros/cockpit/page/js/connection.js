@@ -9,6 +9,7 @@ const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 2000;
 const REPLY_WITHIN_MS = 10000;
 const PING_EVERY_MS = 1000;
+const LONGEST_TOLD_MS = 60000;
 
 /** One page's connection to the server. */
 export class Connection {
@@ -33,7 +34,7 @@ export class Connection {
     this.#url = url;
     this.#open();
     this.#pings = setInterval(
-      () => this.send({ type: 'ping', t: performance.now() }), PING_EVERY_MS);
+      () => this.#ping(), PING_EVERY_MS);
   }
 
   /** Whether the server can be reached at this moment. */
@@ -85,6 +86,15 @@ export class Connection {
     clearInterval(this.#pings);
     clearTimeout(this.#retryTimer);
     this.#socket?.close();
+  }
+
+  /** The last way there and back goes with it: the others see who is far away. */
+  #ping() {
+    const { round_trip_ms } = this.#store;
+    const t = performance.now();
+    this.send(Number.isFinite(round_trip_ms)
+      ? { type: 'ping', t, round_trip_ms: Math.min(round_trip_ms, LONGEST_TOLD_MS) }
+      : { type: 'ping', t });
   }
 
   #open() {

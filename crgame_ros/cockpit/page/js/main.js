@@ -10,7 +10,10 @@ import { createWorld } from './world/world.js';
 // by one, so that a part that cannot be loaded is named on the page and the others still work.
 const PARTS = [
   ['./panels/notices.js', 'createNotices', '#notices', 'notices'],
+  ['./person.js', 'createPerson', 'body', 'person'],
   ['./driving/driving.js', 'createDriving', '#hud', 'driving'],
+  ['./lobby.js', 'createLobby', '#stage', 'lobby'],
+  ['./people.js', 'createPeople', '#panel-drive', 'people'],
   ['./run_control.js', 'createRunControl', '#bar', 'runControl'],
   ['./panels/settings.js', 'createSettings', '#bar-end', 'settings'],
   ['./sound/sound.js', 'createSound', '#bar-end', 'sound'],

@@ -130,6 +130,24 @@ export {};
 /** @typedef {{client: string, name: string}} Person */
 
 /**
+ * What this page may do: `directs` and `drives` now, `may_…` if it wants to.
+ *
+ * @typedef {{role: string, directs: boolean, drives: boolean, seat: string, may_direct: boolean,
+ *   may_drive: boolean}} Rights
+ */
+
+/**
+ * @typedef {object} Present somebody at a page
+ * @property {string} client
+ * @property {string} name
+ * @property {string} role
+ * @property {string|null} seat
+ * @property {boolean} away whether the hands are off the controls
+ * @property {number|null} round_trip_ms
+ * @property {number|null} input_delay_ms from the hand to the picture
+ */
+
+/**
  * @typedef {object} Seat
  * @property {string} source whose commands the vehicle obeys
  * @property {string} driver the source that the game names
@@ -137,6 +155,10 @@ export {};
  * @property {string|null} holder_name
  * @property {Person[]} [requests] who asks for it
  * @property {Person[]} [others] who could get it
+ * @property {Person|null} [offer] to whom its holder wants to give it
+ * @property {{name: string, for_s: number}|null} [kept] for whom, who has gone, and how long
+ * @property {boolean} [ready] whether its driver is ready to begin
+ * @property {string} [device] that its driver has named
  * @property {boolean} [lost] whether nothing comes from its driver
  */
 
@@ -203,6 +225,7 @@ export {};
  * @property {string} [reason] why it ended
  * @property {boolean} [stays] whether the program goes on after the run
  * @property {string[]} [awaited] seats without a driver
+ * @property {number} [countdown_s] until the run begins; 0 for none
  * @property {Contact[]} [contacts]
  * @property {{vehicle: string, t: number}[]} [departures]
  * @property {number} real_time_factor
@@ -236,7 +259,9 @@ export {};
  * What the server sends and the store takes in.
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
- *   version: string}} HelloMessage
+ *   version: string, rights: Rights}} HelloMessage
+ * @typedef {{type: 'you', rights: Rights, accepted: boolean}} YouMessage
+ * @typedef {{type: 'people', people: Present[]}} PeopleMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
  * @typedef {{type: 'signals', k: number, states: Record<string, string>}} SignalsMessage
@@ -246,7 +271,7 @@ export {};
  * @typedef {{type: 'files'} & Files} FilesMessage
  * @typedef {{type: 'notice', level: NoticeLevel, text: string}} NoticeMessage
  * @typedef {HelloMessage|SceneMessage|SeatsMessage|SignalsMessage|EventsMessage|AlarmsMessage
- *   |StatusMessage|FilesMessage|NoticeMessage} StoreMessage
+ *   |StatusMessage|FilesMessage|NoticeMessage|YouMessage|PeopleMessage} StoreMessage
  */
 
 /**
@@ -270,9 +295,13 @@ export {};
  *   scans?: boolean}} LayersMessage
  * @typedef {{type: 'sound', on: number, volume: number, rumble: number}} SoundMessage
  * @typedef {InputMessage|LayersMessage|SoundMessage|{type: 'name', name: string}
- *   |{type: 'ping', t: number}} TellingMessage
- * @typedef {{type: 'claim'|'release'|'ask', seat: string}
- *   |{type: 'hand_over', seat: string, to: string}|{type: 'control', action: RunAction}
+ *   |{type: 'person', key: string, fresh: boolean}|{type: 'device', device: string}
+ *   |{type: 'ping', t: number, round_trip_ms?: number}} TellingMessage
+ * @typedef {{type: 'release'|'ask', seat: string}|{type: 'claim', seat: string, device: string}
+ *   |{type: 'hand_over', seat: string, to: string}
+ *   |{type: 'answer', seat: string, accept: boolean}
+ *   |{type: 'ready', seat: string, ready: boolean}|{type: 'role', role: string}
+ *   |{type: 'control', action: RunAction, all?: boolean}
  *   |{type: 'rate', factor: number}|{type: 'planner', av: string, run: boolean}
  *   |{type: 'trigger', event: string}} RequestMessage
  * @typedef {TellingMessage|(RequestMessage & {id: number})} PageMessage

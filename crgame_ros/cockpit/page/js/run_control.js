@@ -5,6 +5,7 @@
 import { element, part, setAttribute, setText } from './dom.js';
 import { isTyping } from './driving/focus.js';
 import { icon } from './driving/icons.js';
+import { reasonAgainst } from './rights.js';
 
 /** @import { Connection } from './connection.js' */
 /** @import { Recording, RequestMessage, RunAction, Status } from './messages.js' */
@@ -76,7 +77,8 @@ class RunControl {
     this.#root.append(...Object.values(this.#buttons),
       element('label', { class: 'run-factor' }, element('span', { text: 'Speed' }), this.#factor));
     window.addEventListener('keydown', (event) => this.#key(event));
-    for (const name of /** @type {const} */ (['hello', 'status', 'connection'])) {
+    for (const name of /** @type {const} */ (['hello', 'you', 'status', 'connection',
+      'seats'])) {
       store.on(name, () => this.#show());
     }
     this.#show();
@@ -87,10 +89,15 @@ class RunControl {
     setAttribute(this.#root, 'hidden', mode === 'replay');
     setAttribute(this.#lamp.node, 'hidden', mode === 'replay' || status === null);
     for (const action of ACTIONS) {
+      const reason = this.#reason(action);
       setAttribute(this.#buttons[action], 'disabled', !connected || !status
-        || !ORDERS[action].in.includes(status.run));
+        || !ORDERS[action].in.includes(status.run) || reason !== '');
+      setAttribute(this.#buttons[action], 'title', reason || ORDERS[action].title);
     }
-    setAttribute(this.#factor, 'disabled', !connected || !status || status.run === 'ended');
+    const slow = reasonAgainst(this.#store, 'direct', 'change the speed of time');
+    setAttribute(this.#factor, 'disabled', !connected || !status || status.run === 'ended'
+      || slow !== '');
+    setAttribute(this.#factor, 'title', slow || 'Simulated seconds per second');
     setAttribute(this.#clock.node, 'hidden', status === null);
     if (status) {
       this.#clock.show(status, connected);
@@ -99,6 +106,20 @@ class RunControl {
         this.#offer(status.real_time_factor ?? 1);
       }
     }
+  }
+
+  /**
+   * Why this person cannot give an order; a driver in the seat says by start that they are ready.
+   *
+   * @param {RunAction} action
+   */
+  #reason(action) {
+    const { seats, me, status } = this.#store;
+    const seated = Object.values(seats).some(({ holder }) => holder === me.id && me.id !== '');
+    if (action === 'start' && seated && status?.n === 0 && this.#store.rights.drives) {
+      return '';
+    }
+    return reasonAgainst(this.#store, 'direct', `${action} the run`);
   }
 
   /**
@@ -143,7 +164,9 @@ class RunControl {
   /** @param {KeyboardEvent} event */
   #key(event) {
     if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)
-        || document.querySelector('dialog[open]') || this.#root.hidden) {
+        || document.querySelector('dialog[open]') || this.#root.hidden
+        // Somebody who drives may press a key by mistake: the experiment is the director's.
+        || reasonAgainst(this.#store, 'direct', 'pause') !== '') {
       return;
     }
     const action = ACTIONS.find((name) => ORDERS[name].key === event.code

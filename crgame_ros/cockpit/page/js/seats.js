@@ -5,6 +5,7 @@
 import { element, setAttribute, setText } from './dom.js';
 import { NameField } from './driving/name_field.js';
 import { describeSeat } from './driving/seat_text.js';
+import { reasonAgainst } from './rights.js';
 
 /** @import { Connection } from './connection.js' */
 /** @import { Driving } from './driving/driving.js' */
@@ -24,6 +25,9 @@ import { describeSeat } from './driving/seat_text.js';
  * @property {Person[]} requests
  * @property {Person[]} others
  * @property {boolean} asked
+ * @property {Person|null} offer
+ * @property {boolean} offered to this person
+ * @property {string} refused why this person cannot take a seat
  * @property {string} text
  * @property {boolean} lost
  */
@@ -65,7 +69,7 @@ class Seats {
       this.#stale = false;
       this.#show();
     });
-    for (const event of /** @type {const} */ (['hello', 'scene', 'status'])) {
+    for (const event of /** @type {const} */ (['hello', 'you', 'scene', 'status'])) {
       store.on(event, () => this.#show());
     }
     store.on('connection', (connected) => connected || this.#disconnected());
@@ -115,10 +119,27 @@ class Seats {
       requests: seat.requests ?? [],
       others: seat.others ?? [],
       asked: (seat.requests ?? []).some(({ client }) => client === me.id),
+      offer: seat.offer ?? null,
+      offered: connected && seat.offer?.client === me.id,
+      refused: this.#refusal(id, seat),
       text: connected ? describeSeat(seat, role, scene?.planners?.[id], me.id)
         : 'Unknown without a connection',
       lost: Boolean(seat.lost || status?.seats_lost?.[id]),
     };
+  }
+
+  /**
+   * Why this person cannot do anything about a seat.
+   *
+   * @param {string} id
+   * @param {Seat} seat
+   */
+  #refusal(id, seat) {
+    const { rights, me } = this.#store;
+    const mine = seat.holder === me.id || seat.offer?.client === me.id;
+    return reasonAgainst(this.#store, 'drive', 'take a seat')
+      || (rights.seat === '' || rights.seat === id || mine ? ''
+        : `Your link is for ${rights.seat}; the driver of ${id} can offer it to you.`);
   }
 
   /**
@@ -156,7 +177,8 @@ class Seats {
   }
 
   /** @param {Facts} facts */
-  #buttons({ id, role, mine, holder, left, requests, others, asked, connected }) {
+  #buttons(facts) {
+    const { id, role, mine, holder, left, requests, others, asked, connected, refused } = facts;
     /**
      * @param {string} action
      * @param {string} text
@@ -166,16 +188,30 @@ class Seats {
      * @returns {HTMLElement}
      */
     const button = (action, text, act, title, enabled = connected) => element('button', {
-      type: 'button', class: `drive-button ${action === 'claim' ? 'primary' : ''}`, text, title,
-      'data-action': action, 'data-key': `${id} ${text}`, disabled: !enabled,
+      type: 'button', text, title: refused || title,
+      class: `drive-button ${['claim', 'accept'].includes(action) ? 'primary' : ''}`,
+      'data-action': action, 'data-key': `${id} ${text}`, disabled: !enabled || refused !== '',
       on: { click: () => this.#report(act()) } });
     const giveBack = button('release', 'Give back', () => this.#giveBack(id), role === 'human'
       ? 'Give the seat back to the driver that the game names'
       : 'Give the vehicle back to its planner');
+    if (facts.offered) {
+      return [
+        button('accept', 'Accept', () => this.#request({ type: 'answer', seat: id, accept: true }),
+          `Drive ${id} from now on; a seat that you have is given back`),
+        button('decline', 'Decline',
+          () => this.#request({ type: 'answer', seat: id, accept: false }),
+          'The driver keeps the seat')];
+    }
+    if (mine && facts.offer !== null) {
+      return [button('withdraw', 'Withdraw the offer',
+        () => this.#request({ type: 'hand_over', seat: id, to: this.#store.me.id }),
+        `${facts.offer.name} has not answered yet`), giveBack];
+    }
     if (mine) {
       return [...requests.map(({ client, name }) => button('hand_over', `Hand over to ${name}`,
         () => this.#request({ type: 'hand_over', seat: id, to: client }),
-        `${name} asks for this seat`)),
+        `${name} asks for this seat, and has to accept it`)),
       others.length > 0 ? this.#handOver(id, others, connected) : null,
       giveBack].filter((item) => item !== null);
     }
@@ -236,7 +272,7 @@ class Seats {
     this.#stale = true;
     this.#before = {};
     setText(this.#news, lost.length > 0
-      ? `The connection broke: you no longer hold ${lost.join()}.` : '');
+      ? `The connection broke: ${lost.join()} is kept for you for a minute.` : '');
     this.#show();
   }
 
@@ -255,6 +291,10 @@ class Seats {
       } else if (had && seat.holder !== me.id) {
         setText(this.#news, seat.holder === null ? `${id} is given back.`
           : `${id} is now driven by ${seat.holder_name}.`);
+      } else if (seat.offer?.client === me.id && before?.offer?.client !== me.id) {
+        setText(this.#news, `${seat.holder_name} offers you ${id}.`);
+      } else if (had && before.offer && !seat.offer) {
+        setText(this.#news, `You keep ${id}.`);
       } else if (had && (seat.requests?.length ?? 0) > (before.requests?.length ?? 0)) {
         setText(this.#news, `${seat.requests?.at(-1)?.name} asks for ${id}.`);
       }

@@ -16,6 +16,7 @@ import { SampleRing } from './samples.js';
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
 /** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
+/** @import { PeopleMessage, Present, Rights, YouMessage } from './messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
 
 // At 100 Hz the ring of raw samples holds 5 s, that of scenario steps at 10 Hz 10 s.
@@ -47,6 +48,8 @@ const LATE_S = 0.1;
  * @property {AlarmsMessage} alarms
  * @property {FilesMessage} files
  * @property {NoticeMessage} notice
+ * @property {YouMessage} you
+ * @property {PeopleMessage} people
  * @property {boolean} connection whether there is one
  * @property {StateFrame} state
  * @property {ObjectsFrame} objects
@@ -73,6 +76,11 @@ export class Store {
   /** @type {Alarm[]} */
   alarms = [];
   me = { id: '', name: '' };
+  /** @type {Present[]} */
+  people = [];
+  /** @type {Rights} */
+  rights = { role: '', directs: false, drives: false, seat: '', may_direct: false,
+    may_drive: false };
   /** @type {HelloMessage['mode']|null} */
   mode = null;
   version = '';
@@ -147,6 +155,7 @@ export class Store {
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
         this.version = message.version;
+        this.rights = message.rights ?? this.rights;
         this.#fresh = true;
         break;
       case 'scene': {
@@ -161,6 +170,8 @@ export class Store {
         }
         break;
       }
+      case 'you': this.rights = message.rights; break;
+      case 'people': this.people = message.people; break;
       case 'seats': this.seats = message.seats; break;
       case 'signals': this.signals = message; break;
       case 'events': this.fired = message.fired; break;

@@ -30,6 +30,7 @@ export class Driving {
   #unplugged = false;
   // What the instruments say while there is no connection.
   #lost = '';
+  #toldDevice = '';
 
   /**
    * @param {HTMLElement} root `#hud`, or an ancestor of it
@@ -49,13 +50,17 @@ export class Driving {
       changed: () => this.#moved(this.gamepads?.active !== null),
       gear: (change) => this.#setReverse(change(this.#reverse)),
       unplugged: () => this.#unplug(),
-      listed: () => this.#devicePanel?.list(),
+      listed: () => {
+        this.#devicePanel?.list();
+        this.#tellDevice();
+      },
     });
     this.calibration = new CalibrationDialog(
       (index, profile) => this.gamepads.setProfile(index, profile));
     this.#devicePanel = new DevicePanel(this.gamepads, (index) => this.calibration.open(index));
     this.hud = new Hud(part(root, 'hud'), store, () => this.#subject());
     store.on('seats', () => this.#takeSeat());
+    store.on('hello', () => this.#tellDevice(true));
     store.on('connection', (connected) => this.#connectionChanged(connected));
     this.#takeSeat();
   }
@@ -98,7 +103,7 @@ export class Driving {
     if (this.seat !== null && this.seat !== seat) {
       await this.release();
     }
-    return this.#connection.request({ type: 'claim', seat });
+    return this.#connection.request({ type: 'claim', seat, device: this.#device });
   }
 
   /**
@@ -112,6 +117,20 @@ export class Driving {
     const reply = await this.#connection.request({ type: 'release', seat: seat ?? '' });
     this.#takeSeat();
     return reply;
+  }
+
+  /** What the hands are on, as the recording names it. */
+  get #device() {
+    const active = this.gamepads?.active;
+    return active ? shortName(active.id).slice(0, 60) : 'Keyboard';
+  }
+
+  /** @param {boolean} [anew] also if the server has heard it before */
+  #tellDevice(anew = false) {
+    if (anew || this.#device !== this.#toldDevice) {
+      this.#toldDevice = this.#device;
+      this.#connection.send({ type: 'device', device: this.#device });
+    }
   }
 
   /** @param {boolean} connected */

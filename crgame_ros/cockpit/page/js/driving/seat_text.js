@@ -17,7 +17,7 @@ const GAME_DRIVERS = {
 /**
  * Describe who drives a seat.
  *
- * @param {Pick<Seat, 'source'|'driver'|'holder'|'holder_name'>} seat
+ * @param {Pick<Seat, 'source'|'driver'|'holder'|'holder_name'|'kept'>} seat
  * @param {string|undefined} role 'human' or 'autonomous'
  * @param {string|undefined} planner name of the AV's planner
  * @param {string} me id of this client
@@ -27,6 +27,9 @@ export function describeSeat(seat, role, planner, me) {
   if (seat.holder !== null) {
     return seat.holder === me && me !== '' ? 'You drive'
       : `Driven by ${seat.holder_name || seat.holder} in a cockpit`;
+  }
+  if (seat.source === 'cockpit' && seat.kept) {
+    return `Kept for ${seat.kept.name || 'its driver'} for ${seat.kept.for_s} s`;
   }
   if (seat.source === 'cockpit') {
     return seat.driver === 'cockpit' ? 'Waits for somebody in a cockpit'

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The panel from which an experimenter triggers the events of the game. */
 
-import { element, setText } from '../dom.js';
+import { element, setAttribute, setText } from '../dom.js';
+import { reasonAgainst } from '../rights.js';
 import { conditionWords, eventKind, eventWords } from './event_words.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
@@ -37,6 +38,7 @@ export function createEvents(root, store, connection) {
     const fired = new Map(store.fired.map((entry) => [entry.name, entry]));
     for (const [name, card] of cards) {
       card.update(fired.get(name), asked.has(name), steerable(store), store);
+      card.explain(reasonAgainst(store, 'direct', 'trigger events'));
     }
     logTitle.hidden = store.fired.length === 0;
     log.replaceChildren(...[...store.fired].reverse().map((entry) => element('li', {},
@@ -73,6 +75,7 @@ export function createEvents(root, store, connection) {
   store.on('epoch', rebuild);
   store.on('events', update);
   store.on('hello', update);
+  store.on('you', update);
   store.on('connection', update);
   store.on('status', (status) => {
     if (status.run !== run) {
@@ -86,7 +89,8 @@ export function createEvents(root, store, connection) {
 
 /** @param {Store} store */
 function steerable(store) {
-  return store.mode === 'live' && store.connected && store.status?.run !== 'ended';
+  return store.mode === 'live' && store.connected && store.status?.run !== 'ended'
+    && store.rights.directs;
 }
 
 /**
@@ -119,6 +123,8 @@ function makeCard(event, press) {
       state, error),
     /** @param {string} text */
     refused: (text) => setText(error, text),
+    /** @param {string} reason why it cannot be pressed, or empty */
+    explain: (reason) => setAttribute(button, 'title', reason || null),
     /**
      * @param {FiredEvent|undefined} fired
      * @param {boolean} asked

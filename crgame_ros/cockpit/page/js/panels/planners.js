@@ -4,6 +4,7 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 import { countText } from '../perception/unseen.js';
+import { reasonAgainst } from '../rights.js';
 import { baseName } from './event_words.js';
 import { count, fixed, oneLine } from './format.js';
 import { icon } from './icons.js';
@@ -129,12 +130,13 @@ function makeRow(av, connection) {
       setAttribute(state, 'data-state', word);
       const label = `${stopped ? 'Let the planner of' : 'Stop the planner of'} ${av}`
         + `${stopped ? ' go on' : ''}`;
-      if (button.title !== label) {
+      if (button.getAttribute('aria-label') !== label) {
         button.replaceChildren(icon(stopped ? 'go' : 'stop'), stopped ? 'Go' : 'Stop');
-        button.title = label;
         button.setAttribute('aria-label', label);
       }
       setAttribute(button, 'hidden', store.mode === 'replay');
+      setAttribute(button, 'disabled', !store.rights.directs);
+      button.title = reasonAgainst(store, 'direct', 'stop planners') || label;
       cells.forEach((cell, at) => setText(cell, COLUMNS[at][2](planner)));
       setAttribute(cells[1], 'data-late', Boolean(planner.stale) && !stopped);
       const why = oneLine(planner.last_refusal);

@@ -3,6 +3,7 @@
 /** The panel that chooses, previews and loads a scenario (FastSim's scenario loading area). */
 
 import { element, setAttribute, setText } from '../dom.js';
+import { reasonAgainst } from '../rights.js';
 import { Busy } from './busy.js';
 import { acceptDrops } from './drop.js';
 import { errorText, oneLine, plural } from './format.js';
@@ -81,7 +82,7 @@ class ScenarioPanel {
         this.#errors.start, this.#start));
     store.on('status', () => this.#warn());
     acceptDrops(this.#dropZone, (files) => {
-      if (store.mode !== 'live') {
+      if (store.mode !== 'live' || !store.rights.directs) {
         return;
       }
       /** @type {HTMLElement|null} */
@@ -163,7 +164,7 @@ class ScenarioPanel {
       const text = await load({ id: this.#chosen, ...this.#form.choices });
       this.#busy.say(text ? `${text.replace(/[.…\s]+$/, '')} …` : 'Loading …');
       await begun.promise;
-      if (this.#store.status?.run === 'paused') {
+      if (this.#store.status?.run === 'paused' && !waitsForSeveral(this.#store)) {
         await this.#connection.request({ type: 'control', action: 'start' });
       }
     } catch (error) {
@@ -240,6 +241,15 @@ class ScenarioPanel {
   }
 }
 
+/**
+ * Whether several people are to say that they are ready.
+ *
+ * @param {Store} store
+ */
+function waitsForSeveral(store) {
+  return Object.values(store.seats).filter(({ driver }) => driver === 'cockpit').length > 1;
+}
+
 function fieldError() {
   return element('p', { class: 'field-error', role: 'alert' });
 }
@@ -266,20 +276,24 @@ function refusal(files) {
  */
 export function createScenario(root, store, connection) {
   const replay = element('p', {
-    class: 'hint', hidden: true, text: 'A recording is being shown: nothing can be loaded.',
+    class: 'hint', hidden: true,
   });
   const body = element('div', { class: 'stack' });
   root.append(replay, body);
   const panel = new ScenarioPanel(body, store, connection);
   const seen = () => {
-    replay.hidden = store.mode !== 'replay';
-    body.hidden = store.mode === 'replay';
-    if (!root.hidden && store.mode === 'live') {
+    const refused = store.mode === 'replay' ? 'A recording is being shown: nothing can be loaded.'
+      : reasonAgainst(store, 'direct', 'choose what is run');
+    setText(replay, refused);
+    replay.hidden = refused === '';
+    body.hidden = refused !== '';
+    if (!root.hidden && refused === '') {
       panel.refresh();
     }
   };
   new MutationObserver(seen).observe(root, { attributeFilter: ['hidden'] });
   store.on('hello', seen);
+  store.on('you', seen);
   seen();
   return panel;
 }

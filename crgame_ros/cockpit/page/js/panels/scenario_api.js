@@ -9,6 +9,11 @@ import { oneLine } from './format.js';
 // Sent with all that changes something: no page of another site can add it unasked.
 const OWN = { 'X-Crgame': '1' };
 
+/** Names this page, so that the others are told who has done it. */
+function own() {
+  return { ...OWN, ...window.crgame?.person?.headers };
+}
+
 /** @returns {Promise<Offer>} */
 export function fetchScenarios() {
   return ask('/api/scenarios');
@@ -29,7 +34,7 @@ export function fetchPreview(id, signal) {
  */
 export async function upload(file) {
   const reply = await ask(`/api/upload?name=${encodeURIComponent(file.name)}`, {
-    method: 'POST', body: file, headers: { ...OWN, 'Content-Type': 'application/xml' },
+    method: 'POST', body: file, headers: { ...own(), 'Content-Type': 'application/xml' },
   });
   return reply.id;
 }
@@ -41,7 +46,7 @@ export async function upload(file) {
 export async function load(choice) {
   const reply = await ask('/api/load', {
     method: 'POST', body: JSON.stringify(choice),
-    headers: { ...OWN, 'Content-Type': 'application/json' },
+    headers: { ...own(), 'Content-Type': 'application/json' },
   });
   return oneLine(reply.text);
 }

@@ -1,0 +1,182 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Who may keep a connection open: so many each, and only while something is asked through it."""
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable
+import logging
+import ssl
+
+from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
+
+# At once, of all and of one address; a browser opens six for a page.
+MAX_CONNECTIONS = 256
+MAX_OF_ADDRESS = 128
+# Until the first request, and between two of them [s]
+FIRST_REQUEST_S = 10.0
+NEXT_REQUEST_S = 40.0
+_LOOK_S = 5.0
+
+_log = logging.getLogger(__name__)
+
+
+class Doorkeeper:
+    """Counts the connections of each address and ends those that are kept for nothing."""
+
+    def __init__(self) -> None:
+        self._of_address: Counter[str] = Counter()
+        self._open: dict[asyncio.BaseTransport, _Watched] = {}
+
+    def watched(self, make: Callable[[], asyncio.Protocol]) -> Callable[[], asyncio.Protocol]:
+        """Give a factory of protocols that are watched."""
+        return lambda: _Watched(self, make())
+
+    def begins(self, transport: asyncio.BaseTransport | None) -> None:
+        """Take note that a request has come."""
+        if transport in self._open:
+            self._open[transport].requests += 1
+
+    def ends(self, transport: asyncio.BaseTransport | None) -> None:
+        """Take note that a request has been answered."""
+        if transport in self._open:
+            watched = self._open[transport]
+            watched.requests -= 1
+            watched.idle_since_s = asyncio.get_running_loop().time()
+            watched.patience_s = NEXT_REQUEST_S
+
+    def lets_in(self, transport: asyncio.BaseTransport, watched: '_Watched') -> bool:
+        """Count a connection, unless there are too many."""
+        if len(self._open) >= MAX_CONNECTIONS \
+                or self._of_address[watched.address] >= MAX_OF_ADDRESS:
+            return False
+        self._of_address[watched.address] += 1
+        self._open[transport] = watched
+        return True
+
+    def forget(self, transport: asyncio.BaseTransport, watched: '_Watched') -> None:
+        """Take note that a connection has ended."""
+        if self._open.pop(transport, None) is not None:
+            self._of_address[watched.address] -= 1
+            if not self._of_address[watched.address]:
+                del self._of_address[watched.address]
+
+
+class _Watched(asyncio.Protocol):
+    """Passes everything on to the protocol of one connection."""
+
+    def __init__(self, keeper: Doorkeeper, protocol: asyncio.Protocol) -> None:
+        self._keeper = keeper
+        self._protocol = protocol
+        self._transport: asyncio.Transport | None = None
+        self._refused = False
+        self._timer: asyncio.TimerHandle | None = None
+        self.address = ''
+        self.requests = 0
+        self.idle_since_s = 0.0
+        self.patience_s = FIRST_REQUEST_S
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        peer = transport.get_extra_info('peername')
+        self.address = str(peer[0]) if peer else ''
+        if not self._keeper.lets_in(transport, self):
+            self._refused = True
+            transport.abort()
+            return
+        self._transport = transport
+        self.idle_since_s = asyncio.get_running_loop().time()
+        self._look()
+        self._protocol.connection_made(transport)
+
+    def connection_lost(self, error: Exception | None) -> None:
+        if self._refused or self._transport is None:
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._keeper.forget(self._transport, self)
+        self._protocol.connection_lost(error)
+
+    def data_received(self, data: bytes) -> None:
+        if not self._refused:
+            self._protocol.data_received(data)
+
+    def eof_received(self) -> bool | None:
+        return None if self._refused else self._protocol.eof_received()
+
+    def pause_writing(self) -> None:
+        self._protocol.pause_writing()
+
+    def resume_writing(self) -> None:
+        self._protocol.resume_writing()
+
+    def _look(self) -> None:
+        loop = asyncio.get_running_loop()
+        if self._transport is not None and not self.requests \
+                and loop.time() - self.idle_since_s > self.patience_s:
+            self._transport.abort()
+            return
+        self._timer = loop.call_later(_LOOK_S, self._look)
+
+
+class WatchedSite(web.BaseSite):
+    """
+    Where a server listens behind a doorkeeper.
+
+    :param runner: of the server.
+    :param host: address or name.
+    :param port: 0 for any.
+    :param keeper: counts who comes.
+    :param ssl_context: of TLS; None for plain HTTP.
+    """
+
+    def __init__(self, runner: web.AppRunner, host: str, port: int, keeper: Doorkeeper,
+                 ssl_context: ssl.SSLContext | None = None) -> None:
+        super().__init__(runner, ssl_context=ssl_context)
+        self._host = host
+        self._port = port
+        self._keeper = keeper
+
+    @property
+    def name(self) -> str:
+        """Give the address."""
+        return f'{"https" if self._ssl_context else "http"}://{self._host}:{self._port}'
+
+    async def start(self) -> None:
+        """Begin to listen."""
+        await super().start()
+        server = self._runner.server
+        assert server is not None
+        self._server = await asyncio.get_running_loop().create_server(
+            self._keeper.watched(server), self._host, self._port,
+            ssl=self._ssl_context, backlog=self._backlog,
+            ssl_handshake_timeout=FIRST_REQUEST_S if self._ssl_context else None)
+
+
+class _StrangersMistakes(logging.Filter):
+    """Makes one line of what comes of requests that are no HTTP: anybody can send them."""
+
+    def filter(self, record: logging.LogRecord) -> bool:  # noqa: A003
+        error = record.exc_info[1] if record.exc_info else None
+        return not isinstance(error, HttpProcessingError)
+
+
+def server_log() -> logging.Logger:
+    """Give the log of the HTTP server, in which requests that are no HTTP leave no traceback."""
+    log = logging.getLogger(f'{__name__}.http')
+    if not log.filters:
+        log.addFilter(_StrangersMistakes())
+    return log

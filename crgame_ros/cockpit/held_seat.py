@@ -1,0 +1,107 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A seat that somebody at a page holds, and what their hands do."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from crgame_ros.cockpit.input_delay import InputDelay
+from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
+from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+
+# A page repeats its input every 50 ms; silent for longer, it counts as gone [s].
+SILENCE_S = 0.2
+# What the page says of the lever and the horn: which of left, right, hazard and horn are held.
+_LIGHTS = LightButtons(*(frozenset({i}) for i in range(4)))
+
+
+class HeldSeat:
+    """
+    A seat that somebody in the browser holds.
+
+    Keys go through the keyboard filter (CRG 18-19) in simulation time, axes are taken as the
+    page calibrated them (CRG 17).
+
+    :param seat_id: the vehicle.
+    :param holder: id of the client.
+    :param person: id of the client's person.
+    """
+
+    def __init__(self, seat_id: str, holder: str, person: str = '') -> None:
+        self.id = seat_id
+        self.holder = holder
+        self.person = person
+        self.requests: list[str] = []
+        # To whom the holder wants to give it, until they have answered.
+        self.offered_to: str | None = None
+        self.delay = InputDelay()
+        self._cycles = KeyboardCycles()
+        self._lever = IndicatorLever(_LIGHTS)
+        self._keys: KeyState | None = None
+        self._axes: DriverCommand | None = None
+        self._heard_s = 0.0
+        self.away = True
+
+    def take(self, message: Mapping[str, Any], now_s: float) -> bool:
+        """
+        Take an input message of the holder, already checked.
+
+        :param now_s: steady clock [s]
+        :return: whether the hands do something else than before.
+        """
+        self._heard_s = now_s
+        before = (self._keys, self._axes)
+        reverse = bool(message.get('reverse'))
+        keys, axes = message.get('keys'), message.get('axes')
+        self.away = keys is None and axes is None
+        self._lever.hold(i for i, held in enumerate(message.get('lights', ())) if held)
+        if self.away:
+            self.let_go()
+        elif axes is not None:
+            throttle, brake, steering = axes
+            self._keys, self._axes = None, DriverCommand(throttle, brake, steering, reverse)
+        elif keys is not None:
+            throttle, brake, left, right = map(bool, keys)
+            self._keys, self._axes = KeyState(throttle, brake, left, right, reverse), None
+        return (self._keys, self._axes) != before
+
+    def let_go(self) -> None:
+        """Take the hands off everything at once."""
+        self.away = True
+        self._keys = self._axes = None
+        self._cycles.reset()
+        self._lever.hold(())
+
+    def is_silent(self, now_s: float) -> bool:
+        """Tell whether the page has not been heard for too long."""
+        return not self.away and now_s - self._heard_s > SILENCE_S
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """
+        Give the command of cycle n; while nobody is there it is released, but for the indicators.
+
+        :param dt_s: length of a cycle in simulation time [s]
+        """
+        command = RELEASED
+        if self._axes is not None:
+            command = self._axes
+        elif self._keys is not None:
+            if n < self._cycles.cycle:
+                # A new run has begun.
+                self._cycles.reset()
+            command = self._cycles.command(n, self._keys, dt_s)
+        self._lever.turn(command.steering)
+        return command._replace(lights=self._lever.lights)

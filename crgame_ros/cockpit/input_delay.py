@@ -1,0 +1,63 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How long it takes from a page's input until the first state that obeys it is known here."""
+
+from collections import deque
+import statistics
+
+# Enough to tell how it is now; a median does not mind a single late step.
+_KEPT = 21
+# A run that stands still obeys nothing [s].
+_GIVE_UP_S = 1.0
+
+
+class InputDelay:
+    """Measures with the inputs that change something, on one clock."""
+
+    def __init__(self) -> None:
+        self._pending: tuple[float, int] | None = None
+        self._measured_ms: deque[float] = deque(maxlen=_KEPT)
+
+    @property
+    def turn_ms(self) -> float | None:
+        """Median of the last measurements [ms]; None before the first."""
+        return statistics.median(self._measured_ms) if self._measured_ms else None
+
+    def changed(self, now_s: float, n: int) -> None:
+        """
+        Take note of an input that is passed on.
+
+        :param now_s: steady clock [s]
+        :param n: newest step that is known.
+        """
+        if self._pending is None or now_s - self._pending[0] > _GIVE_UP_S:
+            self._pending = (now_s, n)
+
+    def stepped(self, now_s: float, n: int) -> None:
+        """Take note of a state that has come."""
+        if self._pending is None:
+            return
+        since_s, before_n = self._pending
+        if now_s - since_s > _GIVE_UP_S or n < before_n:
+            self._pending = None
+        elif n > before_n:
+            self._measured_ms.append((now_s - since_s) * 1e3)
+            self._pending = None
+
+    def total_ms(self, round_trip_ms: float | None) -> float | None:
+        """Give the delay from the hand to the page that shows it [ms]: the way there and back."""
+        if self.turn_ms is None or round_trip_ms is None:
+            return None
+        return self.turn_ms + round_trip_ms

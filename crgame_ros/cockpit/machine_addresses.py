@@ -1,0 +1,63 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The addresses under which other machines reach this one."""
+
+import fcntl
+import ipaddress
+from pathlib import Path
+import socket
+import struct
+
+# Asks Linux for the IPv4 address of an interface.
+_SIOCGIFADDR = 0x8915
+_IF_INET6 = Path('/proc/net/if_inet6')
+_GLOBAL = '00'
+
+
+def reachable_addresses(host: str) -> tuple[str, ...]:
+    """
+    Give the addresses that others can open when a server listens on one.
+
+    :param host: an address, or `0.0.0.0` or `::` for all of this machine.
+    :return: of all, those of its interfaces, loopback left out unless there is nothing else.
+    """
+    if host == '0.0.0.0':
+        return _version_4() or ('127.0.0.1',)
+    if host == '::':
+        return (*_version_4(), *_version_6()) or ('::1',)
+    return (host,)
+
+
+def _version_4() -> tuple[str, ...]:
+    found: dict[str, None] = {}
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        for _, name in socket.if_nameindex():
+            request = struct.pack('256s', name.encode()[:15])
+            try:
+                answer = fcntl.ioctl(probe.fileno(), _SIOCGIFADDR, request)
+            except OSError:
+                # An interface without such an address.
+                continue
+            found[socket.inet_ntoa(answer[20:24])] = None
+    return tuple(item for item in found if not ipaddress.ip_address(item).is_loopback)
+
+
+def _version_6() -> tuple[str, ...]:
+    try:
+        rows = [line.split() for line in _IF_INET6.read_text().splitlines()]
+    except OSError:
+        return ()
+    return tuple(str(ipaddress.IPv6Address(int(row[0], 16))) for row in rows
+                 if len(row) == 6 and row[3] == _GLOBAL)

@@ -1,0 +1,123 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Before a run that people drive: who is ready, and the countdown over the picture. */
+
+import { element, setAttribute, setText } from './dom.js';
+import { describeSeat } from './driving/seat_text.js';
+
+/** @import { Connection } from './connection.js' */
+/** @import { RequestMessage, Seat } from './messages.js' */
+/** @import { Store } from './store.js' */
+
+/** The lobby in the Drive panel and the countdown on the stage. */
+class Lobby {
+  #store;
+  #connection;
+  #list = element('ul', { class: 'lobby-seats' });
+  #note = element('p', { class: 'drive-note', role: 'status' });
+  #ready = element('button', { type: 'button', class: 'drive-button primary wide',
+    on: { click: () => this.#sayReady() } });
+  #all = element('button', { type: 'button', class: 'drive-button', text: 'Start for all',
+    title: 'Begin as soon as everybody has the hands on the controls',
+    on: { click: () => this.#request({ type: 'control', action: 'start', all: true }) } });
+  #section = element('section', { class: 'drive-section lobby', hidden: true,
+    'aria-labelledby': 'lobby-title' },
+  element('h2', { id: 'lobby-title', text: 'Before the start' }), this.#list, this.#note,
+  this.#ready, this.#all);
+  #countdown = element('div', { class: 'countdown', role: 'timer', 'aria-live': 'assertive',
+    hidden: true });
+
+  /**
+   * @param {HTMLElement} stage
+   * @param {Store} store
+   * @param {Connection} connection
+   */
+  constructor(stage, store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    stage.append(this.#countdown);
+    document.querySelector('#panel-drive')?.prepend(this.#section);
+    for (const event of /** @type {const} */ (['hello', 'you', 'seats', 'status',
+      'connection'])) {
+      store.on(event, () => this.#show());
+    }
+    this.#show();
+  }
+
+  /** @returns {[string, Seat][]} the seats that the game leaves to people at pages */
+  get #seats() {
+    return Object.entries(this.#store.seats).filter(
+      ([, { driver, source }]) => driver === 'cockpit' && source === 'cockpit');
+  }
+
+  /** @returns {string|undefined} the seat that this page holds */
+  get #mine() {
+    const { me } = this.#store;
+    return this.#seats.find(([, { holder }]) => holder === me.id && me.id !== '')?.[0];
+  }
+
+  #show() {
+    const { status, connected, mode, rights, seats } = this.#store;
+    const seconds = connected ? status?.countdown_s ?? 0 : 0;
+    setAttribute(this.#countdown, 'hidden', seconds === 0);
+    setText(this.#countdown, seconds > 0 ? String(seconds) : '');
+    const waits = mode === 'live' && connected && status?.n === 0
+      && ['waiting', 'paused'].includes(status.run) && this.#seats.length > 0;
+    setAttribute(this.#section, 'hidden', !waits);
+    if (!waits) {
+      return;
+    }
+    this.#list.replaceChildren(...this.#seats.map(([id, seat]) => this.#row(id, seat)));
+    const missing = this.#seats.filter(([, { holder, ready }]) => holder === null || !ready);
+    setText(this.#note, seconds > 0 ? 'Hands on the controls: it begins.'
+      : missing.length > 0 ? 'The run begins when all are ready, after a countdown of 3 s.'
+        : 'All are ready; hands on the controls.');
+    const mine = this.#mine;
+    const ready = mine !== undefined && Boolean(seats[mine].ready);
+    setAttribute(this.#ready, 'hidden', mine === undefined);
+    setText(this.#ready, ready ? 'Not ready after all' : 'Ready');
+    setAttribute(this.#ready, 'aria-pressed', String(ready));
+    setAttribute(this.#all, 'hidden', !rights.directs || this.#seats.length < 2);
+  }
+
+  /**
+   * @param {string} id
+   * @param {Seat} seat
+   */
+  #row(id, seat) {
+    const { me } = this.#store;
+    const state = seat.holder === null ? 'free' : seat.ready ? 'ready' : 'not ready yet';
+    return element('li', { 'data-ready': Boolean(seat.ready) && seat.holder !== null },
+      element('strong', { text: id }),
+      element('span', { text: describeSeat(seat, 'human', undefined, me.id) }),
+      element('span', { class: 'lobby-state', text: state }));
+  }
+
+  #sayReady() {
+    const seat = this.#mine;
+    if (seat !== undefined) {
+      this.#ready.blur();
+      this.#request({ type: 'ready', seat, ready: !this.#store.seats[seat].ready });
+    }
+  }
+
+  /** @param {RequestMessage} message */
+  async #request(message) {
+    const { ok, text } = await this.#connection.request(message);
+    if (!ok) {
+      this.#store.receive({ type: 'notice', level: 'warn', text });
+    }
+  }
+}
+
+/**
+ * Put the lobby into the Drive panel and the countdown over the picture.
+ *
+ * @param {HTMLElement} stage
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {Lobby}
+ */
+export function createLobby(stage, store, connection) {
+  return new Lobby(stage, store, connection);
+}

@@ -1,0 +1,133 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Who is at this cockpit: roles, delays, and links by which others come in. */
+
+import { element, setAttribute, setText } from './dom.js';
+
+/** @import { Connection } from './connection.js' */
+/** @import { Present } from './messages.js' */
+/** @import { Store } from './store.js' */
+
+/** @type {[role: string, text: string][]} */
+const ROLES = [['all', 'Director and driver'], ['direct', 'Director'], ['drive', 'Driver'],
+  ['watch', 'Spectator']];
+
+/** The section of the Drive panel. */
+class People {
+  #store;
+  #connection;
+  #list = element('ul', { class: 'people' });
+  #role = element('select', { id: 'my-role', on: { change: () => this.#choose() } });
+  #roleRow = element('p', { class: 'people-role' },
+    element('label', { for: 'my-role', text: 'You take part as' }), this.#role);
+  #whom = element('select', { 'aria-label': 'For whom the link is' });
+  #link = element('input', { type: 'text', readonly: true, hidden: true,
+    'aria-label': 'The link', on: { focus: () => this.#link.select() } });
+  #error = element('p', { class: 'field-error', role: 'alert' });
+  #invite = element('form', { class: 'people-invite', hidden: true,
+    on: { submit: (/** @type {Event} */ event) => this.#makeLink(event) } },
+  this.#whom, element('button', { type: 'submit', class: 'drive-button', text: 'Make a link',
+    title: 'A link that lets one browser in' }), this.#link, this.#error);
+  #shown = '';
+
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   * @param {Connection} connection
+   */
+  constructor(root, store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    const section = element('section', { class: 'drive-section',
+      'aria-labelledby': 'people-title' },
+    element('h2', { id: 'people-title', text: 'People' }), this.#roleRow, this.#list,
+    this.#invite);
+    root.append(section);
+    for (const event of /** @type {const} */ (['hello', 'you', 'people', 'scene'])) {
+      store.on(event, () => {
+        setAttribute(section, 'hidden', store.mode === 'replay');
+        this.#show();
+      });
+    }
+    this.#show();
+  }
+
+  #show() {
+    const { people, rights, scene } = this.#store;
+    this.#list.replaceChildren(...people.map((person) => this.#row(person)));
+    const humans = (scene?.vehicles ?? []).filter(({ role }) => role === 'human');
+    const shown = JSON.stringify([rights, humans.map(({ id }) => id)]);
+    if (shown === this.#shown) {
+      return;
+    }
+    this.#shown = shown;
+    const { may_direct, may_drive, directs, drives } = rights;
+    const now = directs ? (drives ? 'all' : 'direct') : drives ? 'drive' : 'watch';
+    const possible = ROLES.filter(([role]) => (may_direct || !['all', 'direct'].includes(role))
+      && (may_drive || !['all', 'drive'].includes(role)));
+    this.#role.replaceChildren(...possible.map(([role, text]) => element('option',
+      { value: role, text, selected: role === now })));
+    setAttribute(this.#roleRow, 'hidden', possible.length < 2);
+    // Links are made where the cockpit is open to the network, which is over TLS.
+    setAttribute(this.#invite, 'hidden', !directs || window.location.protocol !== 'https:');
+    this.#whom.replaceChildren(
+      ...humans.map(({ id }) => element('option', { value: `drive ${id}`, text: `drive ${id}` })),
+      element('option', { value: 'watch', text: 'watch' }),
+      element('option', { value: 'direct', text: 'direct' }));
+  }
+
+  /** @param {Present} person */
+  #row({ client, name, role, seat, round_trip_ms, input_delay_ms }) {
+    const me = client === this.#store.me.id ? ' (you)' : '';
+    const delays = [
+      round_trip_ms === null ? '' : `${round_trip_ms.toFixed(0)} ms there and back`,
+      input_delay_ms === null ? '' : `${input_delay_ms.toFixed(0)} ms from hand to picture`,
+    ].filter(Boolean).join(', ');
+    return element('li', { 'data-client': client },
+      element('strong', { text: `${name}${me}` }),
+      element('span', { text: seat === null ? role : `${role} in ${seat}` }),
+      element('span', { class: 'drive-note', text: delays }));
+  }
+
+  async #choose() {
+    const role = this.#role.value;
+    // A select that keeps the focus would take the driving keys.
+    this.#role.blur();
+    const { ok, text } = await this.#connection.request({ type: 'role', role });
+    if (!ok) {
+      this.#store.receive({ type: 'notice', level: 'warn', text });
+    }
+  }
+
+  /** @param {Event} event */
+  async #makeLink(event) {
+    event.preventDefault();
+    const [role, seat = ''] = this.#whom.value.split(' ');
+    let answer;
+    try {
+      const response = await fetch('/api/invite', { method: 'POST', credentials: 'same-origin',
+        headers: { 'X-Crgame': '1', 'Content-Type': 'application/json',
+          ...window.crgame?.person?.headers },
+        body: JSON.stringify({ role, seat }) });
+      answer = await response.json();
+    } catch {
+      answer = { error: 'The server does not answer.' };
+    }
+    setText(this.#error, answer.error ?? '');
+    setAttribute(this.#link, 'hidden', !answer.link);
+    this.#link.value = answer.link ?? '';
+    this.#link.select();
+  }
+}
+
+/**
+ * Put the list of people into the Drive panel.
+ *
+ * @param {HTMLElement} root the panel
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {People}
+ */
+export function createPeople(root, store, connection) {
+  return new People(root, store, connection);
+}

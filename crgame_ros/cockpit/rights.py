@@ -1,0 +1,86 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What somebody at a page may do: direct the experiment, drive, or watch."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+# What a page, a link or the address may ask for.
+ROLES = ('direct', 'drive', 'watch', 'all')
+_DIRECTS = ('control', 'rate', 'planner', 'trigger')
+_DRIVES = ('input', 'claim', 'release', 'ask', 'hand_over', 'answer', 'ready', 'device')
+_DEEDS = {'start': 'start the run', 'pause': 'pause the run', 'step': 'step through the run',
+          'reset': 'reset the run', 'stop': 'stop the run', 'rate': 'change the speed of time',
+          'planner': 'stop a planner or let it go on', 'trigger': 'trigger events',
+          'load': 'choose what is run', 'invite': 'make links'}
+
+
+@dataclass(frozen=True)
+class Rights:
+    """
+    The rights of one person.
+
+    :param directs: steers the experiment: run control, scenarios, planners, events, links.
+    :param drives: may take a seat.
+    :param seat: the only seat that may be taken without being offered; empty for any.
+    """
+
+    directs: bool = True
+    drives: bool = True
+    seat: str = ''
+
+    @classmethod
+    def of(cls, role: str, seat: str = '') -> 'Rights':
+        """Give the rights of a role: direct, drive, watch or all."""
+        return cls(role in ('direct', 'all'), role in ('drive', 'all'), seat)
+
+    @property
+    def role(self) -> str:
+        """The role in words."""
+        words = [word for has, word in ((self.directs, 'director'), (self.drives, 'driver'))
+                 if has]
+        return ' and '.join(words) or 'spectator'
+
+    def narrowed(self, role: str) -> 'Rights':
+        """Give as much of a role as these rights hold."""
+        wanted = Rights.of(role)
+        return replace(self, directs=self.directs and wanted.directs,
+                       drives=self.drives and wanted.drives)
+
+    def refusal(self, kind: str, action: str = '') -> str:
+        """
+        Say why something may not be done, empty if it may.
+
+        :param kind: of a message, load or invite.
+        :param action: of the run control.
+        """
+        deed = _DEEDS.get(action or kind, '')
+        if kind == 'control' and action == 'start' and (self.directs or self.drives):
+            # A driver may say that they are ready: who asks more is refused where it is known.
+            return ''
+        if kind in (*_DIRECTS, 'load', 'invite') and not self.directs:
+            return f'only a director can {deed}; you are a {self.role}'
+        if kind in _DRIVES and not self.drives:
+            return f'only a driver can take a seat; you are a {self.role}'
+        return ''
+
+
+ALL_RIGHTS = Rights()
+
+
+def refusal_of(rights: Rights, message: Mapping[str, Any]) -> str:
+    """Say why a page's message is refused, empty if it is not."""
+    return rights.refusal(message['type'], message.get('action', ''))

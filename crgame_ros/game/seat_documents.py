@@ -1,0 +1,198 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Who sits in which seat, as JSON text: parts of `/seats`, `/seats/order` and `/seats/drivers`."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+import json
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import MALFORMED, SEATS_TOPIC
+from crgame_ros.game.driven_vehicle import VEHICLE_ID
+
+ORDER_TOPIC = '/seats/order'
+DRIVERS_TOPIC = '/seats/drivers'
+MAX_PERSON_TEXT = 80
+MAX_SOURCE_LENGTH = 40
+
+
+@dataclass(frozen=True)
+class SeatPerson:
+    """
+    Somebody in a seat, by what they said of themselves and nothing else.
+
+    :param id: the same as long as the person's page is the same.
+    :param name: as typed.
+    :param device: what the hands are on.
+    :param browser: in which the page is, empty outside a browser.
+    :param role: in the experiment.
+    """
+
+    id: str  # noqa: A003
+    name: str = ''
+    device: str = ''
+    browser: str = ''
+    role: str = ''
+
+
+@dataclass(frozen=True)
+class SeatTenant:
+    """
+    Who has a seat, or had it last.
+
+    :param person: who.
+    :param here: false once the connection to their page has ended.
+    :param ready: whether they have said so at the start.
+    """
+
+    person: SeatPerson
+    here: bool = True
+    ready: bool = False
+
+
+@dataclass(frozen=True)
+class SeatDemand:
+    """
+    What an order says; None is: says nothing of it.
+
+    :param seat: the vehicle.
+    :param source: whose commands it shall obey.
+    :param person: who takes the seat, or how the person in it is described now.
+    :param displaced: id of the person whose place is taken: the order holds for no other.
+    :param left: id of the person whose connection has ended.
+    :param ready: whether the person in the seat is ready.
+    """
+
+    seat: str
+    source: str | None = None
+    person: SeatPerson | None = None
+    displaced: str | None = None
+    left: str | None = None
+    ready: bool | None = None
+
+
+@dataclass
+class DrivingSpell:
+    """
+    One stretch of steps in which a seat was driven by one source and one person.
+
+    :param seat: the vehicle.
+    :param source: whose commands it obeyed.
+    :param driver: the source that the game names.
+    :param person: in a cockpit; None elsewhere, and while the seat was left.
+    :param from_n: the first step.
+    :param until_n: the step from which on somebody else drove; None while it lasts.
+    """
+
+    seat: str
+    source: str
+    driver: str
+    person: SeatPerson | None
+    from_n: int
+    until_n: int | None = None
+
+
+def seat_entry(source: str, driver: str, tenant: SeatTenant | None) -> dict[str, Any]:
+    """Write what `/seats` says of a seat."""
+    entry: dict[str, Any] = {'source': source, 'driver': driver}
+    if tenant is not None:
+        entry.update(person=asdict(tenant.person), here=tenant.here, ready=tenant.ready)
+    return entry
+
+
+def parse_tenants(text: str) -> dict[str, SeatTenant]:
+    """
+    Read who has the seats from `/seats`.
+
+    :raises InputError: if it is not what the contract says.
+    """
+    try:
+        return {str(name): SeatTenant(_person(entry['person']), entry['here'] is True,
+                                      entry['ready'] is True)
+                for name, entry in json.loads(text).items() if entry.get('person') is not None}
+    except (*MALFORMED, InputError) as error:
+        raise InputError('is not what the contract says', SEATS_TOPIC) from error
+
+
+def demand_text(demand: SeatDemand) -> str:
+    """Write an order."""
+    content = {key: value for key, value in asdict(demand).items() if value is not None}
+    return json.dumps(content)
+
+
+def parse_demand(text: str) -> SeatDemand:
+    """
+    Read an order.
+
+    :raises InputError: if it is none.
+    """
+    try:
+        content = json.loads(text)
+        person, ready = content.get('person'), content.get('ready')
+        demand = SeatDemand(
+            str(content['seat']), content.get('source'),
+            None if person is None else _person(person), content.get('displaced'),
+            content.get('left'), None if ready is None else ready is True)
+    except MALFORMED as error:
+        raise InputError('is no order', ORDER_TOPIC, 'give seat and source') from error
+    if (demand.source, demand.person, demand.left, demand.ready) == (None,) * 4:
+        raise InputError('is no order', ORDER_TOPIC, 'give seat and source')
+    if demand.source is not None and not is_short(demand.source, MAX_SOURCE_LENGTH):
+        raise InputError('the source is no name', ORDER_TOPIC, 'give game or a driver')
+    return demand
+
+
+def spells_document(epoch: int, spells: Iterable[DrivingSpell]) -> str:
+    """Write `/seats/drivers`."""
+    return json.dumps({'epoch': epoch, 'drivers': [asdict(item) for item in spells]})
+
+
+def parse_spells(text: str) -> tuple[int, tuple[DrivingSpell, ...]]:
+    """
+    Read `/seats/drivers`.
+
+    :return: the epoch, and who drove in it.
+    :raises InputError: if it is not what `spells_document` writes.
+    """
+    try:
+        content = json.loads(text)
+        spells = tuple(
+            DrivingSpell(str(item['seat']), str(item['source']), str(item['driver']),
+                         None if item['person'] is None else _person(item['person']),
+                         int(item['from_n']),
+                         None if item['until_n'] is None else int(item['until_n']))
+            for item in content['drivers'])
+        epoch = int(content['epoch'])
+    except (*MALFORMED, InputError) as error:
+        raise InputError('is not what the contract says', DRIVERS_TOPIC) from error
+    if not all(VEHICLE_ID.fullmatch(item.seat) for item in spells):
+        raise InputError('is not what the contract says', DRIVERS_TOPIC)
+    return epoch, spells
+
+
+def is_short(text: object, length: int, least: int = 1) -> bool:
+    """Tell whether something is a text of one line that can be shown."""
+    return isinstance(text, str) and least <= len(text) <= length and text.isprintable()
+
+
+def _person(entry: Mapping[str, Any]) -> SeatPerson:
+    person = SeatPerson(entry['id'], *(entry.get(name, '') for name in (
+        'name', 'device', 'browser', 'role')))
+    if not is_short(person.id, MAX_SOURCE_LENGTH) or not all(
+            is_short(text, MAX_PERSON_TEXT, 0)
+            for text in (person.name, person.device, person.browser, person.role)):
+        raise InputError('the person is not described as the contract says', ORDER_TOPIC)
+    return person

@@ -1,0 +1,120 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""`crgame new`: a game file for any scenario, with as many people as are to drive in it."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from crgame_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from commonroad.planning.planning_problem import PlanningProblem
+    from crgame_ros.game.game import Game, HumanSpec, PoseSpawn
+    from crgame_ros.vehicle.state import VehicleState
+
+DESCRIPTION = """\
+Write a game file for a CommonRoad scenario, with seats for several people.
+
+Each seat gets a place of its own, written out so that it can be changed: near the first AV on free
+lanes (--at lanes), or where planning problems begin (--at problems), which no AV drives then. The
+other planning problems become AVs."""
+MAX_HUMANS = 16
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.description = DESCRIPTION
+    add = parser.add_argument
+    add('scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
+    add('--humans', type=int, default=1, metavar='N', help='seats for people (default: 1)')
+    add('--driver', default='cockpit', metavar='SOURCE',
+        help='who drives each of them (default: cockpit, somebody at a page)')
+    add('--at', choices=('lanes', 'problems'), default='lanes',
+        help='where they start (default: lanes)')
+    add('--planner', metavar='NAME', help='planner of the AVs')
+    add('--title', default='', help='one line for people')
+    add('--duration', type=float, metavar='S', help='simulated seconds (default: without end)')
+    add('--out', type=Path, metavar='GAME.yaml',
+        help='file to write (default: <scenario>.yaml here; never over another file)')
+    parser.set_defaults(command=_new)
+
+
+def _new(values: argparse.Namespace) -> int:
+    from crgame_ros.driver.source import parse_source
+    from crgame_ros.game.game_file import dump_game
+    from crgame_ros.simulation.setup import build_setup
+    if not 1 <= values.humans <= MAX_HUMANS:
+        raise InputError(f'is {values.humans}', '--humans', f'give 1 to {MAX_HUMANS}')
+    parse_source(values.driver)
+    out = values.out or Path(f'{values.scenario.stem}.yaml')
+    if out.exists():
+        raise InputError('is there already', str(out), 'remove it, or name another with --out')
+    game = _game(values)
+    setup = build_setup(game)
+    humans = tuple(replace(human, spawn=_pose(placed.state))
+                   for human, placed in zip(game.humans, setup.humans, strict=True))
+    game = replace(game, humans=humans,
+                   title=game.title or f'{setup.loaded.benchmark_id}, {len(humans)} in seats')
+    # Placed as it will be read.
+    build_setup(game, setup.loaded)
+    _write(out, dump_game(game))
+    print(f'{out}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s)')
+    for notice in setup.notices:
+        print(f'note: {notice}')
+    print(f'./run.sh {out}')
+    return 0
+
+
+def _game(values: argparse.Namespace) -> 'Game':
+    """Give the game, its humans not yet placed unless problems place them."""
+    from crgame_ros.game.game import AvSpec, DEFAULT_PLANNER, Game, HumanSpec
+    from crgame_ros.scenario.loading import load_scenario
+    loaded = load_scenario(values.scenario)
+    problems = sorted(loaded.planning_problems, key=lambda item: item.planning_problem_id)
+    taken = problems[:values.humans] if values.at == 'problems' else []
+    planner = values.planner or DEFAULT_PLANNER
+    avs = tuple(AvSpec(f'av{index}', planner, planning_problem=problem.planning_problem_id)
+                for index, problem in enumerate(problems[len(taken):]))
+    humans = tuple(HumanSpec(f'hv{index}', values.driver) for index in range(values.humans))
+    humans = tuple(replace(human, spawn=_problem_pose(human, problem))
+                   for human, problem in zip(humans, taken, strict=False)) + humans[len(taken):]
+    more = {} if values.duration is None else {'duration': values.duration}
+    return Game(values.scenario.resolve(), values.title, humans, avs, **more)
+
+
+def _problem_pose(human: 'HumanSpec', problem: 'PlanningProblem') -> 'PoseSpawn':
+    from crgame_ros.scenario.spawn import problem_pose
+    from crgame_ros.vehicle.parameters import load_vehicle_parameters
+    vehicle = load_vehicle_parameters(human.vehicle)
+    return _pose(problem_pose(problem, vehicle.rear_to_center))
+
+
+def _pose(state: 'VehicleState') -> 'PoseSpawn':
+    """Write a place as people change it: to the centimetre and the tenth of a degree."""
+    from crgame_ros.game.game import PoseSpawn
+    return PoseSpawn(round(state.x, 2), round(state.y, 2), round(state.yaw, 4),
+                     round(state.speed, 2))
+
+
+def _write(path: Path, text: str) -> None:
+    part = path.with_name(f'{path.name}.part')
+    try:
+        part.write_text(text, encoding='utf-8')
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f'cannot be written ({error.strerror})', str(path),
+                         'name another file with --out') from error

@@ -1,0 +1,303 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The seats of a live run as the people at this cockpit take, drive, offer and leave them."""
+
+from collections.abc import Mapping
+import time
+from typing import Any
+
+from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.held_seat import HeldSeat
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.seat_orders import SeatOrders
+from crgame_ros.cockpit.seat_table import SeatTable
+from crgame_ros.driver.source import COCKPIT
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.documents import parse_seats_document
+from crgame_ros.game.seat_documents import parse_tenants, SeatDemand, SeatPerson
+from crgame_ros.nodes.cockpit.cockpit_feed import CockpitFeed
+from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.ros_messages import to_joy
+from crgame_ros.ros.seat import GAME
+from crgame_ros.vehicle.driver_command import DriverCommand
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+WAITS = ('waiting', 'paused')
+
+
+class SeatDesk:
+    """
+    Carries out what pages ask about seats, and publishes what their hands do.
+
+    :param node: owner of the endpoints.
+    :param endpoints: of the node.
+    :param orders: to the simulation.
+    :param hub: all pages.
+    :param feed: how the run stands.
+    """
+
+    def __init__(self, node: Node, endpoints: Endpoints, orders: CockpitOrders, hub: Hub,
+                 feed: CockpitFeed) -> None:
+        self._node = node
+        self._endpoints = endpoints
+        self._orders = orders
+        self._hub = hub
+        self._feed = feed
+        self._commands: dict[str, Publisher] = {}
+        self.table = SeatTable()
+        self._awaited = SeatOrders()
+        self._told: dict[str, SeatPerson] = {}
+        self._driven_n = 0
+
+    def close(self) -> None:
+        """Let go of every seat."""
+        for seat in list(self.table.held.values()):
+            self._let_go(seat)
+            self._orders.order_seat(SeatDemand(seat.id, left=seat.person))
+
+    def take_seats(self, text: str) -> None:
+        """
+        Take what `/seats` says.
+
+        :raises InputError: if it is not what the contract says.
+        """
+        seats, tenants = parse_seats_document(text), parse_tenants(text)
+        self._awaited.answered(seats, tenants)
+        self.table.update(seats, self._awaited, tenants)
+        # Ahead of the first claim: a new publisher takes a while to be discovered.
+        for name in seats.keys() - self._commands.keys():
+            self._commands[name] = self._endpoints.publisher('/<v>/driver_command', name)
+        for name in self._commands.keys() - seats.keys():
+            self._node.destroy_publisher(self._commands.pop(name))
+        for client in self._hub.clients.values():
+            self._return(client)
+        self.show()
+
+    def serve(self) -> None:
+        """Repeat orders without an answer, and tell how the people in the seats have changed."""
+        for demand in self._awaited.due(time.monotonic()):
+            self._orders.order_seat(demand)
+        self.table.update(self.table.seats, self._awaited)
+        for seat in self.table.held.values():
+            client = self._hub.clients.get(seat.holder)
+            if client is not None and seat.id not in self._awaited \
+                    and self._told.get(seat.id) != _person(client):
+                self._told[seat.id] = _person(client)
+                self._orders.order_seat(SeatDemand(seat.id, person=_person(client)))
+        self.show()
+
+    def drive(self) -> None:
+        """Send the command of each held seat for a new cycle; let go of silent ones."""
+        now_s = time.monotonic()
+        new_cycle, self._driven_n = self._feed.n != self._driven_n, self._feed.n
+        for seat in self.table.held.values():
+            seat.delay.stepped(now_s, self._feed.n)
+            if seat.is_silent(now_s):
+                self._let_go(seat)
+            elif new_cycle and not seat.away:
+                self._publish(seat)
+
+    def show(self) -> None:
+        """Tell the pages who has which seat."""
+        now_s, lost = time.monotonic(), self._feed.status.seats_lost
+        self.table.note_absent(lost, now_s)
+        self._hub.set_document('seats', self.table.document(self._drivers(), lost, now_s))
+        for client in self._hub.clients.values():
+            client.drives = self.table.seat_of(client.id) is not None
+            self._feed.pace(client)
+
+    def joined(self, client: Client) -> None:
+        """Give somebody who has come back their seat; take it from whoever only watches now."""
+        held = self.table.seat_of(client.id)
+        if held is not None and not client.rights.drives:
+            self._release(client, held.id)
+        self._return(client)
+        self.show()
+
+    def left(self, client: Client) -> None:
+        """Take the hands of a page that is gone off the controls, at once."""
+        seat = self.table.left(client.id)
+        if seat is not None:
+            self._let_go(seat)
+            self._told.pop(seat.id, None)
+            self._orders.order_seat(SeatDemand(seat.id, left=seat.person))
+        self.show()
+
+    def input(self, client: Client, message: Mapping[str, Any]) -> str:  # noqa: A003
+        """
+        Pass on what hands do.
+
+        :raises InputError: if the client does not have the seat.
+        """
+        seat = self.table.holding(client.id, message['seat'])
+        now_s = time.monotonic()
+        if seat.take(message, now_s):
+            # The newest step, for the one that obeys this is measured from it.
+            self._feed.poll_states()
+            seat.delay.changed(now_s, self._feed.n)
+        self._publish(seat)
+        return ''
+
+    def order(self, client: Client, message: Mapping[str, Any]) -> str:
+        """
+        Do what a page asks about a seat.
+
+        :raises CrgameError: if it cannot be done.
+        """
+        orders = {'claim': self._claim, 'release': self._give_back, 'hand_over': self._offer,
+                  'answer': self._answer, 'ask': self._ask, 'ready': self._ready}
+        if message['type'] not in orders:
+            raise InputError('cannot be done in a live run', str(message['type']))
+        text = orders[message['type']](client, message)
+        self.show()
+        return text
+
+    def claim_for(self, client: Client) -> None:
+        """Put somebody into the first free seat that the game leaves to a cockpit."""
+        if self.table.seat_of(client.id) is not None or not client.rights.drives:
+            return
+        for name, entry in self.table.seats.items():
+            if entry['driver'] == COCKPIT and name not in self.table.held:
+                self._claim(client, {'seat': name})
+                self.show()
+                return
+
+    def gate_seat(self, client: Client) -> str | None:
+        """Name the seat whose readiness a client can declare, None where no run waits for it."""
+        held = self.table.seat_of(client.id)
+        waits = self._feed.n == 0 and self._feed.status.run in WAITS
+        return held.id if waits and held is not None and held.id in self.cockpit_seats else None
+
+    @property
+    def cockpit_seats(self) -> list[str]:
+        """The seats that the game leaves to people at pages."""
+        return [name for name, entry in self.table.seats.items()
+                if entry['driver'] == entry['source'] == COCKPIT]
+
+    def _drivers(self) -> dict[str, str]:
+        return {item.id: item.name for item in self._hub.clients.values() if item.rights.drives}
+
+    def _return(self, client: Client) -> None:
+        """Give the seat back to somebody whose connection was broken."""
+        seat = self.table.seat_kept_for(client.person)
+        if seat is None or not client.key or client.dropped or not client.rights.drives:
+            return
+        held = self.table.held.get(seat)
+        if held is not None and held.person == client.person and held.holder != client.id:
+            # The server has not noticed yet that the old connection is gone.
+            self._let_go(held)
+            del self.table.held[seat]
+            held = None
+        if held is None and seat not in self._awaited:
+            self._sit(client, self.table.claim(client.id, seat, {}, person=client.person))
+
+    def _claim(self, client: Client, message: Mapping[str, Any]) -> str:
+        seat = message['seat']
+        client.device = message.get('device') or client.device
+        if client.rights.seat not in ('', seat):
+            raise CrgameError(f'your link is for {client.rights.seat}; the driver of {seat} can '
+                              'offer it to you')
+        before = self.table.seat_of(client.id)
+        held = self.table.claim(client.id, seat, self._drivers(), person=client.person,
+                                may_displace=client.rights.directs, now_s=time.monotonic())
+        if before is not None and before.id != seat:
+            self._release(client, before.id)
+        self._sit(client, held)
+        return f'you drive {seat}'
+
+    def _sit(self, client: Client, held: HeldSeat) -> None:
+        """Order a seat for somebody, in the place of whoever had it."""
+        tenant = self.table.tenants.get(held.id)
+        person = self._told[held.id] = _person(client)
+        displaced = None if tenant is None or tenant.person.id == person.id else tenant.person.id
+        self._order(SeatDemand(held.id, COCKPIT, person, displaced))
+
+    def _give_back(self, client: Client, message: Mapping[str, Any]) -> str:
+        self._release(client, message['seat'])
+        return f'{message["seat"]} is given back'
+
+    def _release(self, client: Client, seat: str) -> None:
+        held = self.table.release(client.id, seat)
+        if held is not None:
+            self._let_go(held)
+        self._told.pop(seat, None)
+        self._order(SeatDemand(seat, GAME))
+
+    def _offer(self, client: Client, message: Mapping[str, Any]) -> str:
+        seat, to, names = message['seat'], message['to'], self._drivers()
+        if to not in names:
+            raise InputError('is not here any more, or only watches', to)
+        held = self.table.offer(client.id, seat, to)
+        return f'{seat} is offered to {names[to]}' if held.offered_to else f'you keep {seat}'
+
+    def _answer(self, client: Client, message: Mapping[str, Any]) -> str:
+        seat = message['seat']
+        if not message['accept']:
+            self._tell(self.table.decline(client.id, seat).holder,
+                       f'{client.name} does not want {seat}')
+            return f'you do not take {seat}'
+        taken = self.table.seat_of(client.id)
+        before = self.table.accept(client.id, seat, client.person)
+        self._let_go(before)
+        if taken is not None:
+            self._let_go(taken)
+            self.table.held.pop(taken.id, None)
+            self._order(SeatDemand(taken.id, GAME))
+        self._sit(client, self.table.held[seat])
+        self._tell(before.holder, f'{client.name} drives {seat} now')
+        return f'you drive {seat}'
+
+    def _ask(self, client: Client, message: Mapping[str, Any]) -> str:
+        held = self.table.ask(client.id, message['seat'])
+        return f'{self._drivers().get(held.holder, "")} was asked for {held.id}'
+
+    def _ready(self, client: Client, message: Mapping[str, Any]) -> str:
+        seat = self.table.holding(client.id, message['seat']).id
+        if self.gate_seat(client) is None:
+            raise InputError('no run waits for its driver', seat)
+        self._orders.order_seat(
+            SeatDemand(seat, person=_person(client), ready=bool(message['ready'])))
+        return 'you are ready' if message['ready'] else 'you are not ready'
+
+    def _tell(self, client_id: str, text: str) -> None:
+        client = self._hub.clients.get(client_id)
+        if client is not None:
+            self._hub.send_event('notice', {'level': 'info', 'text': text}, only=client)
+
+    def _order(self, demand: SeatDemand) -> None:
+        self._orders.order_seat(demand)
+        self._awaited.note(demand, self.table.seats, self.table.tenants, time.monotonic())
+
+    def _let_go(self, seat: HeldSeat) -> None:
+        """Say once that the hands are off; then silence, on which the seat's watchdog brakes."""
+        seat.let_go()
+        self._publish(seat)
+
+    def _publish(self, seat: HeldSeat) -> None:
+        scenario = self._feed.scenario
+        if scenario is None or self.table.seats.get(seat.id, {}).get('source') != COCKPIT:
+            return
+        scheduler = scenario.game.scheduler
+        command: DriverCommand = seat.command(self._feed.n, scheduler.dt_s)
+        self._commands[seat.id].publish(
+            to_joy(command, scheduler.stamp_ns(self._feed.n), COCKPIT))
+
+
+def _person(client: Client) -> SeatPerson:
+    """Describe somebody by what they have said, and by nothing else."""
+    return SeatPerson(client.person, client.name, client.device, client.browser,
+                      client.rights.role)

@@ -1,0 +1,92 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Who drove in a recorded run, and how long their input took."""
+
+from collections import defaultdict
+from pathlib import Path
+import statistics
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.seat_documents import DRIVERS_TOPIC, DrivingSpell, parse_spells
+from crgame_ros.messages.status_values import read_status
+from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.reader import BagReader
+
+_DIAGNOSTICS = '/diagnostics'
+_DRIVER, _OF_SEAT = 'cockpit_node: ', ' driver'
+
+
+class RecordedDriver(NamedTuple):
+    """
+    One stretch of a run that somebody drove.
+
+    :param spell: who, which seat, from which step to which.
+    :param input_delay_ms: median from the hand to the page's picture [ms]; None if not measured.
+    """
+
+    spell: DrivingSpell
+    input_delay_ms: float | None
+
+
+def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, ...]:
+    """
+    Read who drove in a run from its recording; nobody, in one that does not say it.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if there is no such run in it.
+    """
+    with BagReader(path, parts=True) as reader:
+        topic = reader.topics.get(DRIVERS_TOPIC)
+        if topic is None or not topic.message_count:
+            return ()
+        wanted = read_epoch(reader, epoch).game.epoch
+        spells: tuple[DrivingSpell, ...] = ()
+        delays_ms: dict[tuple[str, str], list[float]] = defaultdict(list)
+        for message in reader.messages([DRIVERS_TOPIC, _DIAGNOSTICS]):
+            content = reader.decode(message).message
+            if message.topic == DRIVERS_TOPIC:
+                spells = _newer(spells, str(content.data), wanted)
+            else:
+                for status in map(read_status, content.status):
+                    if status.name.startswith(_DRIVER) and status.name.endswith(_OF_SEAT):
+                        seat = status.name[len(_DRIVER):-len(_OF_SEAT)]
+                        _note(delays_ms[seat, status.values.get('person', '')],
+                              status.values.get('input_delay_ms', ''))
+    return tuple(RecordedDriver(item, _median(delays_ms.get(
+        (item.seat, '' if item.person is None else item.person.id)))) for item in spells)
+
+
+def _newer(spells: tuple[DrivingSpell, ...], text: str,
+           wanted: int) -> tuple[DrivingSpell, ...]:
+    """Take what a message says of the wanted run: each says all so far."""
+    try:
+        epoch, newer = parse_spells(text)
+    except InputError:
+        # Anybody may have published on this topic.
+        return spells
+    return newer if epoch == wanted else spells
+
+
+def _note(delays_ms: list[float], text: str) -> None:
+    try:
+        delays_ms.append(float(text))
+    except ValueError:
+        # Not measured yet.
+        return
+
+
+def _median(values: list[float] | None) -> float | None:
+    return statistics.median(values) if values else None

@@ -1,0 +1,244 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Two people drive one game in two browsers, over TLS, while others watch and attack."""
+
+from collections.abc import Iterator
+import http.client
+import re
+import signal
+import socket
+import ssl
+import threading
+from typing import Any
+from urllib.parse import urlsplit
+
+from browser_support import Browser, OpenBrowser
+from live_browser_support import Graph, LivePage, PATIENCE_S, THROTTLE
+from live_peer import Peer
+from live_support import is_node, Launcher, ROOT, wait_until
+import numpy as np
+import pytest
+from selenium.common.exceptions import WebDriverException
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+import yaml
+
+TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state', '/seats/drivers')
+HOSTILE = 20
+
+
+@pytest.fixture(scope='module')
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+    """Keep one graph of the example for two people, open by links."""
+    folder = tmp_path_factory.mktemp('people')
+    game = yaml.safe_load((ROOT / 'examples' / 'two_humans.yaml').read_text())
+    game |= {'scenario': str(ROOT / 'scenarios' / 'ZAM_Merge-1_1_T-1.xml'), 'duration': 3600}
+    (folder / 'game.yaml').write_text(yaml.safe_dump(game))
+    with Launcher([folder / 'game.yaml', '--open-cockpit', '--listen', '127.0.0.1'],
+                  folder / 'run', headless=False) as launcher, \
+            Peer(launcher.domain, *TOPICS) as peer:
+        launcher.wait_for('its certificate')
+        peer.wait_until(lambda: peer.games, 'the game')
+        yield Graph(launcher, peer, '')
+
+
+def link(graph: Graph, purpose: str) -> str:
+    """Give a link that was printed."""
+    found = re.search(rf'to {purpose} +(https://\S+)', graph.launcher.text)
+    assert found, graph.launcher.text
+    return found[1]
+
+
+class Person(LivePage):
+    """Somebody who came by a link, in a browser that trusts the certificate."""
+
+    def __init__(self, graph: Graph, browser: Browser, purpose: str, name: str) -> None:
+        super().__init__(graph._replace(address=link(graph, purpose)), browser)
+        if name:
+            field = self.driver.find_element(By.ID, 'my-name')
+            field.send_keys(Keys.CONTROL, 'a')
+            field.send_keys(name, Keys.ENTER)
+
+    def ask(self, **message: Any) -> dict[str, Any]:
+        """Send a request whatever the page's buttons allow, and give the reply."""
+        return dict(self.run_async('return crgame.connection.request(arguments[0]);', message))
+
+
+def throttle(graph: Graph, seat: str) -> float:
+    """Give the throttle that a vehicle obeyed last."""
+    graph.peer.listen()
+    return float(graph.commands(seat)[1][-1, THROTTLE]) \
+        if graph.peer.messages['/timing/cycle'] else np.nan
+
+
+def attack(address: str, number: int) -> None:
+    """Do what a client without a link may try."""
+    host, port = urlsplit(address).hostname or '', urlsplit(address).port or 0
+    context = ssl._create_unverified_context()
+    try:
+        with socket.create_connection((host, port), PATIENCE_S) as plain:
+            if number % 4 == 0:
+                plain.sendall(b'GET / HTTP/1.1\r\n' + b'\x00\xff' * 100)
+                plain.recv(100)
+                return
+            with context.wrap_socket(plain) as peer:
+                if number % 4 == 1:
+                    peer.sendall(b'NONSENSE \x01\r\nHost: :\r\n\r\n')
+                    peer.recv(100)
+                elif number % 4 == 2:
+                    peer.sendall(f'GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: '
+                                 'Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13'
+                                 '\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n'
+                                 .encode())
+                    assert b' 403 ' in peer.recv(100)
+                else:
+                    peer.sendall(f'POST /api/load HTTP/1.1\r\nHost: {host}:{port}\r\nX-Crgame: '
+                                 '1\r\nContent-Length: 2\r\n\r\n{}'.encode())
+                    assert b' 403 ' in peer.recv(100)
+    except OSError:
+        # Thrown out: that is what the test is for.
+        return
+
+
+def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> None:
+    """A whole game: seats, readiness, countdown, a lost page, a spectator, hostile clients."""
+    peer, launcher = graph.peer, graph.launcher
+    anna = Person(graph, new_browser(1000, 640, trusting=True), 'drive hv0', 'Anna')
+    bert = Person(graph, new_browser(1000, 640, trusting=True), 'drive hv1', 'Bert')
+    watcher = Person(graph, new_browser(1000, 640, trusting=True), 'watch', '')
+
+    # A link lets one browser in, and says so to the next.
+    status, text = get(link(graph, 'drive hv0'))
+    assert status == 403 and 'This link has been used' in text
+
+    # Seats: each their own; the server decides, whatever the page shows.
+    anna.claim('hv0')
+    bert.claim('hv1')
+    assert 'your link is for hv1' in bert.ask(type='claim', seat='av0', device='')['text']
+    watcher.wait_for_text('li[data-seat="hv0"]', 'Driven by Anna')
+    for message in ({'type': 'claim', 'seat': 'av0', 'device': ''},
+                    {'type': 'hand_over', 'seat': 'hv0', 'to': 'c1'},
+                    {'type': 'ready', 'seat': 'hv0', 'ready': 1},
+                    *({'type': 'control', 'action': action, 'all': 1}
+                      for action in ('start', 'pause', 'step', 'reset', 'stop')),
+                    {'type': 'rate', 'factor': 0.1}, {'type': 'role', 'role': 'all'},
+                    {'type': 'planner', 'av': 'av0', 'run': 0}):
+        reply = watcher.ask(**message)
+        assert 'spectator' in reply['text'], (message, reply)
+    assert 'only a director can reset the run' in anna.ask(
+        type='control', action='reset')['text']
+    button = watcher.driver.find_element(By.CSS_SELECTOR, '#run-control [data-action="reset"]')
+    assert not button.is_enabled() and 'Only a director' in (button.get_attribute('title') or '')
+
+    # Ready: one is not enough; both are, after the countdown.
+    anna.click('.lobby .primary')
+    bert.wait('crgame.store.seats.hv0.ready', 'her readiness')
+    peer.listen_for(0.5)
+    assert bert.run('return crgame.store.status.n') == 0
+    bert.click('.lobby .primary')
+    watcher.wait('crgame.store.status.countdown_s > 0', 'the countdown')
+    watcher.wait('crgame.store.status.run === "running" && crgame.store.status.n > 10', 'the run')
+
+    # Both drive, each their own vehicle. A driver's P pauses nothing.
+    anna.hold('w')
+    bert.hold('s')
+    graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
+    graph.wait_for_command('hv1', 1, 1.0, 1.0)
+    bert.hold('p')
+    bert.release('p')
+    graph.wait_for_steps(20)
+    anna.release('w')
+    anna.hold('w')
+    watcher.wait('crgame.store.people.filter((person) => person.input_delay_ms > 0).length === 2',
+                 'both delays')
+
+    # Her page is killed: the vehicle brakes by itself, the seat is kept, she comes back to it.
+    own = anna.driver.current_window_handle
+    anna.driver.switch_to.new_window('tab')
+    spare = anna.driver.current_window_handle
+    anna.driver.switch_to.window(own)
+    crash(anna)
+    bert.wait_for_text('li[data-seat="hv0"]', 'Kept for Anna')
+    # The watchdog's gentle brake is 0.15.
+    graph.wait_for_command('hv0', 1, 0.05, 0.16)
+    anna.driver.switch_to.window(spare)
+    ActionBuilder(anna.driver).clear_actions()
+    anna.graph = anna.graph._replace(address=link(graph, 'drive hv0').partition('?')[0])
+    anna.open()
+    anna.wait('crgame.driving.seat === "hv0" && crgame.driving.away === null', 'her seat')
+    anna.hold('w')
+    graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
+
+    # Strangers change nothing.
+    n = peer.n
+    threads = [threading.Thread(target=attack, args=(link(graph, 'watch'), number))
+               for number in range(HOSTILE)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    graph.wait_for_command('hv1', 1, 1.0, 1.0)
+    assert peer.n > n and throttle(graph, 'hv0') == 1.0
+    assert watcher.run('return [crgame.store.seats.hv0.holder_name, '
+                       'crgame.store.seats.hv1.holder_name]') == ['Anna', 'Bert']
+    assert 'Traceback' not in launcher.text + '\n'.join(launcher.errors)
+
+    check_recording(graph)
+    assert bert.browser.console_errors() == watcher.browser.console_errors() == []
+
+
+def crash(person: Person) -> None:
+    """End the process of the present tab."""
+    def kill() -> None:
+        try:
+            person.driver.execute_cdp_cmd('Page.crash', {})
+        except WebDriverException:
+            # Nobody is left to answer.
+            return
+    thread = threading.Thread(target=kill, daemon=True)
+    thread.start()
+    thread.join(5.0)
+
+
+def get(address: str) -> tuple[int, str]:
+    """Open a link as a program does."""
+    parts = urlsplit(address)
+    connection = http.client.HTTPSConnection(
+        parts.netloc, context=ssl._create_unverified_context(), timeout=PATIENCE_S)
+    connection.request('GET', f'{parts.path}?{parts.query}')
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, text
+
+
+def check_recording(graph: Graph) -> None:
+    """End everything, and read from the bag who drove."""
+    from crgame_ros.recording.recorded_drivers import read_drivers
+    launcher = graph.launcher
+    launcher.signal(signal.SIGINT)
+    wait_until(lambda: not any(is_node(pid) for _, pid in launcher.started), 'the end',
+               PATIENCE_S)
+    drivers = [item for item in read_drivers(launcher.out / 'bag')
+               if item.spell.person is not None]
+    assert [(item.spell.seat, item.spell.person.name, item.spell.person.role)
+            for item in drivers if item.spell.until_n is None] == [
+        ('hv1', 'Bert', 'driver'), ('hv0', 'Anna', 'driver')]
+    first = next(item for item in drivers if item.spell.seat == 'hv0')
+    assert first.spell.person.device == 'Keyboard'
+    assert re.fullmatch(r'(Chromium|Chrome) [0-9]+', first.spell.person.browser)
+    assert first.spell.from_n == 0 < (first.spell.until_n or 0)
+    assert all(0.0 < (item.input_delay_ms or 0.0) < 5_000.0 for item in drivers)

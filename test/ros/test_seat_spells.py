@@ -1,0 +1,61 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Who drove from which step to which."""
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.seat_documents import DrivingSpell, parse_spells, SeatPerson
+from crgame_ros.ros.seat_spells import MAX_SPELLS, SeatSpells
+import pytest
+
+ADA, BOB = SeatPerson('p1', 'Ada', 'Keyboard'), SeatPerson('p2', 'Bob', 'G29')
+
+
+def driven(person: SeatPerson | None) -> tuple[str, str, str, SeatPerson | None]:
+    """Give a seat of a cockpit with somebody in it."""
+    return 'hv0', 'cockpit', 'cockpit', person
+
+
+def test_each_stretch_has_its_steps() -> None:
+    """Two people one after the other, an AV taken over in between; the last one goes on."""
+    spells = SeatSpells(3)
+    spells.note(0, [driven(None)])
+    # Before the first step was done: nobody drove a stretch of no steps.
+    spells.note(0, [driven(ADA)])
+    spells.note(40, [driven(ADA), ('av0', 'cockpit', 'idm', BOB)])
+    spells.note(70, [driven(ADA)])
+    spells.note(90, [driven(BOB)])
+    epoch, told = parse_spells(spells.document())
+    assert epoch == 3 and told == (
+        DrivingSpell('hv0', 'cockpit', 'cockpit', ADA, 0, 90),
+        DrivingSpell('av0', 'cockpit', 'idm', BOB, 40, 70),
+        DrivingSpell('hv0', 'cockpit', 'cockpit', BOB, 90))
+
+
+def test_a_flood_of_changes_is_bounded() -> None:
+    """Any peer may order a seat ten times a cycle."""
+    spells = SeatSpells(0)
+    for n in range(2 * MAX_SPELLS):
+        spells.note(n, [driven(ADA if n % 2 else BOB)])
+    assert len(parse_spells(spells.document())[1]) == MAX_SPELLS
+
+
+@pytest.mark.parametrize('text', [
+    '', '[]', '{"epoch": 0}', '{"epoch": 0, "drivers": [{"seat": "hv0"}]}',
+    '{"epoch": 0, "drivers": [{"seat": "x", "source": "", "driver": "", "person": null, '
+    '"from_n": 0, "until_n": null}]}'])
+def test_what_is_no_such_document_is_refused(text: str) -> None:
+    """Recordings hold what any peer has published."""
+    with pytest.raises(InputError, match='/seats/drivers: is not what the contract says'):
+        parse_spells(text)
