@@ -124,7 +124,7 @@ def test_it_begins_with_a_click_and_is_silent_in_a_pause(page: Served, browser: 
     assert browser.run('return crgame.sound.heard.own.id') == 'hv0'
     assert browser.run('return heardPeak()[1]') < 1.0
     client = next(iter(page.backend.hub.clients.values()))
-    assert client.sound.on and client.sound.volume == pytest.approx(0.6)
+    assert client.sound.on and client.sound.volume == pytest.approx(0.7)
     page.control('pause')
     silent(browser)
     page.control('start')

@@ -12,9 +12,9 @@ import { speedShare } from './drive_train.js';
 
 /** @import { DriveTrain } from './drive_train.js' */
 
-const TYRES = { amplitude: 0.11, at: 30, exponent: 1.75 };
-const WIND = { amplitude: 0.09, at: 40, exponent: 3 };
-const LOUDEST_WIND = 0.3;
+const TYRES = { amplitude: 0.07, at: 30, exponent: 1.75 };
+const WIND = { amplitude: 0.06, at: 40, exponent: 3 };
+const LOUDEST_WIND = 0.2;
 // Decelerations at which brakes begin to squeal and do so at their loudest [m/s^2].
 const SQUEAL_FROM = 5;
 const SQUEAL_FULL = 8;

@@ -13,16 +13,16 @@ import { arrival, RANGE_M } from './hearing.js';
 
 /** So many others are heard at once: the nearest. */
 export const MOST_OTHERS = 6;
-/** What the column `lights` of a vehicle says, bit by bit. */
-export const LIGHTS = Object.freeze({ left: 1, right: 2, horn: 4 });
 
 // A vehicle that is longer is a lorry or a bus [m].
 const LONG_M = 7.5;
 // Where a driver's head is: shares of the wheelbase ahead of the rear axle, and of the width left.
 const HEAD_AHEAD = 0.45;
 const HEAD_LEFT = 0.2;
-// Where no pedal is told the throttle is guessed: what holds a speed, and what gains more [s^2/m].
+// Where no pedal is told the throttle is guessed: what holds a speed, less below some [m/s], and
+// what gains more [s^2/m].
 const HOLDING = 0.15;
+const HELD_FROM = 5;
 const THROTTLE_PER_ACCELERATION = 0.25;
 // Of CommonRoad's types those that are no cars; null has no engine.
 /** @type {Record<string, DriveTrain|null|undefined>} */
@@ -41,7 +41,7 @@ const TYPES = {
  * @property {number} speed without a sign [m/s]
  * @property {number} deceleration against the motion [m/s^2]
  * @property {number} lateral acceleration, to the left [m/s^2]
- * @property {number} lights bits of LIGHTS
+ * @property {number} lights bits of LIGHT
  */
 
 /**
@@ -99,13 +99,13 @@ export class Listener {
     const train = trainOf(vehicle);
     const along = (rows[at + VEHICLE.acceleration] || 0) * (Math.sign(signed) || 1);
     const pedal = rows[at + VEHICLE.throttle];
-    const throttle = Number.isFinite(pedal) ? pedal : guessThrottle(along);
+    const throttle = Number.isFinite(pedal) ? pedal : guessThrottle(Math.abs(signed), along);
     const reverse = signed < 0 || (signed === 0 && rows[at + VEHICLE.reverse] > 0.5);
     const speed = Math.abs(signed);
     return {
       id: vehicle.id, train, ...this.#engine(vehicle.id, train, speed, throttle, reverse),
       load: throttle, speed, deceleration: -along,
-      lateral: signed * (rows[at + VEHICLE.yaw_rate] || 0), lights: lightsOf(rows, at),
+      lateral: signed * (rows[at + VEHICLE.yaw_rate] || 0), lights: rows[at + VEHICLE.lights] || 0,
     };
   }
 
@@ -119,9 +119,10 @@ export class Listener {
     const train = trainOfObject(object);
     const { vx, vy } = objectAt(rows, column);
     const speed = Math.hypot(vx, vy);
+    const throttle = guessThrottle(speed, 0);
     return train === null || !Number.isFinite(speed) ? null : {
-      id: object.id, train, ...this.#engine(object.id, train, speed, HOLDING, false),
-      load: HOLDING, speed, deceleration: 0, lateral: 0, lights: 0,
+      id: object.id, train, ...this.#engine(object.id, train, speed, throttle, false),
+      load: throttle, speed, deceleration: 0, lateral: 0, lights: 0,
     };
   }
 
@@ -152,7 +153,7 @@ export class Listener {
     scene.vehicles.forEach((vehicle, index) => {
       all.push({ id: vehicle.id, train: trainOf(vehicle),
         source: centreOf(vehicle, vehicles, index),
-        lights: lightsOf(vehicles, index * VEHICLE_WIDTH) });
+        lights: vehicles[index * VEHICLE_WIDTH + VEHICLE.lights] || 0 });
     });
     scene.objects.forEach((object, column) => {
       const train = trainOfObject(object);
@@ -167,7 +168,8 @@ export class Listener {
       .filter(({ distance }) => distance < RANGE_M)
       .sort((a, b) => a.distance - b.distance).slice(0, MOST_OTHERS)
       .map((other) => ({ ...other,
-        rpm: this.#engine(other.id, other.train, other.speed, HOLDING, false).rpm }));
+        rpm: this.#engine(other.id, other.train, other.speed, guessThrottle(other.speed, 0), false)
+          .rpm }));
   }
 }
 
@@ -190,18 +192,13 @@ function trainOfObject({ type, role, shape }) {
     : known ?? (shape.length > LONG_M ? HEAVY : CAR);
 }
 
-/** @param {number} acceleration along the motion [m/s^2] */
-function guessThrottle(acceleration) {
-  return Math.min(Math.max(HOLDING + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
-}
-
 /**
- * @param {Float64Array} rows
- * @param {number} at where the vehicle's row begins
+ * @param {number} speed without a sign [m/s]
+ * @param {number} acceleration along the motion [m/s^2]
  */
-function lightsOf(rows, at) {
-  const column = /** @type {Record<string, number|undefined>} */ (VEHICLE).lights;
-  return column === undefined ? 0 : rows[at + column] || 0;
+function guessThrottle(speed, acceleration) {
+  const holding = HOLDING * Math.min(speed / HELD_FROM, 1);
+  return Math.min(Math.max(holding + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
 }
 
 /**

@@ -2,19 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Somebody who passes by: engine, tyres and horn, from a side, from afar, shifted in pitch. */
 
+import { LIGHT } from '../lights.js';
 import { tone_Hz } from './drive_train.js';
 import { attenuation } from './hearing.js';
 import { Horn } from './horn.js';
 import { engineLevel, tyreLevel } from './levels.js';
-import { LIGHTS } from './listener.js';
 import { engineWave, mainPartial, makeFilter, makeGain, playNoise, Value } from './voices.js';
 
 /** @import { Other } from './listener.js' */
 
 // Outside, tyres are louder, and engines little, beside what each is inside.
-const TYRES = 5;
-const ENGINE = 0.7;
+const TYRES = 14;
+const ENGINE = 1.2;
 const LOAD = 0.4;
+// One hears with both ears what is at one side.
+const ASIDE = 0.85;
 const BAND_Hz = 750;
 // How much of the treble a cabin lets in.
 const CABIN_Hz = 2200;
@@ -88,7 +90,7 @@ export class OtherVoice {
     const frequency = doppler * tone_Hz(train, rpm) / mainPartial(train);
     if (id !== this.id) {
       this.id = id;
-      this.#begin(frequency, doppler, pan, when);
+      this.#begin(frequency, doppler, ASIDE * pan, when);
     }
     if (train.name !== this.#train) {
       this.#train = train.name;
@@ -98,8 +100,8 @@ export class OtherVoice {
     this.#rate.to(doppler, when);
     this.#engineGain.to(ENGINE * engineLevel(train, rpm, LOAD), when);
     this.#tyreGain.to(TYRES * tyreLevel(speed), when);
-    this.#horn.update((lights & LIGHTS.horn) !== 0, doppler, when);
-    this.#pan.to(pan, when);
+    this.#horn.update((lights & LIGHT.horn) !== 0, doppler, when);
+    this.#pan.to(ASIDE * pan, when);
     this.#level.to(attenuation(distance), when);
   }
 

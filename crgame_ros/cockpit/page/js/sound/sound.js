@@ -18,7 +18,7 @@ import { Speaker } from './speaker.js';
 // Ears do not need every frame of the picture [ms].
 const EVERY_MS = 30;
 const KEY = 'KeyM';
-const VOLUME = 0.6;
+const VOLUME = 0.7;
 const RUMBLE = 0.5;
 // A time that moves farther between two looks was jumped to [s].
 const JUMP_S = 0.5;

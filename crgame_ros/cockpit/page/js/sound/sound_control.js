@@ -26,7 +26,8 @@ export function createSoundControl(root, sound) {
   const volume = slider(sound, 'volume', 'Volume');
   const rumble = slider(sound, 'rumble', 'Rumble');
   const motors = element('p', { class: 'sound-note' });
-  const panel = element('div', { id: 'sound-panel', popover: 'auto', 'aria-label': 'Sound' },
+  const panel = element('div',
+    { id: 'sound-panel', popover: 'auto', role: 'group', 'aria-label': 'Sound' },
     toggle, told, volume.node, rumble.node, motors);
   let picture = '';
   const show = () => {

@@ -7,10 +7,11 @@
  * ends below 1, and the gate gives at most 1: no sample is ever beyond full scale.
  */
 
+import { LIGHT, shining } from '../lights.js';
 import { EngineVoice } from './engine_voice.js';
 import { Horn } from './horn.js';
 import { impact } from './levels.js';
-import { LIGHTS, MOST_OTHERS } from './listener.js';
+import { MOST_OTHERS } from './listener.js';
 import { OtherVoice } from './other_voice.js';
 import { RoadVoice } from './road_voice.js';
 import { Strikes } from './strikes.js';
@@ -25,8 +26,6 @@ const CLIP_RANGE = 4;
 const KNEE = 0.8;
 const CEILING = 0.98;
 const FADE_S = 0.04;
-/** Of indicators, as UN R48 has them: 90 a minute [Hz]. */
-export const BLINKS_Hz = 1.5;
 
 /** @typedef {{collision: boolean, offRoad: boolean}} Trouble of one's own vehicle */
 
@@ -43,7 +42,6 @@ export class SoundGraph {
   /** @type {Trouble|null} */
   #trouble = null;
   #lit = false;
-  #blinking = false;
   #fading = { from: 0, to: 0, at: 0 };
 
   /** @param {BaseAudioContext} context */
@@ -99,24 +97,23 @@ export class SoundGraph {
   update({ t, own, others }, trouble, when) {
     this.#engine.update(own, when);
     this.#road.update({ ...own, offRoad: trouble.offRoad }, when);
-    this.#horn.update((own.lights & LIGHTS.horn) !== 0, 1, when);
-    this.#blink((own.lights & (LIGHTS.left | LIGHTS.right)) !== 0, t, when);
+    this.#horn.update((own.lights & LIGHT.horn) !== 0, 1, when);
+    this.#blink(own.lights, t, when);
     this.#strike(trouble, own.speed, when);
     this.#lend(others, when);
   }
 
   /**
-   * @param {boolean} blinking
+   * @param {number} lights
    * @param {number} t simulation time [s]
    * @param {number} when
    */
-  #blink(blinking, t, when) {
-    const lit = blinking && t * BLINKS_Hz % 1 < 0.5;
-    if (lit !== this.#lit && (blinking || this.#blinking)) {
-      this.#strikes.click(lit, when);
+  #blink(lights, t, when) {
+    const { left, right } = shining(lights, t);
+    if ((left || right) !== this.#lit) {
+      this.#lit = left || right;
+      this.#strikes.click(this.#lit, when);
     }
-    this.#lit = lit;
-    this.#blinking = blinking;
   }
 
   /**

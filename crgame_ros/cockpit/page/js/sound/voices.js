@@ -9,7 +9,7 @@ const SETTLE_S = 0.025;
 const NOISE_S = 3;
 // Less than this cannot be heard: no event for it.
 const SAME = 2e-4;
-const PARTIALS = 48;
+const PARTIALS = 128;
 
 /** One value of an audio node, moved smoothly. */
 export class Value {
