@@ -97,7 +97,7 @@ def drawn(page: Browser) -> dict[str, Any]:
 def last_frame(page: Browser) -> dict[str, Any]:
     """Take the frame that the world has drawn last."""
     frame: dict[str, Any] = page.run(DRAWN)
-    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, 12)
+    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, 13)
     frame['objects'] = np.array(frame['objects'], dtype=float).reshape(-1, 6)
     return frame
 

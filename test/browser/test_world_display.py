@@ -56,7 +56,7 @@ def page(run: RecordedRun, browser: Browser) -> Iterator[Served]:
 def shown(browser: Browser) -> dict[str, Any]:
     """Take the last frame as it was drawn."""
     frame: dict[str, Any] = browser.run(SHOWN)
-    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, 12)
+    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, 13)
     frame['objects'] = np.array(frame['objects'], dtype=float).reshape(-1, 6)
     return frame
 

@@ -43,7 +43,7 @@ FloatArray = NDArray[np.float64]
 
 class RecordedRun:
     """
-    A game's run, computed offline: (n, V, 12) states at all steps, (ticks, M, 6) objects.
+    A game's run, computed offline: (n, V, 13) states at all steps, (ticks, M, 6) objects.
 
     :param path: game file.
     :param duration_s: simulated.
@@ -58,7 +58,7 @@ class RecordedRun:
             setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
         self.scene = scene_document(setup.loaded, setup.descriptions, game)
         count, vehicles, columns = result.vehicle_states.shape
-        self.states: FloatArray = np.full((count, vehicles, 12), np.nan)
+        self.states: FloatArray = np.full((count, vehicles, 13), np.nan)
         self.states[:, :, :columns] = result.vehicle_states
         self.states[:, :len(setup.humans), 8:] = result.commands
         self.objects: FloatArray = np.concatenate(
