@@ -23,6 +23,7 @@ from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Keyed, Listed, Within, Wording
 from crgame_ros.study.local_text import LocalText, Text
+from crgame_ros.study.names import ColumnName
 
 _SEE = 'see docs/studies.md for the keys'
 MOST_CHARACTERS = 20_000
@@ -191,8 +192,7 @@ class Question:
 
     FORM: ClassVar[Form] = Form(_SEE, first=('name', 'ask'))
 
-    name: Annotated[str, Wording('[a-z][a-z0-9_]{0,39}',
-                                 'begin with a letter a-z, then letters, digits and _')]
+    name: ColumnName
     kind: Annotated[QuestionKind, Keyed(KINDS, 'kind of answer')]
     ask: Annotated[Text, Advice('say what is asked')] = LocalText()
     required: bool = True

@@ -23,16 +23,15 @@ from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
-from crgame_ros.schema.marks import Listed, Wording
+from crgame_ros.schema.marks import Listed
 from crgame_ros.schema.reading import read
 from crgame_ros.study.local_text import LocalText, Text
+from crgame_ros.study.names import ColumnName
 from crgame_ros.study.question import Answer, ChoiceQuestion, Question
 from crgame_ros.yaml_text import read_yaml
 
 SCALES = Path(__file__).resolve().parent / 'scales'
 _SEE = 'see docs/studies.md for the keys'
-Name = Annotated[str, Wording('[a-z][a-z0-9_]{0,39}',
-                              'begin with a letter a-z, then letters, digits and _')]
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ class Score:
 
     FORM: ClassVar[Form] = Form(_SEE)
 
-    name: Name
+    name: ColumnName
     items: Annotated[tuple[str, ...], Listed(1, noun='item')]
     how: Literal['mean', 'sum', 'tally'] = 'mean'
     factor: float = 1.0
@@ -95,7 +94,7 @@ class Questionnaire:
 
     FORM: ClassVar[Form] = Form(_SEE)
 
-    name: Name
+    name: ColumnName
     questions: Annotated[tuple[Question, ...], Listed(1, 200, 'question', 'name')]
     title: Text = LocalText()
     text: Text = LocalText()
