@@ -81,7 +81,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'drivers': {human.id: human.driver for human in game.humans},
         'planners': {av.id: av.planner for av in game.avs},
         'occupancy': game.occupancy is not None,
-        'events': list(game.event_entries)}
+        'events': list(game.event_entries), 'sound': game.sound}
     finite: Document = _finite(document)
     return finite
 
@@ -174,6 +174,7 @@ def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) 
     return {'id': item.id, 'role': role, 'shape': _shape(vehicle.shape),
             'rear_to_center': vehicle.rear_to_center, 'wheelbase': vehicle.wheelbase,
             'max_steering_angle': vehicle.max_steering_angle,
+            'powertrain': vehicle.powertrain,
             'perception': None if perception is None else _perception(perception)}
 
 

@@ -76,6 +76,7 @@ class GameDocument:
     :param events: the game's events.
     :param event_entries: the same, as pages are told.
     :param file: text of the game file; empty where there is none.
+    :param sound: on or none: whether pages may sound and gamepads rumble.
     """
 
     epoch: int
@@ -95,6 +96,7 @@ class GameDocument:
     events: tuple[EventSpec, ...]
     event_entries: tuple[Any, ...]
     file: str
+    sound: str
 
     @property
     def vehicles(self) -> tuple[DrivenVehicle, ...]:
@@ -146,7 +148,7 @@ def parse_game_document(text: str) -> GameDocument:
                 TrafficSpec, traffic, f'{GAME_TOPIC}: traffic'),
             occupancy=None if occupancy is None else Path(occupancy),
             events=parse_document_entries(events, GAME_TOPIC), event_entries=tuple(events),
-            file=str(content.get('file') or ''))
+            file=str(content.get('file') or ''), sound=str(content.get('sound') or 'on'))
     except MALFORMED as error:
         raise InputError(f'is no game document ({type(error).__name__}: {error})',
                          GAME_TOPIC) from error

@@ -284,6 +284,7 @@ class Game:
     :param objects: objects of the game's own (FS II-A3).
     :param traffic: vehicles that react (FS III); None for none.
     :param occupancy: map of permanent obstacles (FS II-A2).
+    :param sound: whether pages may sound and gamepads rumble; `none` for a study without.
     """
 
     FORM: ClassVar[Form] = Form(
@@ -304,6 +305,8 @@ class Game:
     objects: Annotated[ObjectList, LeftOut()] = ()
     traffic: TrafficSpec | None = None
     occupancy: Annotated[Path, Advice('name the YAML file of a map')] | None = None
+    # YAML reads a bare on as a truth value.
+    sound: Annotated[Literal['on', 'none'], Meaning(True, 'on'), LeftOut()] = 'on'
 
     def _repr_html_(self) -> str:
         """Show it in a notebook as its file says it."""

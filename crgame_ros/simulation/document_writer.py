@@ -67,6 +67,7 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
         'objects': write(game.objects),
         'traffic': write(game.traffic),
         'occupancy': write(game.occupancy),
+        'sound': game.sound,
         'file': dump_game(game)}
     return json.dumps(document, allow_nan=False)
 

@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 import functools
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
@@ -73,6 +73,7 @@ class VehicleParameters:
     :param air_density: [kg/m^3]
     :param gravity: [m/s^2]
     :param longitudinal_lag: tau_long of CRG 25: drivetrain and brakes [s]
+    :param powertrain: what it sounds like in the cockpit; it drives alike.
     """
 
     FORM: ClassVar[Form] = Form('see config/vehicles/bmw_320i.yaml')
@@ -103,6 +104,7 @@ class VehicleParameters:
     air_density: Share
     gravity: Positive
     longitudinal_lag: Positive
+    powertrain: Literal['combustion', 'electric'] = 'combustion'
 
     @property
     def shape(self) -> Shape:

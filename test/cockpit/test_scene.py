@@ -103,6 +103,7 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
     # BMW 320i, CommonRoad vehicle 2.
     assert document['vehicles'][0] == {
         'id': 'hv0', 'role': 'human', 'max_steering_angle': 0.91, 'perception': None,
+        'powertrain': 'combustion',
         'rear_to_center': pytest.approx(1.4227, abs=5e-5),
         'wheelbase': pytest.approx(2.5789, abs=5e-5),
         'shape': {'kind': 'rectangle', 'length': 4.508, 'width': 1.61, 'vertices': []}}
@@ -111,6 +112,20 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
         'duration_s': setup.game.duration}
     assert document['planners'] == {'av0': 'idm', 'av1': 'idm'}
     assert document['drivers'] == {'hv0': setup.humans[0].driver}
+
+
+def test_what_sounds_and_what_does_not_is_told() -> None:
+    setup = build_setup(load_game(scenarios_directory() / 'two_avs.yaml'))
+    assert document_of(setup)['sound'] == 'on'
+    # Of a recording that is older than the key.
+    assert document_of(setup, sound=None)['sound'] == 'on'
+    setup = replace(setup, game=replace(setup.game, sound='none'), humans=tuple(
+        replace(human, vehicle=replace(human.vehicle, powertrain='electric'))
+        for human in setup.humans))
+    document = document_of(setup)
+    assert document['sound'] == 'none'
+    assert [item['powertrain'] for item in document['vehicles']] == [
+        'electric', 'combustion', 'combustion']
 
 
 def test_the_reach_of_an_avs_sensors_is_told() -> None:

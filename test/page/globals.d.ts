@@ -7,6 +7,7 @@ import type { Driving } from '../../crgame_ros/cockpit/page/js/driving/driving.j
 import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
 import type { createPerception } from
   '../../crgame_ros/cockpit/page/js/perception/perception.js';
+import type { Sound } from '../../crgame_ros/cockpit/page/js/sound/sound.js';
 import type { Store } from '../../crgame_ros/cockpit/page/js/store.js';
 import type { View3d } from '../../crgame_ros/cockpit/page/js/view3d/view3d.js';
 import type { World } from '../../crgame_ros/cockpit/page/js/world/world.js';
@@ -18,6 +19,7 @@ interface Crgame {
   world: World;
   driving?: Driving;
   perception?: ReturnType<typeof createPerception>;
+  sound?: Sound;
   view3d?: View3d;
   ready?: boolean;
   [part: string]: unknown;

@@ -29,6 +29,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_seats_document
 from crgame_ros.nodes.cockpit.cockpit_feed import CockpitFeed
 from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.nodes.cockpit.sound_report import SoundReport
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.ros_messages import to_joy
 from crgame_ros.ros.seats import GAME
@@ -63,6 +64,7 @@ class LiveBackend:
         self._runs = runs
         self._endpoints = Endpoints(node)
         self._orders = CockpitOrders(node, self._endpoints)
+        self._sound_report = SoundReport(self._endpoints.diagnostics)
         self._seat_slot = self._endpoints.polled('/seats')
         self._commands: dict[str, Publisher] = {}
         self._table = SeatTable()
@@ -119,6 +121,10 @@ class LiveBackend:
         self._table.update(self._table.seats, self._awaited)
         # People come and change their names.
         self._show_seats()
+        if self._feed.scenario is not None:
+            self._sound_report.tell(
+                self._table.held.values(), self._hub.clients,
+                self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 
     def _drive(self) -> None:
         """Send the command of each held seat for a new cycle; let go of silent ones."""

@@ -13,6 +13,7 @@ const PARTS = [
   ['./driving/driving.js', 'createDriving', '#hud', 'driving'],
   ['./run_control.js', 'createRunControl', '#bar', 'runControl'],
   ['./panels/settings.js', 'createSettings', '#bar-end', 'settings'],
+  ['./sound/sound.js', 'createSound', '#bar-end', 'sound'],
   ['./panels/title.js', 'createTitle', '#title', 'title'],
   ['./panels/alarms.js', 'createAlarms', '#alarms', 'alarms'],
   ['./panels/tabs.js', 'createTabs', '#panels', 'panels'],

@@ -50,6 +50,7 @@ export {};
  * @property {number} rear_to_center [m]
  * @property {number} wheelbase [m]
  * @property {number} max_steering_angle [rad]
+ * @property {'combustion'|'electric'} powertrain
  * @property {{localisation: boolean, sensors: string[], range: number|null}|null} perception
  *   range [m], null for no limit
  */
@@ -122,6 +123,7 @@ export {};
  * @property {Record<string, string>} planners
  * @property {boolean} occupancy whether there is a map of permanent obstacles
  * @property {GameEvent[]} events
+ * @property {'on'|'none'} sound whether pages may sound and gamepads rumble
  * @property {number} [again] counts how often a recording was played
  */
 
@@ -259,13 +261,15 @@ export {};
 /**
  * What the page sends.
  *
- * @typedef {{away: true}|{keys: number[], reverse: number}
- *   |{axes: number[], reverse: number}} Hands
+ * @typedef {{away: true}|{keys: number[], reverse: number, lights: number[]}
+ *   |{axes: number[], reverse: number, lights: number[]}} Hands  `lights`: which of LIGHT_BUTTONS
+ *   are held
  * @typedef {'start'|'pause'|'step'|'reset'|'stop'} RunAction
  * @typedef {{type: 'input', seat: string} & Hands} InputMessage
  * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
  *   scans?: boolean}} LayersMessage
- * @typedef {InputMessage|LayersMessage|{type: 'name', name: string}
+ * @typedef {{type: 'sound', on: number, volume: number, rumble: number}} SoundMessage
+ * @typedef {InputMessage|LayersMessage|SoundMessage|{type: 'name', name: string}
  *   |{type: 'ping', t: number}} TellingMessage
  * @typedef {{type: 'claim'|'release'|'ask', seat: string}
  *   |{type: 'hand_over', seat: string, to: string}|{type: 'control', action: RunAction}

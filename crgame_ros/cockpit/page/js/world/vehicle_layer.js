@@ -3,6 +3,7 @@
 /** Humans' vehicles, AVs, obstacles and pedestrians, where they are shown at this moment. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { shining } from '../lights.js';
 import { drawOutline } from './hollow.js';
 import { lookOf, TYRE } from './vehicle_shape.js';
 
@@ -180,6 +181,10 @@ export class VehicleLayer {
       drawTyres(context, view, vehicle, x, y, yaw,
         shown.vehicles[row + VEHICLE.steering_angle]);
     }
+    if (!hollow && shown.vehicles[row + VEHICLE.lights] > 0) {
+      camera.enterPose(context, ratio, x, y, yaw, factor);
+      drawLights(context, view, vehicle, shown.vehicles[row + VEHICLE.lights]);
+    }
     const trouble = store.status?.drivability?.[vehicle.id];
     if (trouble?.collision || store.seats[vehicle.id]?.holder === store.me.id) {
       camera.enterPose(context, ratio, x, y, yaw, factor);
@@ -257,6 +262,37 @@ function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, stee
       y + along * Math.sin(yaw) + left * Math.cos(yaw), yaw + steering);
     context.fill(TYRE);
     context.stroke(TYRE);
+  }
+}
+
+/**
+ * Indicators at the corners, and the sound of the horn as arcs before the front.
+ *
+ * @param {CanvasRenderingContext2D} context in the vehicle's coordinates
+ * @param {LiveView} view
+ * @param {DrawnVehicle} vehicle
+ * @param {number} lights
+ */
+function drawLights(context, { shown, palette }, { look }, lights) {
+  const { left, right, horn } = shining(lights, shown.t);
+  context.fillStyle = palette.indicator;
+  context.strokeStyle = palette.outline;
+  context.lineWidth = 0.08;
+  for (const [on, path] of /** @type {const} */ ([
+    [left, look.indicators?.left], [right, look.indicators?.right]])) {
+    if (on && path !== undefined) {
+      context.fill(path);
+      context.stroke(path);
+    }
+  }
+  if (horn) {
+    context.strokeStyle = palette.indicator;
+    context.lineWidth = 0.25;
+    for (const away of [0.8, 1.6]) {
+      context.beginPath();
+      context.arc(look.extent / 2 - 0.6, 0, 0.6 + away, -0.7, 0.7);
+      context.stroke();
+    }
   }
 }
 
