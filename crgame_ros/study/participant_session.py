@@ -27,6 +27,7 @@ from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_journal import SessionJournal
 from crgame_ros.study.session_script import Fields, PracticeDrives, session_of, SessionItem
 from crgame_ros.study.study_file import Page, Questions, StudyFile
+from crgame_ros.study.study_pages import questionnaire_name
 from crgame_ros.study.trial_plan import PlannedTrial
 
 
@@ -124,10 +125,7 @@ class ParticipantSession:
         if isinstance(item.what, Fields):
             return self.study.fields
         if isinstance(item.what, Questions):
-            name = item.what.name
-            file = self.study.base / name
-            return load_questionnaire(str(file) if name.endswith(('.yaml', '.yml')) else name
-                                      ).questions
+            return load_questionnaire(questionnaire_name(self.study, item.what)).questions
         return ()
 
     def finish(self, answers: Mapping[str, Any] | None = None, **told: Any) -> SessionItem:
