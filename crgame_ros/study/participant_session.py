@@ -31,7 +31,7 @@ from crgame_ros.study.study_pages import questionnaire_name
 from crgame_ros.study.trial_plan import PlannedTrial
 
 
-class Entry(StrEnum):
+class SessionEvent(StrEnum):
     """What an entry of the journal says."""
 
     BEGUN = 'begun'
@@ -67,11 +67,11 @@ class ParticipantSession:
         self._clock_s = clock_s
         self.journal = SessionJournal(folder)
         begun = next((entry for entry in self.journal.entries
-                      if entry['entry'] == Entry.BEGUN), None)
+                      if entry['entry'] == SessionEvent.BEGUN), None)
         mine = {'participant': participant, 'place': place,
                 'items': [item.id for item in self.items]}
         if begun is None:
-            self._add(Entry.BEGUN, **mine)
+            self._add(SessionEvent.BEGUN, **mine)
         elif {name: begun[name] for name in mine} != mine:
             self.journal.close()
             raise InputError('began with another plan', str(folder),
@@ -89,23 +89,23 @@ class ParticipantSession:
         """Name the items that are finished or skipped."""
         found: set[str] = set()
         for entry in self.journal.entries:
-            if entry['entry'] in (Entry.FINISHED, Entry.SKIPPED):
+            if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
                 found.add(entry['item'])
-            elif entry['entry'] == Entry.REPEATED:
+            elif entry['entry'] == SessionEvent.REPEATED:
                 found.discard(entry['item'])
         return frozenset(found)
 
     @property
     def next_item(self) -> SessionItem | None:
         """Give what is to be done now; None at the end, or once somebody has ended it."""
-        if any(entry['entry'] == Entry.ENDED for entry in self.journal.entries):
+        if any(entry['entry'] == SessionEvent.ENDED for entry in self.journal.entries):
             return None
         done = self.done
         return next((item for item in self.items if item.id not in done), None)
 
     def attempts(self, item: str) -> int:
         """Count how often an item was started."""
-        return sum(entry['entry'] == Entry.STARTED and entry['item'] == item
+        return sum(entry['entry'] == SessionEvent.STARTED and entry['item'] == item
                    for entry in self.journal.entries)
 
     def start(self, run: str = '') -> int:
@@ -117,7 +117,7 @@ class ParticipantSession:
         """
         item = self._now()
         attempt = self.attempts(item.id) + 1
-        self._add(Entry.STARTED, item=item.id, attempt=attempt, run=run)
+        self._add(SessionEvent.STARTED, item=item.id, attempt=attempt, run=run)
         return attempt
 
     def questions(self, item: SessionItem) -> tuple[Question, ...]:
@@ -144,7 +144,7 @@ class ParticipantSession:
         if isinstance(item.what, PlannedTrial) and not self.attempts(item.id):
             raise InputError('has not begun', item.id, 'start it first')
         taken = check_answers(self.questions(item), answers or {}, item.id)
-        self._add(Entry.FINISHED, item=item.id, answers=taken, **told)
+        self._add(SessionEvent.FINISHED, item=item.id, answers=taken, **told)
         return item
 
     def practised(self, good: bool, **told: Any) -> bool:
@@ -157,43 +157,43 @@ class ParticipantSession:
         item = self._now()
         if not isinstance(item.what, PracticeDrives):
             raise InputError('is no practice', item.id, 'finish it')
-        self._add(Entry.PRACTISED, item=item.id, good=good, **told)
+        self._add(SessionEvent.PRACTISED, item=item.id, good=good, **told)
         drives = [entry['good'] for entry in self.journal.entries
-                  if entry['entry'] == Entry.PRACTISED and entry['item'] == item.id]
+                  if entry['entry'] == SessionEvent.PRACTISED and entry['item'] == item.id]
         practice = item.what.practice
         over = len(drives) >= practice.at_least and (
             good or 0 < practice.at_most <= len(drives))
         if over:
-            self._add(Entry.FINISHED, item=item.id, answers={}, drives=len(drives))
+            self._add(SessionEvent.FINISHED, item=item.id, answers={}, drives=len(drives))
         return over
 
     def abort(self, reason: str) -> None:
         """Say that the present attempt of the next item counts for nothing; it comes again."""
-        self._add(Entry.ABORTED, item=self._now().id, reason=reason)
+        self._add(SessionEvent.ABORTED, item=self._now().id, reason=reason)
 
     def skip(self, reason: str) -> None:
         """Leave the next item out, for a reason."""
         if not reason.strip():
             raise InputError('needs a reason', self._now().id, 'say why it is left out')
-        self._add(Entry.SKIPPED, item=self._now().id, reason=reason)
+        self._add(SessionEvent.SKIPPED, item=self._now().id, reason=reason)
 
     def repeat(self, item: str, reason: str) -> None:
         """Let an item that is done come again: what was told of it before stays in the journal."""
         if item not in self._ids or item not in self.done:
             raise InputError('is not done', item[:60], 'name an item that is')
-        self._add(Entry.REPEATED, item=item, reason=reason)
+        self._add(SessionEvent.REPEATED, item=item, reason=reason)
 
     def note(self, text: str, **told: Any) -> None:
         """Keep what the experimenter remarks."""
-        self._add(Entry.NOTE, text=text, **told)
+        self._add(SessionEvent.NOTE, text=text, **told)
 
     def mark(self, name: str, **told: Any) -> None:
         """Keep a marker of the experimenter's or of a secondary task."""
-        self._add(Entry.MARKER, name=name, **told)
+        self._add(SessionEvent.MARKER, name=name, **told)
 
     def end(self, reason: str) -> None:
         """End the session before its last item; it does not go on any more."""
-        self._add(Entry.ENDED, reason=reason)
+        self._add(SessionEvent.ENDED, reason=reason)
 
     def _now(self) -> SessionItem:
         item = self.next_item
@@ -201,5 +201,5 @@ class ParticipantSession:
             raise InputError('is over', f'session of {self.participant}', 'nothing is left to do')
         return item
 
-    def _add(self, entry: Entry, **values: Any) -> None:
+    def _add(self, entry: SessionEvent, **values: Any) -> None:
         self.journal.add({'entry': entry.value, 'at': self._clock_s(), **values})

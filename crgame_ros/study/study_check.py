@@ -41,7 +41,7 @@ PAGE_S, QUESTION_S, DEVICE_S = 60.0, 7.0, 45.0
 
 
 @dataclass(frozen=True)
-class Finding:
+class StudyFinding:
     """
     Something about a study.
 
@@ -67,7 +67,7 @@ class SessionLength:
 
 
 def check_study(study: StudyFile,
-                progress: Callable[[float], object] = lambda _: None) -> list[Finding]:
+                progress: Callable[[float], object] = lambda _: None) -> list[StudyFinding]:
     """
     Look at everything that a study names, and drive a second of each of its conditions.
 
@@ -79,7 +79,7 @@ def check_study(study: StudyFile,
         try:
             _try(settings)
         except CrgameError as error:
-            found.append(Finding('error', f'{name}: {error}'))
+            found.append(StudyFinding('error', f'{name}: {error}'))
         progress((number + 1) / len(drives))
     return found
 
@@ -142,7 +142,7 @@ def _try(settings: TrialSettings) -> None:
         raise CrgameError('has no end: give "duration" to the game or to the study')
 
 
-def _steps(study: StudyFile) -> Iterator[Finding]:
+def _steps(study: StudyFile) -> Iterator[StudyFinding]:
     languages = dict.fromkeys((study.language, *study.languages))
     steps = [entry.step for entries in (
         study.before, study.after,
@@ -153,26 +153,26 @@ def _steps(study: StudyFile) -> Iterator[Finding]:
         if isinstance(step, Page):
             for language in languages:
                 if page_file(study, step, language) is None:
-                    yield Finding('error', f'{study.base / step.file}: there is no such page')
+                    yield StudyFinding('error', f'{study.base / step.file}: there is no such page')
                     break
         elif isinstance(step, Questions):
             try:
                 scale = load_questionnaire(questionnaire_name(study, step))
             except CrgameError as error:
-                yield Finding('error', str(error))
+                yield StudyFinding('error', str(error))
                 continue
             for language in languages:
                 if any(question.ask.lacks(language) for question in scale.questions):
-                    yield Finding('warning', f'{step.name}: has no texts in "{language}"')
+                    yield StudyFinding('warning', f'{step.name}: has no texts in "{language}"')
 
 
-def _balance(study: StudyFile) -> Iterator[Finding]:
+def _balance(study: StudyFile) -> Iterator[StudyFinding]:
     for block in study.blocks:
         try:
             orders = [[trial.condition.name for trial in plan_trials(study, place)
                        if trial.block == block.name] for place in range(study.participants)]
         except CrgameError as error:
-            yield Finding('error', str(error))
+            yield StudyFinding('error', str(error))
             continue
         conditions = len(conditions_of(study, block))
         if conditions > 1:
@@ -180,17 +180,17 @@ def _balance(study: StudyFile) -> Iterator[Finding]:
 
 
 def _unbalanced(study: StudyFile, block: Block, conditions: int,
-                orders: list[list[str]]) -> Iterator[Finding]:
+                orders: list[list[str]]) -> Iterator[StudyFinding]:
     first = Counter(order[0] for order in orders)
     if len(first) < conditions or len(set(first.values())) > 1:
         rows = rows_of(block.order, conditions)
         mend = f'take a multiple of {rows} participants' if block.order == 'williams' \
             and not block.sequences else 'take "order: williams"'
-        yield Finding('warning', f'{block.name}: with {study.participants} participants not '
+        yield StudyFinding('warning', f'{block.name}: with {study.participants} participants not '
                                  f'every condition is first equally often; {mend}')
     follows = Counter(pair for order in orders for pair in _within(order, conditions))
     if len(follows) < conditions * (conditions - 1) or len(set(follows.values())) > 1:
-        yield Finding('warning', f'{block.name}: not every condition follows every other equally '
+        yield StudyFinding('warning', f'{block.name}: not every condition follows every other equally '
                                  'often')
 
 
