@@ -187,11 +187,11 @@ def _unbalanced(study: StudyFile, block: Block, conditions: int,
         mend = f'take a multiple of {rows} participants' if block.order == 'williams' \
             and not block.sequences else 'take "order: williams"'
         yield StudyFinding('warning', f'{block.name}: with {study.participants} participants not '
-                                 f'every condition is first equally often; {mend}')
+                                      f'every condition is first equally often; {mend}')
     follows = Counter(pair for order in orders for pair in _within(order, conditions))
     if len(follows) < conditions * (conditions - 1) or len(set(follows.values())) > 1:
-        yield StudyFinding('warning', f'{block.name}: not every condition follows every other equally '
-                                 'often')
+        yield StudyFinding('warning', f'{block.name}: not every condition follows every other '
+                                      'equally often')
 
 
 def _within(order: list[str], conditions: int) -> Iterable[tuple[str, str]]:
