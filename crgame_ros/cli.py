@@ -61,6 +61,8 @@ TOOLS = (
           'crgame_ros.analysis.reproduction.reproduce_command'),
     _Tool('evaluate', 'planners x scenarios x recorded humans x seeds, into tables',
           'crgame_ros.evaluation.evaluate_command'),
+    _Tool('study', 'experiments with people: plan them, and find mistakes',
+          'crgame_ros.study.study_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',
           'crgame_ros.analysis.validate_command'),
     _Tool('new', 'a game file for any scenario, with seats for several people',
@@ -69,6 +71,8 @@ TOOLS = (
           'crgame_ros.occupancy.occupancy_command'),
     _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',
           'crgame_ros.waypoints.waypoint_command'),
+    _Tool('cockpit-3d', "fetch what the page's 3D view is drawn with",
+          'crgame_ros.cockpit.three_command'),
     _Tool('schema', 'what a game file and other files may say, for editors',
           'crgame_ros.schema_command'))
 DESCRIPTION = """\

@@ -27,6 +27,7 @@ import sys
 import time
 from typing import Literal
 
+from crgame_ros.cockpit.three_library import find_library, wanted_version
 from crgame_ros.paths import share_directory
 from crgame_ros.registry import PACKAGES
 from crgame_ros.requirements import needed
@@ -80,9 +81,9 @@ def run_checks(runs: Path | None = None) -> list[Check]:
     """Check everything, in some seconds; recordings go to `runs`, by default ./runs."""
     prepare_environment()
     return [check_python(), *check_packages(share_directory() / 'requirements.txt'),
-            check_imports(), check_ros(), check_profile(), check_devices(), check_priority(),
-            *check_discovery(), check_disk(runs or Path('runs')), check_processors(),
-            check_clock()]
+            check_imports(), check_three(), check_ros(), check_profile(), check_devices(),
+            check_priority(), *check_discovery(), check_disk(runs or Path('runs')),
+            check_processors(), check_clock()]
 
 
 def format_checks(checks: list[Check]) -> str:
@@ -159,6 +160,14 @@ def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
                      f'idm-package: {detail}', COMPILE_FIX if absent == {'Polygon'} else
                      f'pip install --no-deps --ignore-requires-python -r {pins}')
     return Check('imports', 'fail', detail, 'remove .venv and start again')
+
+
+def check_three() -> Check:
+    """Check whether the cockpit can show its 3D view."""
+    if find_library() is None:
+        return Check('3D view', 'warn', f'three.js {wanted_version()} is not there: the cockpit '
+                     'shows its map alone', 'crgame cockpit-3d')
+    return Check('3D view', 'ok', f'three.js {wanted_version()}')
 
 
 def check_ros() -> Check:

@@ -266,6 +266,19 @@ _crgame_export_network() {
     fi
 }
 
+# What the cockpit's 3D view is drawn with, once; tried again after a day where it cannot be had.
+_crgame_three() {
+    local version pins=$root/config/page_libraries/package.json
+    [[ -r $pins ]] || return 0
+    version=$(sed -n 's/^ *"three": "\(.*\)".*/\1/p' "$pins")
+    [[ ! -e $venv/share/crgame_ros/three-$version/three.module.js ]] || return 0
+    [[ -w $venv && -z $(find "$venv/three.log" -mmin -1440 2>/dev/null) ]] || return 0
+    (export PYTHONPATH=$root; "$venv/bin/python" -m crgame_ros.cli cockpit-3d) \
+        >"$venv/three.log" 2>&1 ||
+        _crgame_say "the cockpit has no 3D view yet ($(tail -n 1 "$venv/three.log"));" \
+            '`./crgame cockpit-3d` tries again'
+}
+
 _crgame_main() {
     local root venv wanted python version ros made
     root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P) || return 1
@@ -284,6 +297,7 @@ _crgame_main() {
         done
         ((made == 0)) || return "$made"
     fi
+    _crgame_three
     if [[ $ros == wheels ]]; then
         _crgame_export_wheels
     else

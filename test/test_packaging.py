@@ -296,6 +296,34 @@ def test_env_keeps_another_ros_apart(tmp_path: Path) -> None:
     assert ':/lib/mine' in done.stdout
 
 
+def test_env_fetches_the_3d_library_into_an_environment_made_before(tmp_path: Path) -> None:
+    """Once; where it cannot be had a line says so, and it is not tried again at once."""
+    tree = _stamped(tmp_path / 'a tree')
+    _copy(tree, 'crgame_ros', 'config/page_libraries')
+    # Else Python takes itself for the one of the link's target.
+    (tree / '.venv' / 'pyvenv.cfg').write_text(f'home = {Path(sys.executable).parent}\n')
+    programs = tmp_path / 'programs'
+    programs.mkdir()
+    for name in ('node', 'npm'):
+        (programs / name).write_text('#!/bin/sh\necho "npm error no network" >&2\nexit 1\n')
+        (programs / name).chmod(0o755)
+    path = f'{programs}:{os.environ["PATH"]}'
+    done = _source(tree, PATH=path, HOME=str(tmp_path))
+    assert done.returncode == 0 and done.stderr.count('\n') == 1
+    assert 'no 3D view yet (error: three.js cannot be fetched: npm says "npm error no network"' \
+        in done.stderr
+    assert _source(tree, PATH=path, HOME=str(tmp_path)).stderr == ''
+    if shutil.which('npm') is None:
+        pytest.skip('three.js is not fetched: npm is missing')
+    (tree / '.venv' / 'three.log').unlink()
+    done = _source(tree)
+    if 'cannot be fetched' in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.stderr == ''
+    fetched = next((tree / '.venv' / 'share' / 'crgame_ros').iterdir())
+    assert (fetched / 'three.module.js').is_file()
+
+
 def test_env_refuses_other_pythons(tmp_path: Path) -> None:
     """Python 3.10 is refused in one line with exit code 2, and nothing is made."""
     tree = _copy(tmp_path / 'tree', 'scripts/env.sh', 'requirements.txt')

@@ -43,6 +43,21 @@ class _Text:
     data: bytes
 
 
+@dataclass(frozen=True)
+class Sound:
+    """
+    What a page lets its person hear and feel.
+
+    :param on: whether it sounds while the run goes on.
+    :param volume: 0 to 1.
+    :param rumble: strength of its gamepads' motors, 0 to 1.
+    """
+
+    on: bool = False
+    volume: float = 0.0
+    rumble: float = 0.0
+
+
 class TokenBucket:
     """
     A limit on how often something may happen.
@@ -104,6 +119,8 @@ class Client:
         # Whose perception the page shows, empty for nobody's; and whether with its scans.
         self.perceives_as = ''
         self.wants_scans = False
+        # As the page told it last.
+        self.sound = Sound()
         # Least time between two frames of the slot 'state' [s]; 0 sends each.
         self.state_period_s = 0.0
         self.dropped = ''

@@ -21,7 +21,7 @@ from crgame_ros.errors import InputError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-STATE_COLUMNS = 12
+STATE_COLUMNS = 13
 OBJECT_COLUMNS = 6
 PLAN_COLUMNS = 5
 PREDICTION_COLUMNS = 3
@@ -57,9 +57,10 @@ def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> b
     :param n: simulation step.
     :param k: scenario step.
     :param t: time since the start of the run [s].
-    :param vehicles: (V, 12) x, y [m], yaw [rad] of the rear axle, speed [m/s], steering angle
+    :param vehicles: (V, 13) x, y [m], yaw [rad] of the rear axle, speed [m/s], steering angle
         [rad], acceleration [m/s^2], yaw rate, steering rate [rad/s], then the command in force:
-        throttle, brake, steering, reverse; NaN where there is none.
+        throttle, brake, steering, reverse, lights (bits: 1 left indicator, 2 right indicator,
+        4 horn); NaN where there is none.
     :raises InputError: if the array has another width.
     """
     return _rows(FrameKind.STATE, epoch, n, k, t, (), vehicles, STATE_COLUMNS)

@@ -18,11 +18,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from crgame_ros.cockpit.input_delay import InputDelay
+from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
 # A page repeats its input every 50 ms; silent for longer, it counts as gone [s].
 SILENCE_S = 0.2
+# What the page says of the lever and the horn: which of left, right, hazard and horn are held.
+_LIGHTS = LightButtons(*(frozenset({i}) for i in range(4)))
 
 
 class HeldSeat:
@@ -46,6 +49,7 @@ class HeldSeat:
         self.offered_to: str | None = None
         self.delay = InputDelay()
         self._cycles = KeyboardCycles()
+        self._lever = IndicatorLever(_LIGHTS)
         self._keys: KeyState | None = None
         self._axes: DriverCommand | None = None
         self._heard_s = 0.0
@@ -63,6 +67,7 @@ class HeldSeat:
         reverse = bool(message.get('reverse'))
         keys, axes = message.get('keys'), message.get('axes')
         self.away = keys is None and axes is None
+        self._lever.hold(i for i, held in enumerate(message.get('lights', ())) if held)
         if self.away:
             self.let_go()
         elif axes is not None:
@@ -78,6 +83,7 @@ class HeldSeat:
         self.away = True
         self._keys = self._axes = None
         self._cycles.reset()
+        self._lever.hold(())
 
     def is_silent(self, now_s: float) -> bool:
         """Tell whether the page has not been heard for too long."""
@@ -85,15 +91,17 @@ class HeldSeat:
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """
-        Give the command of cycle n; released while nobody is there.
+        Give the command of cycle n; while nobody is there it is released, but for the indicators.
 
         :param dt_s: length of a cycle in simulation time [s]
         """
+        command = RELEASED
         if self._axes is not None:
-            return self._axes
-        if self._keys is None:
-            return RELEASED
-        if n < self._cycles.cycle:
-            # A new run has begun.
-            self._cycles.reset()
-        return self._cycles.command(n, self._keys, dt_s)
+            command = self._axes
+        elif self._keys is not None:
+            if n < self._cycles.cycle:
+                # A new run has begun.
+                self._cycles.reset()
+            command = self._cycles.command(n, self._keys, dt_s)
+        self._lever.turn(command.steering)
+        return command._replace(lights=self._lever.lights)

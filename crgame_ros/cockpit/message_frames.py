@@ -95,7 +95,7 @@ class MessageFrames:
         """
         Make the frame of states (V, 8).
 
-        :param commands: (V, 4) consumed; None where they are not known.
+        :param commands: (V, 5) consumed; None where they are not known.
         """
         return Frame('state', frames.encode_state(*place, state_rows(states, commands)))
 
@@ -181,7 +181,7 @@ class MessageFrames:
 
 def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:
     """
-    Give the rows (V, 12) of a frame of states (V, 8).
+    Give the rows (V, 13) of a frame of states (V, 8).
 
     :param commands: (V, 4) consumed; None where they are not known.
     """

@@ -19,12 +19,15 @@ from dataclasses import dataclass
 import hashlib
 from pathlib import Path
 
+from crgame_ros.cockpit.three_library import find_library, SCRIPTS
 from crgame_ros.errors import CrgameError
 from crgame_ros.paths import plotly_script
 
 PAGE = Path(__file__).resolve().parent / 'page'
 INDEX = '/'
 PLOTLY = '/plotly.js'
+# Of the 3D view: '/three/three.module.js' imports the other one by its relative path.
+THREE = {f'/three/{name}': name for name in SCRIPTS}
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml', '.png': 'image/png'}
 
@@ -63,6 +66,17 @@ def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
         raise CrgameError(f'{directory}: the page of the cockpit is missing; '
                           'install crgame_ros again')
     return {**table, INDEX: index, PLOTLY: _read(plotly_script())}
+
+
+def read_three(path: str) -> PageFile | None:
+    """
+    Read a script of three.js, which may have been fetched while the cockpit runs.
+
+    :param path: of the request.
+    :return: None if that is none of them, or they have not been fetched.
+    """
+    folder = find_library() if path in THREE else None
+    return None if folder is None else _read(folder / THREE[path])
 
 
 def _page_files(directory: Path) -> Iterator[tuple[str, PageFile]]:

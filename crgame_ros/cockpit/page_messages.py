@@ -90,14 +90,15 @@ def _input(message: Mapping[str, Any]) -> dict[str, Any]:
             raise _wrong('away', 'is not true')
         return {'seat': seat, 'away': True}
     reverse = _flag(message, 'reverse') if 'reverse' in message else False
+    hands: dict[str, Any] = {'seat': seat, 'reverse': reverse}
+    if 'lights' in message:
+        hands['lights'] = [_as_flag(each, 'lights') for each in _list(message, 'lights', 4)]
     if given == ['keys']:
         keys = _list(message, 'keys', 4)
-        return {'seat': seat, 'keys': [_as_flag(key, 'keys') for key in keys],
-                'reverse': reverse}
+        return {**hands, 'keys': [_as_flag(key, 'keys') for key in keys]}
     axes = _list(message, 'axes', 3)
     lows = (0.0, 0.0, -1.0)
-    return {'seat': seat, 'reverse': reverse,
-            'axes': [_axis(axis, low) for axis, low in zip(axes, lows, strict=True)]}
+    return {**hands, 'axes': [_axis(axis, low) for axis, low in zip(axes, lows, strict=True)]}
 
 
 def _seat(message: Mapping[str, Any]) -> dict[str, Any]:
@@ -186,6 +187,11 @@ def _layers(message: Mapping[str, Any]) -> dict[str, Any]:
     return named
 
 
+def _sound(message: Mapping[str, Any]) -> dict[str, Any]:
+    return {'on': _flag(message, 'on'), 'volume': _share(message, 'volume'),
+            'rumble': _share(message, 'rumble')}
+
+
 def _ping(message: Mapping[str, Any]) -> dict[str, Any]:
     delay_ms = message.get('round_trip_ms')
     if delay_ms is None:
@@ -200,7 +206,7 @@ _READERS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
     'input': _input, 'claim': _claim, 'release': _seat, 'ask': _seat, 'hand_over': _hand_over,
     'answer': _answer, 'ready': _ready, 'person': _person, 'role': _role, 'device': _device,
     'control': _control, 'rate': _rate, 'planner': _planner, 'trigger': _trigger,
-    'name': _name, 'layers': _layers, 'ping': _ping}
+    'name': _name, 'layers': _layers, 'sound': _sound, 'ping': _ping}
 
 
 def _id(message: Mapping[str, Any]) -> int:
@@ -226,6 +232,13 @@ def _number(value: Any, field: str) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise _wrong(field, 'is no finite number')
+    return number
+
+
+def _share(message: Mapping[str, Any], field: str) -> float:
+    number = _number(message.get(field), field)
+    if not 0.0 <= number <= 1.0:
+        raise _wrong(field, 'is not from 0 to 1')
     return number
 
 

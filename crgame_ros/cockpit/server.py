@@ -187,13 +187,22 @@ def _refusal(access: Access, request: web.Request, port: int) -> str:
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
     response.headers.update(_HEADERS)
-    static = request.path.startswith('/static/') or request.path == page_files.PLOTLY
+    static = request.path.startswith(('/static/', '/three/')) or request.path == page_files.PLOTLY
     response.headers[hdrs.CACHE_CONTROL] = 'no-cache' if static else 'no-store'
 
 
 def _add_page(app: web.Application, table: Mapping[str, PageFile]) -> None:
+    three: dict[str, PageFile] = {}
+
+    def find(path: str) -> PageFile | None:
+        if path in page_files.THREE and path not in three:
+            file = page_files.read_three(path)
+            if file is not None:
+                three[path] = file
+        return table.get(path) or three.get(path)
+
     async def serve(request: web.Request) -> web.Response:
-        file = table.get(request.path)
+        file = find(request.path)
         if file is None:
             return web.Response(status=404, text='There is no such file.\n')
         if request.headers.get(hdrs.IF_NONE_MATCH) == f'"{file.tag}"':
@@ -202,7 +211,7 @@ def _add_page(app: web.Application, table: Mapping[str, PageFile]) -> None:
                             charset='utf-8' if file.is_text else None,
                             headers={hdrs.ETAG: f'"{file.tag}"'})
 
-    for path in (page_files.INDEX, page_files.PLOTLY, '/static/{name:.*}'):
+    for path in (page_files.INDEX, page_files.PLOTLY, *page_files.THREE, '/static/{name:.*}'):
         app.router.add_get(path, serve)
 
 

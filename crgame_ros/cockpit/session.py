@@ -24,7 +24,7 @@ from typing import Any
 from aiohttp import web, WSCloseCode, WSMsgType
 from crgame_ros.cockpit import page_messages
 from crgame_ros.cockpit.backend import Backend
-from crgame_ros.cockpit.client import Client, TokenBucket
+from crgame_ros.cockpit.client import Client, Sound, TokenBucket
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.request_rights import browser_of, granted
 from crgame_ros.cockpit.rights import refusal_of
@@ -180,6 +180,8 @@ class Session:
                 client.perceives_as = message.get('perception', client.perceives_as)
                 client.wants_scans = message.get('scans', client.wants_scans)
                 self._hub.send_wanted(client)
+            case 'sound':
+                client.sound = Sound(message['on'], message['volume'], message['rumble'])
             case 'person':
                 self._hub.identify(client, message['key'], fresh=message['fresh'])
                 self._backend.joined(client)

@@ -19,6 +19,8 @@ from pathlib import Path
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
+from crgame_ros.driver.force_limits import ForceLimits
+from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
@@ -157,14 +159,18 @@ class ButtonPair:
 
 
 @dataclass(frozen=True)
-class GearEntry:
+class ButtonEntry:
     """
-    Buttons that choose the gear.
+    Buttons of the gear, the indicators and the horn.
 
     :param reverse_on: a press selects reverse.
     :param reverse_off: a press selects forward.
     :param reverse_toggle: a press changes between the two.
     :param reverse_held: reverse exactly while held (the gate of a shifter).
+    :param left_indicator: a press switches the left indicator on or off.
+    :param right_indicator: a press switches the right indicator on or off.
+    :param hazard: a press switches the hazard lights on or off.
+    :param horn: it sounds while held.
     """
 
     FORM: ClassVar[Form] = _FORM
@@ -173,12 +179,24 @@ class GearEntry:
     reverse_off: tuple[ButtonPair, ...] = ()
     reverse_toggle: tuple[ButtonPair, ...] = ()
     reverse_held: tuple[ButtonPair, ...] = ()
+    left_indicator: tuple[ButtonPair, ...] = ()
+    right_indicator: tuple[ButtonPair, ...] = ()
+    hazard: tuple[ButtonPair, ...] = ()
+    horn: tuple[ButtonPair, ...] = ()
 
     def gears(self, way: Literal['evdev', 'joy']) -> GearButtons:
-        """Give them as the program has them, in one way of reading the device."""
-        return GearButtons(*(
-            frozenset(getattr(pair, way) for pair in pairs) for pairs in (
-                self.reverse_on, self.reverse_off, self.reverse_toggle, self.reverse_held)))
+        """Give those of the gear as the program has them, in one way of reading the device."""
+        return GearButtons(*(_codes(pairs, way) for pairs in (
+            self.reverse_on, self.reverse_off, self.reverse_toggle, self.reverse_held)))
+
+    def lights(self, way: Literal['evdev', 'joy']) -> LightButtons:
+        """Give those of indicators and horn as the program has them."""
+        return LightButtons(*(_codes(pairs, way) for pairs in (
+            self.left_indicator, self.right_indicator, self.hazard, self.horn)))
+
+
+def _codes(pairs: tuple[ButtonPair, ...], way: str) -> frozenset[int]:
+    return frozenset(getattr(pair, way) for pair in pairs)
 
 
 @dataclass(frozen=True)
@@ -191,6 +209,10 @@ class KeyEntry:
     :param left: steer to the left.
     :param right: steer to the right.
     :param reverse: change the gear.
+    :param left_indicator: a press switches the left indicator on or off.
+    :param right_indicator: a press switches the right indicator on or off.
+    :param hazard: a press switches the hazard lights on or off.
+    :param horn: it sounds while held.
     """
 
     FORM: ClassVar[Form] = _FORM
@@ -200,6 +222,10 @@ class KeyEntry:
     left: Keys
     right: Keys
     reverse: Keys
+    left_indicator: Keys = ()
+    right_indicator: Keys = ()
+    hazard: Keys = ()
+    horn: Keys = ()
 
 
 _PEDALS = ('throttle', 'pedals')
@@ -218,8 +244,9 @@ class DeviceFile:
     :param throttle: throttle pedal.
     :param brake: brake pedal.
     :param pedals: one axis for both pedals, throttle on its positive side.
-    :param buttons: for the gear.
+    :param buttons: for the gear, the indicators and the horn.
     :param keys: of a keyboard.
+    :param force_feedback: motor of a wheel; without it the wheel is not moved.
     """
 
     FORM: ClassVar[Form] = Form(REMEDY, by='kind', one_of={
@@ -232,8 +259,9 @@ class DeviceFile:
     throttle: Annotated[AxisPair | None, OnlyWith(('throttle',))] = None
     brake: Annotated[AxisPair | None, OnlyWith(('throttle',), needed=True)] = None
     pedals: Annotated[AxisPair | None, OnlyWith(('pedals',))] = None
-    buttons: Annotated[GearEntry | None, _AXES] = None
+    buttons: Annotated[ButtonEntry | None, _AXES] = None
     keys: Annotated[KeyEntry | None, OnlyWith(('keys',))] = None
+    force_feedback: Annotated[ForceLimits | None, OnlyWith(_PEDALS)] = None
 
     def check(self) -> None:
         """Refuse what is no regular expression."""
@@ -254,6 +282,6 @@ class DeviceFile:
         brake = none if self.brake is None else self.brake.bindings(False)
         pedals = none if self.pedals is None else self.pedals.bindings(True)
         return (ControlBindings(steering[0], throttle[0], brake[0], pedals[0],
-                                self.buttons.gears('evdev')),
+                                self.buttons.gears('evdev'), self.buttons.lights('evdev')),
                 ControlBindings(steering[1], throttle[1], brake[1], pedals[1],
-                                self.buttons.gears('joy')))
+                                self.buttons.gears('joy'), self.buttons.lights('joy')))

@@ -22,11 +22,14 @@ import re
 from typing import Any
 
 from crgame_ros.driver.device_file import DeviceFile, REMEDY
+from crgame_ros.driver.force_limits import ForceLimits
+from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import ControlBindings
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory
 from crgame_ros.schema.reading import read
+from crgame_ros.vehicle.lights import Light
 from crgame_ros.yaml_text import parse_yaml, read_yaml
 from evdev import ecodes
 
@@ -48,17 +51,33 @@ class KeyBindings:
     left: frozenset[int]
     right: frozenset[int]
     reverse: frozenset[int]
+    left_indicator: frozenset[int] = frozenset()
+    right_indicator: frozenset[int] = frozenset()
+    hazard: frozenset[int] = frozenset()
+    horn: frozenset[int] = frozenset()
 
     @property
     def codes(self) -> frozenset[int]:
-        """Every bound key."""
+        """Every key that drives; a device without the others is a keyboard too."""
         return self.throttle | self.brake | self.left | self.right | self.reverse
 
-    def held(self, pressed: Set[int], reverse: bool) -> KeyState:
-        """Give the driving keys held, from the codes of all pressed keys and the gear."""
+    @property
+    def lights(self) -> LightButtons:
+        """The keys of indicators and horn."""
+        return LightButtons(self.left_indicator, self.right_indicator, self.hazard, self.horn)
+
+    def held(self, pressed: Set[int], reverse: bool, lights: int = 0) -> KeyState:
+        """
+        Give the driving keys held.
+
+        :param pressed: codes of all pressed keys.
+        :param reverse: the gear that they have chosen.
+        :param lights: that they have switched on.
+        """
         return KeyState(not self.throttle.isdisjoint(pressed), not self.brake.isdisjoint(pressed),
                         not self.left.isdisjoint(pressed), not self.right.isdisjoint(pressed),
-                        reverse)
+                        reverse, bool(lights & Light.LEFT), bool(lights & Light.RIGHT),
+                        bool(lights & Light.HORN))
 
 
 @dataclass(frozen=True)
@@ -73,6 +92,7 @@ class DeviceMap:
     :param evdev: controls when read through evdev; None for a keyboard.
     :param joy: controls when read from a `joy` node; None for a keyboard.
     :param keys: key bindings of a keyboard; None otherwise.
+    :param force: the motor of a wheel; None where there is none, or it is to rest.
     """
 
     name: str
@@ -82,6 +102,7 @@ class DeviceMap:
     evdev: ControlBindings | None = None
     joy: ControlBindings | None = None
     keys: KeyBindings | None = None
+    force: ForceLimits | None = None
 
     def fits(self, name: str, axes: frozenset[int], buttons: frozenset[int]) -> bool:
         """
@@ -145,4 +166,4 @@ def _device_map(values: Any, where: str) -> DeviceMap:
     keys = None if file.keys is None else KeyBindings(
         **{name: frozenset(codes) for name, codes in vars(file.keys).items()})
     return DeviceMap(Path(where).stem, file.title, DeviceKind[file.kind.upper()], file.match,
-                     evdev, joy, keys)
+                     evdev, joy, keys, file.force_feedback)

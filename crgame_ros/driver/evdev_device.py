@@ -22,6 +22,8 @@ import re
 from typing import Any
 
 from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
+from crgame_ros.driver.force_limits import ForceLimits
+from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons, NO_LIGHTS
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import (
     ControlLayout,
@@ -43,14 +45,17 @@ class EventDecoder:
 
     :param gear: the buttons or keys that choose the gear.
     :param reverse: whether reverse is selected to begin with.
+    :param lights: the buttons or keys of indicators and horn.
     """
 
-    def __init__(self, gear: GearButtons, reverse: bool = False) -> None:
+    def __init__(self, gear: GearButtons, reverse: bool = False,
+                 lights: LightButtons = NO_LIGHTS) -> None:
         self._gear = gear
         self._dropping = False
         self.axes: dict[int, float] = {}
         self.pressed: set[int] = set()
         self.reverse = reverse
+        self.lever = IndicatorLever(lights)
         self.stale = False
 
     def feed(self, event: InputEvent) -> bool:
@@ -77,7 +82,7 @@ class EventDecoder:
 
     def synchronise(self, axes: Mapping[int, float], pressed: Iterable[int]) -> None:
         """
-        Take the device's whole state; presses that were missed change no gear.
+        Take the device's whole state; presses that were missed change no gear, no light.
 
         :param axes: raw value by code.
         :param pressed: codes of the keys and buttons held now.
@@ -85,6 +90,7 @@ class EventDecoder:
         gate = self._gear.held & self.pressed
         self.axes = dict(axes)
         self.pressed = set(pressed)
+        self.lever.overlook(self.pressed)
         self.stale = False
         if gate != self._gear.held & self.pressed:
             self.reverse = not gate
@@ -94,6 +100,7 @@ class EventDecoder:
             return False
         (self.pressed.add if pressed else self.pressed.discard)(code)
         self.reverse = self._gear.after(self.reverse, code, pressed)
+        self.lever.hold(self.pressed)
         return True
 
 
@@ -118,6 +125,7 @@ class EvdevDevice:
         self._next_scan_s = -math.inf
         self._limits: dict[int, tuple[float, float]] = {}
         self._buttons: tuple[int, ...] = ()
+        self._can_push = False
         self.problem: InputError | None = None
         self.device_map: DeviceMap | None = None
         self.layout: ControlLayout | None = None
@@ -144,7 +152,8 @@ class EvdevDevice:
         """Give the driving keys held on a keyboard; none held on other devices."""
         if self.device_map is None or self.device_map.keys is None:
             return KeyState()
-        return self.device_map.keys.held(self.decoder.pressed, self.decoder.reverse)
+        return self.device_map.keys.held(self.decoder.pressed, self.decoder.reverse,
+                                         self.decoder.lever.lights)
 
     @property
     def joy(self) -> JoyState:
@@ -158,6 +167,16 @@ class EvdevDevice:
     def fileno(self) -> int | None:
         """Give the descriptor to wait on until something can be read; None if disconnected."""
         return self._device.fd if self._device is not None else None
+
+    @property
+    def force_limits(self) -> ForceLimits | None:
+        """What may be asked of its motor; None without one, or where the map has none."""
+        return self.device_map.force if self._can_push and self.device_map else None
+
+    @property
+    def force_device(self) -> Any:
+        """What its motor is driven through (`ForceDevice`); None without one."""
+        return self._device if self._can_push else None
 
     def poll(self, now_s: float) -> bool:
         """
@@ -223,12 +242,15 @@ class EvdevDevice:
             self._limits = {code: (float(info.min), float(info.max))
                             for code, info in _abs_infos(device).items() if info.min < info.max}
             self._buttons = tuple(device.capabilities().get(ecodes.EV_KEY, ()))
+            self._can_push = ecodes.FF_CONSTANT in device.capabilities().get(ecodes.EV_FF, ())
             if device_map.keys is not None:
                 gear, self.layout = GearButtons(toggle=device_map.keys.reverse), None
+                lights = device_map.keys.lights
             else:
                 assert device_map.evdev is not None
                 gear, self.layout = device_map.evdev.gear, device_map.evdev.layout(self._limits)
-            self.decoder = EventDecoder(gear, self.decoder.reverse)
+                lights = device_map.evdev.lights
+            self.decoder = EventDecoder(gear, self.decoder.reverse, lights)
             self._synchronise(device)
         except (InputError, OSError) as error:
             device.close()

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.vehicle.lights import lights_of
 
 
 class KeyState(NamedTuple):
@@ -32,6 +33,9 @@ class KeyState(NamedTuple):
     :param right: a right key is held
     :param reverse: the reverse gear is asked for; a device flips it at each press of its key,
         the vehicle obeys at standstill
+    :param left_indicator: the left indicator is on; a device's lever switches it
+    :param right_indicator: the right indicator is on; both together are the hazard lights
+    :param horn: the horn sounds
     """
 
     throttle: bool = False
@@ -39,6 +43,14 @@ class KeyState(NamedTuple):
     left: bool = False
     right: bool = False
     reverse: bool = False
+    left_indicator: bool = False
+    right_indicator: bool = False
+    horn: bool = False
+
+    @property
+    def lights(self) -> int:
+        """Give what is on, as `DriverCommand.lights`."""
+        return lights_of(self.left_indicator, self.right_indicator, self.horn)
 
 
 @dataclass(frozen=True)
@@ -114,7 +126,7 @@ class KeyboardFilter:
         return DriverCommand(
             min(1.0, max(0.0, state.throttle + throttle_rate * dt_s)),
             min(1.0, max(0.0, state.brake + brake_rate * dt_s)),
-            steering, bool(keys.reverse))
+            steering, bool(keys.reverse), keys.lights)
 
     def command(self, state: DriverCommand) -> DriverCommand:
         """
@@ -128,7 +140,7 @@ class KeyboardFilter:
             0.0 if state.throttle < p.pedal_deadband else state.throttle,
             0.0 if state.brake < p.pedal_deadband else state.brake,
             0.0 if abs(state.steering) < p.steering_deadband else state.steering,
-            state.reverse)
+            state.reverse, state.lights)
 
     def advance(self, keys: KeyState, dt_s: float) -> DriverCommand:
         """Commit a cycle with these keys held, and give its command."""

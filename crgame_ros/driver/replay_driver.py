@@ -30,13 +30,15 @@ class ReplayDriver(DriverSource):
     After their end nobody is there: as after any loss of a driver the pedals and the steering are
     let go at their rates, then the brake is applied gently and stays, in simulation time.
 
-    :param commands: (cycles, 4) throttle, brake, steering, reverse of cycle 0, 1, …; NaN where an
-        AV followed its plan.
+    :param commands: (cycles, 5) throttle, brake, steering, reverse and lights of cycle 0, 1, …;
+        NaN where an AV followed its plan. What earlier versions kept has no lights.
     """
 
     def __init__(self, commands: NDArray[np.float64]) -> None:
-        self._commands = [DriverCommand(row[0], row[1], row[2], row[3] == 1.0)
-                          for row in commands.tolist()]
+        self._commands = [
+            DriverCommand(throttle, brake, steering, reverse == 1.0,
+                          *(int(each) for each in lights if each == each))
+            for throttle, brake, steering, reverse, *lights in commands.tolist()]
         self._recorded = len(self._commands)
         self._end = SeatWatchdog()
 

@@ -21,6 +21,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from crgame_ros.driver.indicator_lever import IndicatorLever
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyboardParameters
 from crgame_ros.driver.timeline import JoyTimeline, KeyTimeline, SCRIPTED_LAYOUT, Timeline
 from crgame_ros.driver.timeline_file import parse_timeline, read_timeline
@@ -214,7 +215,8 @@ class ScriptedDriver(DriverSource):
         self._time_s = n * dt_s
         if isinstance(self.timeline, JoyTimeline):
             raw = self.timeline.raw_at(self._time_s)
-            return normalize(raw, SCRIPTED_LAYOUT, bool(raw.pressed))
+            held = self.timeline.held.keys_at(self._time_s)
+            return normalize(raw, SCRIPTED_LAYOUT, held.reverse, held.lights)
         for earlier in range(self._cycles.cycle + 1, n):
             self._cycles.command(earlier, self.timeline.keys_at(earlier * dt_s), dt_s)
         return self._cycles.command(n, self.timeline.keys_at(self._time_s), dt_s)
@@ -223,7 +225,10 @@ class ScriptedDriver(DriverSource):
         """Give the scripted axes and the gear, or the held keys as buttons."""
         if isinstance(self.timeline, JoyTimeline):
             raw = self.timeline.raw_at(self._time_s)
-            return JoyState(tuple(raw.axes.values()), (int(bool(raw.pressed)),))
+            held = self.timeline.held.keys_at(self._time_s)
+            return JoyState(tuple(raw.axes.values()), (
+                int(held.reverse), int(held.left_indicator), int(held.right_indicator),
+                int(held.horn)))
         return JoyState((), tuple(map(int, self.timeline.keys_at(self._time_s))))
 
     def reset(self) -> None:
@@ -252,6 +257,7 @@ class JoyDriver(DriverSource):
         self._heard_s = self._now_s = -math.inf
         self._raw = RawInput()
         self._reverse = False
+        self._lever = IndicatorLever(self._layout.lights)
 
     @property
     def connected(self) -> bool:
@@ -274,6 +280,7 @@ class JoyDriver(DriverSource):
         pressed = frozenset(index for index, value in enumerate(buttons) if value)
         for button in sorted(pressed ^ self._raw.pressed):
             self._reverse = self._layout.gear.after(self._reverse, button, button in pressed)
+        self._lever.hold(pressed)
         moved = reported(dict(enumerate(axes)), self._layout, self._raw.axes)
         self._raw = RawInput(moved, pressed)
 
@@ -285,7 +292,9 @@ class JoyDriver(DriverSource):
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """Give the command of the last message."""
-        return normalize(self._raw, self._layout, self._reverse)
+        command = normalize(self._raw, self._layout, self._reverse, self._lever.lights)
+        self._lever.turn(command.steering)
+        return command
 
 
 class EvdevDriver(DriverSource):
@@ -319,9 +328,14 @@ class EvdevDriver(DriverSource):
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """Give the command for cycle n from the device's state now."""
+        decoder = self.device.decoder
         if self.device.layout is not None:
-            return normalize(self.device.raw, self.device.layout, self.device.decoder.reverse)
-        return self._cycles.command(n, self.device.keys, dt_s)
+            command = normalize(self.device.raw, self.device.layout, decoder.reverse,
+                                decoder.lever.lights)
+        else:
+            command = self._cycles.command(n, self.device.keys, dt_s)
+        decoder.lever.turn(command.steering)
+        return command
 
     def joy(self) -> JoyState | None:
         """Give the raw device; None while disconnected."""

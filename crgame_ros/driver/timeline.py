@@ -20,16 +20,15 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from crgame_ros.driver.keyboard import KeyState
-from crgame_ros.driver.wheel import AxisRange, ControlLayout, GearButtons, RawInput
+from crgame_ros.driver.wheel import AxisRange, ControlLayout, RawInput
 
 AxisName = Literal['throttle', 'brake', 'steering']
 JOY_AXES: tuple[AxisName, ...] = ('throttle', 'brake', 'steering')
-REVERSE_BUTTON = 0
 
 # The device that a joy timeline plays: its raw axes are CRG 17's ratios themselves.
 SCRIPTED_LAYOUT = ControlLayout(
     throttle=AxisRange(0, 0.0, 1.0, 0.0), brake=AxisRange(1, 0.0, 1.0, 0.0),
-    steering=AxisRange(2, -1.0, 1.0, 0.0), gear=GearButtons(held=frozenset({REVERSE_BUTTON})))
+    steering=AxisRange(2, -1.0, 1.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,8 @@ class KeyTimeline:
           - {from: 2.0, to: 2.4, hold: [left]}
           - {from: 6.0, to: 8.0, hold: [throttle, reverse]}
 
-    The keys are throttle, brake, left and right; reverse is the gear, asked for while held.
+    The keys are throttle, brake, left and right; reverse is the gear, asked for while held;
+    left_indicator, right_indicator and horn are on while held.
     """
 
     intervals: tuple[KeyInterval, ...]
@@ -101,7 +101,8 @@ class JoyTimeline:
 
     Written by hand as points of simulation time [s] since the start of the run, followed by
     the listed axes; linear between points, constant before the first and after the last. Axes
-    that are not listed rest. Reverse is the gear, asked for in its intervals:
+    that are not listed rest. Reverse is the gear, asked for in its intervals; the indicators and
+    the horn are on in theirs:
 
         joy:
           axes: [throttle, brake, steering]
@@ -110,20 +111,22 @@ class JoyTimeline:
             - [3.0, 0.4, 0.0, 0.2]
           reverse:
             - {from: 6.0, to: 8.0}
+          left_indicator:
+            - {from: 2.0, to: 4.0}
 
     :param times_s: (P) times of the points, rising [s].
     :param values: (P, 3) throttle, brake in [0, 1], steering in [-1, 1], positive to the left.
-    :param reverse: intervals in which the reverse gear is asked for.
+    :param held: intervals in which the reverse gear is asked for and lights are on.
     """
 
     times_s: tuple[float, ...]
     values: tuple[tuple[float, float, float], ...]
-    reverse: KeyTimeline = KeyTimeline(())
+    held: KeyTimeline = KeyTimeline(())
 
     @property
     def end_s(self) -> float:
         """Time from which nothing changes [s]."""
-        return max(self.times_s[-1], self.reverse.end_s)
+        return max(self.times_s[-1], self.held.end_s)
 
     def raw_at(self, t_s: float) -> RawInput:
         """Give the raw device of `SCRIPTED_LAYOUT` at a simulation time [s]."""
@@ -136,8 +139,7 @@ class JoyTimeline:
             a, b = self.values[after - 1], self.values[after]
             values = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]),
                       a[2] + share * (b[2] - a[2]))
-        pressed = {REVERSE_BUTTON} if self.reverse.keys_at(t_s).reverse else ()
-        return RawInput(dict(enumerate(values)), frozenset(pressed))
+        return RawInput(dict(enumerate(values)))
 
 
 Timeline = KeyTimeline | JoyTimeline

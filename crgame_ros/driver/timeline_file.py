@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, get_args, Literal
 
 from crgame_ros.driver.timeline import (
     AxisName,
@@ -41,7 +41,10 @@ _KEPT = 32
 REMEDY = 'see docs/driving.md, section "Scripted drivers"'
 _FORM = Form(REMEDY)
 Time = Annotated[float, Within(0.0, MAX_TIME_S)]
-KeyName = Literal['throttle', 'brake', 'left', 'right', 'reverse']
+LightName = Literal['left_indicator', 'right_indicator', 'horn']
+KeyName = Literal['throttle', 'brake', 'left', 'right', 'reverse', 'left_indicator',
+                  'right_indicator', 'horn']
+_SWITCHES: tuple[Literal['reverse'] | LightName, ...] = ('reverse', *get_args(LightName))
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,12 @@ class HeldKeys(Span):
 
     :param start: first instant, since the start of the run [s]
     :param end: first instant after it [s]
-    :param hold: the keys, a list or one of them; reverse is the gear, asked for while held.
+    :param hold: the keys, a list or one of them; reverse is the gear, asked for while held;
+        indicators (both: hazard lights) and horn are on while held.
     """
 
     hold: Annotated[KeyName | tuple[KeyName, ...], Advice(
-        'give one or a list of throttle, brake, left, right, reverse')]
+        'give one or a list of ' + ', '.join(get_args(KeyName)))]
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,9 @@ class JoyEntry:
         positive to the left; linear in between.
     :param axes: what stands in the points behind the time; axes that are not listed rest.
     :param reverse: intervals in which the reverse gear is asked for.
+    :param left_indicator: intervals in which the left indicator is on.
+    :param right_indicator: intervals in which the right indicator is on.
+    :param horn: intervals in which the horn sounds.
     """
 
     FORM: ClassVar[Form] = Form(REMEDY, first=('axes',))
@@ -99,6 +106,9 @@ class JoyEntry:
     points: Annotated[tuple[tuple[float, ...], ...], Listed(1)]
     axes: tuple[AxisName, ...] = JOY_AXES
     reverse: Annotated[tuple[Span, ...], LeftOut()] = ()
+    left_indicator: Annotated[tuple[Span, ...], LeftOut()] = ()
+    right_indicator: Annotated[tuple[Span, ...], LeftOut()] = ()
+    horn: Annotated[tuple[Span, ...], LeftOut()] = ()
 
     def check(self) -> None:
         """Refuse axes that come twice, and points that do not fit them or do not rise in time."""
@@ -130,7 +140,8 @@ class JoyEntry:
             tuple(point[0] for point in self.points),
             tuple((values.get('throttle', 0.0), values.get('brake', 0.0),
                    values.get('steering', 0.0)) for values in at),
-            KeyTimeline(tuple(span.interval(('reverse',)) for span in self.reverse)))
+            KeyTimeline(tuple(span.interval((name,)) for name in _SWITCHES
+                              for span in getattr(self, name))))
 
 
 @dataclass(frozen=True)
@@ -183,8 +194,10 @@ def timeline_text(timeline: Timeline) -> str:
     else:
         points = ((t, *values) for t, values in zip(timeline.times_s, timeline.values,
                                                     strict=True))
-        document = {'joy': write(JoyEntry(points=tuple(points), reverse=tuple(
-            Span(*_seconds(held)) for held in timeline.reverse.intervals)))}
+        held: dict[str, Any] = {
+            name: tuple(Span(*_seconds(each)) for each in timeline.held.intervals
+                        if name in each.keys) for name in _SWITCHES}
+        document = {'joy': write(JoyEntry(points=tuple(points), **held))}
     return str(yaml.safe_dump(document, default_flow_style=None, sort_keys=False, width=1000))
 
 

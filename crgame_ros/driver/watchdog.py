@@ -20,6 +20,7 @@ import math
 from crgame_ros.driver.keyboard import KeyboardParameters
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.vehicle.lights import HAZARD
 from crgame_ros.vehicle.standstill import REST
 
 _RATES = KeyboardParameters()
@@ -66,8 +67,9 @@ class SeatWatchdog:
     While commands come they pass unchanged, to the last bit. Once the last one is older than
     the timeout, throttle and steering ramp to 0 at the paper's release rates; a brake that is
     held falls to the gentle one, and otherwise the gentle one is applied after the release;
-    at standstill it is released. When commands return, the output moves to them at the same
-    rates and passes them on as soon as it has reached them.
+    at standstill it is released; indicators stay on, the horn falls silent. When
+    commands return, the output moves to them at the same rates and passes them on as soon as it
+    has reached them.
     """
 
     def __init__(self, parameters: WatchdogParameters | None = None) -> None:
@@ -115,7 +117,7 @@ class SeatWatchdog:
             brake = gentle
         else:
             brake = now.brake
-        return DriverCommand(0.0, brake, 0.0, now.reverse)
+        return DriverCommand(0.0, brake, 0.0, now.reverse, now.lights & HAZARD)
 
     def _towards(self, goal: DriverCommand, dt_s: float) -> DriverCommand:
         p = self.parameters
@@ -125,7 +127,7 @@ class SeatWatchdog:
         return DriverCommand(
             _ramp(now.throttle, goal.throttle, p.throttle_rate * dt_s, release),
             _ramp(now.brake, goal.brake, p.brake_rate * dt_s, release),
-            _ramp(now.steering, goal.steering, turn, turn), goal.reverse)
+            _ramp(now.steering, goal.steering, turn, turn), goal.reverse, goal.lights)
 
 
 def _ramp(value: float, goal: float, up: float, down: float) -> float:

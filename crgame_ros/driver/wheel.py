@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
+from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand
 
@@ -138,6 +139,7 @@ class ControlLayout:
     :param brake: brake pedal; None with combined pedals.
     :param pedals: one axis for both pedals, throttle on its positive side.
     :param gear: the gear buttons.
+    :param lights: those of indicators and horn.
     """
 
     steering: AxisRange
@@ -145,6 +147,7 @@ class ControlLayout:
     brake: AxisRange | None = None
     pedals: AxisRange | None = None
     gear: GearButtons = GearButtons()
+    lights: LightButtons = LightButtons()
 
     @property
     def ranges(self) -> tuple[AxisRange, ...]:
@@ -216,6 +219,7 @@ class ControlBindings:
     brake: AxisBinding | None
     pedals: AxisBinding | None
     gear: GearButtons
+    lights: LightButtons = LightButtons()
 
     def layout(self, reported: Mapping[int, tuple[float, float]] | None = None) -> ControlLayout:
         """
@@ -231,7 +235,7 @@ class ControlBindings:
 
         return ControlLayout(
             self.steering.range(known.get(self.steering.code)), complete(self.throttle),
-            complete(self.brake), complete(self.pedals), self.gear)
+            complete(self.brake), complete(self.pedals), self.gear, self.lights)
 
 
 def reported(axes: Mapping[int, float], layout: ControlLayout,
@@ -274,13 +278,15 @@ def joy_state(axes: Mapping[int, float], pressed: Iterable[int],
     return JoyState(tuple(values), tuple(int(code in down) for code in order))
 
 
-def normalize(raw: RawInput, layout: ControlLayout, reverse: bool = False) -> DriverCommand:
+def normalize(raw: RawInput, layout: ControlLayout, reverse: bool = False,
+              lights: int = 0) -> DriverCommand:
     """
     Map raw values linearly to (p_th, p_br, s), without further conditioning (CRG 17).
 
     :param raw: what the device reports.
     :param layout: the device's calibrated axes.
     :param reverse: the gear that its buttons have chosen (`GearButtons.after`).
+    :param lights: that they have switched on (`IndicatorLever`).
     """
     if layout.pedals is not None:
         both = layout.pedals.deflection(raw)
@@ -288,4 +294,4 @@ def normalize(raw: RawInput, layout: ControlLayout, reverse: bool = False) -> Dr
     else:
         throttle = layout.throttle.travel(raw) if layout.throttle else 0.0
         brake = layout.brake.travel(raw) if layout.brake else 0.0
-    return DriverCommand(throttle, brake, layout.steering.deflection(raw), reverse)
+    return DriverCommand(throttle, brake, layout.steering.deflection(raw), reverse, lights)

@@ -47,6 +47,7 @@ class Cell:
     :param traffic_values: likewise.
     :param duration_s: simulated; None as the game says [s]
     :param latency_steps: simulation steps between a request and its plan.
+    :param commonroad_scores: whether CommonRoad's tools judge it, too.
     :param code: digests of the engine's and the planners' code.
     """
 
@@ -64,6 +65,7 @@ class Cell:
     traffic_values: Any
     duration_s: float | None
     latency_steps: int
+    commonroad_scores: bool
     code: tuple[str, ...]
 
     @cached_property

@@ -14,8 +14,10 @@
 # limitations under the License.
 """All cells of an evaluation, one after the other, none held."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, Self
 
 from crgame_ros.errors import InputError
@@ -32,10 +34,11 @@ from crgame_ros.evaluation.cell_scene import (
     with_contents,
 )
 from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.evaluation_plan import EvaluationPlan, OWN
+from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
 from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
 from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
+from crgame_ros.simulation.adapted_game import OWN
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class CellGrid:
     :param seeds: of everything random.
     :param duration_s: of each cell; None as games say [s]
     :param latency_steps: between a request and its plan.
+    :param commonroad_scores: whether CommonRoad's tools judge each cell, too.
     :param engine: digest of the engine's code.
     """
 
@@ -75,6 +79,7 @@ class CellGrid:
     seeds: tuple[int, ...]
     duration_s: float | None
     latency_steps: int
+    commonroad_scores: bool
     engine: str
 
     def __len__(self) -> int:
@@ -91,7 +96,7 @@ class CellGrid:
                                 scene.scenario, scene.game, scene.human, planner.label,
                                 perception, traffic, seed, scene.values, scene.inputs,
                                 planner.choice, seen, flow, self.duration_s, self.latency_steps,
-                                (self.engine, *self._code(scene, planner)))
+                                self.commonroad_scores, (self.engine, *self._code(scene, planner)))
 
     def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
         return (planner.digest,) if planner.choice is not None else scene.digests
@@ -133,15 +138,29 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
     scenes: list[CellScene] = []
     for number, (make, path) in enumerate(places):
         scene = make(path, store)
-        if any(each.label == scene.label for each in scenes):
-            raise InputError(f'another one is called {scene.label}, too', str(path),
-                             'rename one of them, or evaluate them apart')
         if not scene.digests:
             raise InputError('no AV takes part', str(path), 'leave it out, or name AVs in a game')
         scenes.append(scene)
         progress((number + 1) / len(places))
-    return CellGrid(tuple(scenes), planners, perception, traffic, plan.seed_numbers(),
-                    plan.duration, plan.latency, engine_digest())
+    paths = [path for _, path in places]
+    return CellGrid(_told_apart(scenes, paths), planners, perception, traffic, plan.seed_numbers(),
+                    plan.duration, plan.latency, plan.commonroad_scores, engine_digest())
+
+
+def _told_apart(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:
+    """Name scenarios with one benchmark id by their files, too; refuse what is still alike."""
+    labels = Counter(scene.label for scene in scenes)
+    named = tuple(
+        replace(scene, scenario=f'{scene.scenario} ({path.stem})')
+        if labels[scene.label] > 1 and scene.label == scene.scenario else scene
+        for scene, path in zip(scenes, paths, strict=True))
+    known: set[str] = set()
+    for scene, path in zip(named, paths, strict=True):
+        if scene.label in known:
+            raise InputError(f'another one is called {scene.label}, too', str(path),
+                             'rename one of them, or evaluate them apart')
+        known.add(scene.label)
+    return named
 
 
 def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore) -> GridPlanner:

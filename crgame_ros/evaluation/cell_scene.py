@@ -23,6 +23,7 @@ from typing import Any
 
 from crgame_ros.driver.source import parse_source
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.code_neighbours import code_neighbours, MOST_BYTES
 from crgame_ros.evaluation.content import Content, ContentStore
 from crgame_ros.evaluation.source_digest import planner_digest
 from crgame_ros.game.game import Game
@@ -53,7 +54,7 @@ class CellScene:
     """
     A game whose files are in a store.
 
-    :param scenario: benchmark id.
+    :param scenario: benchmark id, with the file's name where two files have that id.
     :param game: name of the game's file; empty where there is none.
     :param human: name of the recorded run whose humans drive; empty where there is none.
     :param values: of the game, as its file would have them; files are references to contents.
@@ -169,6 +170,11 @@ def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
             raise InputError('its image is in another folder', str(file),
                              'put it beside the map, so that both can travel')
         files.append(image)
+    files += code_neighbours(file)
+    if sum(each.stat().st_size for each in files) > MOST_BYTES:
+        raise InputError(f'has more than {MOST_BYTES // 2**20} MiB with what it names beside it',
+                         str(file), 'install the planner where the workers are, and name it '
+                         'module:Class')
     for each in files:
         try:
             yield each.name, each.read_bytes()

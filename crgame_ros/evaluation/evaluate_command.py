@@ -63,6 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='files with "traffic"; "own" is that of the games')
     add('--duration', type=float, metavar='S', help='simulated seconds of each cell')
     add('--latency', type=int, metavar='L', help='simulation steps between a request and its plan')
+    add('--commonroad-scores', action='store_true',
+        help="goals, validity, feasibility and costs by CommonRoad's tools, too: takes longer")
     where = parser.add_argument_group('where it is computed')
     where.add_argument('--workers', type=int, metavar='N',
                        help='processes here (default: one for each processor)')
@@ -168,6 +170,8 @@ def _given(values: argparse.Namespace) -> dict[str, Any]:
     for name in ('duration', 'latency'):
         if getattr(values, name) is not None:
             given[name] = getattr(values, name)
+    if values.commonroad_scores:
+        given['commonroad_scores'] = True
     return given
 
 

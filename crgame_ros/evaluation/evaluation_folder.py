@@ -24,9 +24,9 @@ from crgame_ros.analysis.tables.data_package import PACKAGE_FILE, PROFILE, table
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid
-from crgame_ros.evaluation.cell_rows import TABLES_OF_CELLS
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
+from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.recording.export import prepare_folder, write_text
 from crgame_ros.schema.writing import write
 

@@ -25,10 +25,9 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Folder, Listed, Named, Within
 from crgame_ros.schema.reading import read
+from crgame_ros.simulation.adapted_game import OWN
 from crgame_ros.yaml_text import read_yaml
 
-# The label of what a game says itself.
-OWN = 'own'
 MOST_SEEDS = 1_000_000
 _SEE = Form('see docs/evaluation.md for the keys')
 
@@ -71,6 +70,8 @@ class EvaluationPlan:
     :param duration: simulated seconds of each cell; as the game or recording says where none is
         given, and 20 s where nobody says.
     :param latency: simulation steps between a request and its plan.
+    :param commonroad_scores: whether CommonRoad's tools judge each cell, too: goals, validity,
+        feasibility and costs, which doubles the time of a short cell.
     :param base: directory against which file names are resolved.
     """
 
@@ -86,6 +87,7 @@ class EvaluationPlan:
     traffic: dict[str, Any] = field(default_factory=dict)
     duration: Annotated[float, Within(0.0, 86400.0)] | None = None
     latency: Annotated[int, Within(0, 1_000_000)] = 0
+    commonroad_scores: bool = False
     base: Annotated[Path, Folder()] = Path('.')
 
     def check(self) -> None:

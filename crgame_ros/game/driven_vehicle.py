@@ -27,7 +27,7 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 
 # Parameters of a vehicle that are no numbers.
-TEXTS = ('name', 'steering_ratio')
+TEXTS = ('name', 'steering_ratio', 'powertrain')
 VEHICLE_ID = re.compile(r'(hv|av)\d{1,3}')
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.events import EventList
 from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -209,6 +210,8 @@ class DrivabilitySpec:
     :param collision: whether contacts are looked for.
     :param road: whether vehicles have to stay on the road.
     :param stop: whether a human's violation ends the run.
+    :param contact: what a contact does to a vehicle that a person drives: `through` lets it
+        drive on through what it touches; `stop` lets it stand at once, and only drive away.
     """
 
     FORM: ClassVar[Form] = _SEE
@@ -216,6 +219,7 @@ class DrivabilitySpec:
     collision: bool = True
     road: bool = True
     stop: bool = False
+    contact: Literal['through', 'stop'] = 'through'
 
 
 @dataclass(frozen=True)
@@ -281,6 +285,8 @@ class Game:
     :param objects: objects of the game's own (FS II-A3).
     :param traffic: vehicles that react (FS III); None for none.
     :param occupancy: map of permanent obstacles (FS II-A2).
+    :param sound: whether pages may sound and gamepads rumble; `none` for a study without.
+    :param environment: light and air, as people see the world.
     """
 
     FORM: ClassVar[Form] = Form(
@@ -301,6 +307,9 @@ class Game:
     objects: Annotated[ObjectList, LeftOut()] = ()
     traffic: TrafficSpec | None = None
     occupancy: Annotated[Path, Advice('name the YAML file of a map')] | None = None
+    # YAML reads a bare on as a truth value.
+    sound: Annotated[Literal['on', 'none'], Meaning(True, 'on'), LeftOut()] = 'on'
+    environment: EnvironmentSpec | None = None
 
     def _repr_html_(self) -> str:
         """Show it in a notebook as its file says it."""

@@ -134,7 +134,8 @@ class ReactiveCore:
 
         :param driving: the path that its curvilinear frame follows.
         :param position: where the ego is on it.
-        :raises PlanningError: if the ego rolls backwards or an obstacle was never described.
+        :raises PlanningError: if the ego rolls backwards or is too far from the path, or an
+            obstacle was never described.
         """
         ego = request.ego
         if ego.speed < -REST:
@@ -143,6 +144,9 @@ class ReactiveCore:
             self._build_frame(driving, position.s)
         self.slices.update(request, self._steps + 1)
         system = self._system
+        if not system.cartesian_point_inside_projection_domain(ego.x, ego.y):
+            raise PlanningError(f'the vehicle is {abs(position.d):.0f} m beside its path, too far '
+                                "for the package's coordinates")
         here = system.convert_to_curvilinear_coords(ego.x, ego.y)
         heading = float(np.interp(here[0], system.ref_pos, system.ref_theta))
         # The package compares headings without wrapping them.

@@ -37,8 +37,9 @@ class ReplayInputs(NamedTuple):
     """
     What `ReplayDriver` and `run_offline` need to repeat a recorded run to the last bit.
 
-    :param commands: (n, 4) throttle, brake, steering, reverse by human, and by AV that somebody
-        took over (NaN while it followed its plan); row i was consumed in the step from i to i + 1.
+    :param commands: (n, 5) throttle, brake, steering, reverse, lights by human, and by AV that
+        somebody took over (NaN while it followed its plan); row i was consumed in the step from i
+        to i + 1.
     :param dt_eff_s: (n) interval over which that step was integrated [s]
     """
 

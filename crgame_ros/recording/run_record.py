@@ -37,8 +37,9 @@ class RunRecord:
     :param log: how everybody moved, at the scenario's steps.
     :param ns: (R) simulation steps n of which is known what led to them, rising; where a recorder
         missed some they are not consecutive.
-    :param commands: (R, V, 4) throttle, brake, steering and reverse that the step from n - 1 to n
-        consumed, of the driven vehicles in the log's order; NaN of an AV that follows its plan.
+    :param commands: (R, V, 5) throttle, brake, steering, reverse and lights that the step from
+        n - 1 to n consumed, of the driven vehicles in the log's order; NaN of an AV that
+        follows its plan.
     :param fired: events that took effect, in order.
     :param orders: of the seats, in order; an offline run has none.
     :param drivers: who drove, in order; an offline run does not say it.

@@ -32,6 +32,7 @@ from crgame_ros.recording.recorded_plans import OpenRequests
 from crgame_ros.recording.run_contacts import recorded_contacts
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.seat_sound import SeatSound
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.timing_metrics import TimingMetrics
@@ -90,6 +91,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None
             'drivability': {'violations': len(collected.violations),
                             'list': collected.violations},
             'contacts': contacts,
+            'sound': collected.sound.as_dict(),
             'benchmark_id': run.game.benchmark_id,
             'epoch': run.game.epoch,
             'notices': [*dict.fromkeys((
@@ -145,6 +147,7 @@ class _Collector:
         self._ages_ms: dict[str, list[float]] = defaultdict(list)
         self._reasons: dict[str, Counter[str]] = defaultdict(Counter)
         self._statuses: dict[str, dict[str, str]] = {}
+        self.sound = SeatSound()
 
     def take(self, recorded: BagMessage, reader: BagReader) -> None:
         """Take one message; those of other runs, and those that are none, are passed over."""
@@ -182,8 +185,10 @@ class _Collector:
             self._latencies_ms[av].append(latency_ms)
 
     def _take_status(self, status: Any) -> None:
-        values = read_status(status).values
+        told = read_status(status)
+        values = told.values
         self._statuses[status.name] = values
+        self.sound.take(told)
         if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
             self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
             if status.message.startswith(_BRAKING):

@@ -22,6 +22,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.lights import Light, lights_of
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import Joy
@@ -134,7 +135,8 @@ def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
     :param source: who speaks, as /seats names it.
     """
     message = Joy(axes=array('f', (command.throttle, command.brake, command.steering)),
-                  buttons=array('i', (int(command.reverse),)))
+                  buttons=array('i', (
+                      int(command.reverse), *(int(bool(command.lights & bit)) for bit in Light))))
     message.header.frame_id = source
     message.header.stamp = to_time(stamp_ns)
     return message
@@ -142,7 +144,7 @@ def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
 
 def from_joy(message: Joy, where: str) -> DriverCommand:
     """
-    Read a driver's command.
+    Read a driver's command; lights that it does not tell are off.
 
     :raises InputError: if axes or buttons are missing.
     """
@@ -150,4 +152,6 @@ def from_joy(message: Joy, where: str) -> DriverCommand:
         raise InputError(f'has {len(message.axes)} axes and {len(message.buttons)} buttons', where,
                          'give axes throttle, brake, steering and the button reverse')
     throttle, brake, steering = message.axes[:3]
-    return DriverCommand(throttle, brake, steering, bool(message.buttons[0])).rounded()
+    reverse, left, right, horn = (*message.buttons, 0, 0, 0)[:4]
+    return DriverCommand(throttle, brake, steering, bool(reverse),
+                         lights_of(left, right, horn)).rounded()

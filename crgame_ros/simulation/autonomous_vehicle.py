@@ -273,6 +273,12 @@ class AutonomousVehicle:
         self.state = self._driven.step(command, dt_s)
         return self.state
 
+    def stand(self, state: VehicleState) -> None:
+        """Be stopped, while a person drives it, in a state without speed."""
+        if self._driven is not None:
+            self._driven.stand(state)
+            self.state = state
+
     def advance(self, n: int) -> VehicleState:
         """
         Move to step n along the plan (algorithm 1, line 13), or brake where it is used up.

@@ -34,6 +34,7 @@ from crgame_ros.simulation.av_models import (
     make_vehicle_model,
     published,
 )
+from crgame_ros.simulation.contact_stop import at_rest, ContactStop
 from crgame_ros.simulation.plan_requests import PlanRequests
 from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.run_events import RunEvents
@@ -116,6 +117,8 @@ class Simulation:
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
         self._driven = (*self.humans, *self.avs)
+        self._contact_stop = ContactStop(setup) \
+            if setup.game.drivability.contact == 'stop' else None
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
         self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
@@ -202,6 +205,7 @@ class Simulation:
         Parameters are those of `step`. Whoever drives can be shown what became of it before
         planners' requests are made, which takes ten times as long.
         """
+        before = self.states if self._contact_stop is not None else []
         self.n += 1
         seats = len(self.humans) + len(self.avs)
         self.commands = [command and command.rounded() for command in commands]
@@ -213,6 +217,19 @@ class Simulation:
                 av.advance(self.n)
             else:
                 av.drive(command, dt_eff_s)
+        if self._contact_stop is not None:
+            self._stop_who_touched(self._contact_stop, before)
+
+    def _stop_who_touched(self, contacts: ContactStop, before: Sequence[VehicleState]) -> None:
+        """Let persons' vehicles stand that have driven into something; traces go on."""
+        since_tick = (self.n - 1) % self.scheduler.steps_per_tick + 1
+        if since_tick == 1:
+            contacts.set_objects(self._world.objects)
+        for index in contacts.stopped(since_tick * self.scheduler.dt_s, before, self.states):
+            driven = self._driven[index]
+            if isinstance(driven, HumanVehicle) or (
+                    isinstance(driven, AutonomousVehicle) and driven.driven):
+                driven.stand(at_rest(before[index], driven.state))
 
     def conclude(self) -> StepResult:
         """Do what is due once the vehicles have moved: estimates, objects, events, requests."""

@@ -35,7 +35,7 @@ from crgame_ros.simulation.observer import drivability_monitor, ObservedRun, Run
 from crgame_ros.simulation.offline_driver import offline_driver
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
-from crgame_ros.vehicle.driver_command import RELEASED
+from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, RELEASED
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 import numpy as np
 from numpy.typing import NDArray
@@ -77,8 +77,8 @@ class OfflineResult:
     :param vehicle_states: (n + 1, V, 8) states of humans, then AVs, at every step.
     :param object_poses: (ticks, M, 3) centre poses at every tick.
     :param object_velocities: (ticks, M, 3) their derivatives.
-    :param commands: (n + 1, H, 4) throttle, brake, steering and reverse; row i was consumed by
-        the step that led to state i, row 0 by none.
+    :param commands: (n + 1, H, 5) throttle, brake, steering, reverse and lights; row i was
+        consumed by the step that led to state i, row 0 by none.
     :param intervals_s: (n + 1, V) interval over which each vehicle was moved in that step: Delta
         t_eff where somebody drives it, else the nominal step [s]
     :param planners: what each AV's planner did.
@@ -86,7 +86,7 @@ class OfflineResult:
     :param fired: events that took effect, in order.
     :param stop: the human's violation that ended the run, where the game has it so; its n is that
         of the last state.
-    :param av_commands: (n + 1, A, 4) the same commands of those who took over an AV; NaN while it
+    :param av_commands: (n + 1, A, 5) the same commands of those who took over an AV; NaN while it
         followed its plan.
     """
 
@@ -101,7 +101,8 @@ class OfflineResult:
     violations: tuple[VehicleDrivability, ...] = field(default=())
     fired: tuple[FiredEvent, ...] = ()
     stop: VehicleDrivability | None = None
-    av_commands: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0, 4)))
+    av_commands: NDArray[np.float64] = field(
+        default_factory=lambda: np.empty((0, 0, COMMAND_WIDTH)))
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """Give the states (n + 1, 8) of one driven vehicle."""
@@ -274,8 +275,8 @@ class _Trace:
     def __init__(self, setup: Setup, steps: int, check: bool,
                  observers: Sequence[RunObserver]) -> None:
         self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), STATE_WIDTH))
-        self.commands = np.zeros((steps + 1, len(setup.humans), 4))
-        self.av_commands = np.full((steps + 1, len(setup.avs), 4), np.nan)
+        self.commands = np.zeros((steps + 1, len(setup.humans), COMMAND_WIDTH))
+        self.av_commands = np.full((steps + 1, len(setup.avs), COMMAND_WIDTH), np.nan)
         self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
         self.object_velocities: list[NDArray[np.float64]] = []

@@ -17,6 +17,8 @@
 from struct import Struct
 from typing import NamedTuple
 
+from crgame_ros.vehicle.lights import ALL_LIGHTS
+
 
 class DriverCommand(NamedTuple):
     """
@@ -26,12 +28,15 @@ class DriverCommand(NamedTuple):
     :param brake: normalised brake pedal p_br in [0, 1]
     :param steering: normalised steering wheel s in [-1, 1], positive to the left
     :param reverse: True while the reverse gear is selected
+    :param lights: what others see and hear of it, bits of `Light`; the vehicle's motion does not
+        depend on it
     """
 
     throttle: float = 0.0
     brake: float = 0.0
     steering: float = 0.0
     reverse: bool = False
+    lights: int = 0
 
     def rounded(self) -> 'DriverCommand':
         """
@@ -42,10 +47,12 @@ class DriverCommand(NamedTuple):
         """
         return DriverCommand(
             _clip_float32(self.throttle, 0.0), _clip_float32(self.brake, 0.0),
-            _clip_float32(self.steering, -1.0), bool(self.reverse))
+            _clip_float32(self.steering, -1.0), bool(self.reverse),
+            int(self.lights) & ALL_LIGHTS)
 
 
 RELEASED = DriverCommand()
+COMMAND_WIDTH = len(RELEASED)
 _FLOAT32 = Struct('f')
 
 

@@ -49,6 +49,10 @@ class HumanVehicle:
         """Engaged gear: 1 forward, -1 reverse."""
         return self._model.gear
 
+    def stand(self, state: VehicleState) -> None:
+        """Be stopped by something else than the brakes, in a state without speed."""
+        self.state = state
+
     def step(self, command: DriverCommand, dt_s: float) -> VehicleState:
         """
         Advance by one cycle under a driver's command (CRG 20-24 and 26, then the model).

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from browser_support import Browser
+from crgame_ros.cockpit.frames import STATE_COLUMNS
 from crgame_ros.recording.run_folder import run_folder
 from live_browser_support import (
     BRAKE,
@@ -308,7 +309,7 @@ def test_poses_as_drawn_are_those_of_the_bag(only_page: LivePage) -> None:
     assert len(between) > max(10, 0.2 * len(frames))
     for frame in between:
         assert frame['before'] * DT_S <= frame['t'] + 1e-9 < frame['after'] * DT_S + 2e-9
-        vehicles = np.array(frame['vehicles'], dtype=float).reshape(-1, 12)[:, :3]
+        vehicles = np.array(frame['vehicles'], dtype=float).reshape(-1, STATE_COLUMNS)[:, :3]
         expected = recorded.vehicles_at(frame['t'], frame['before'], frame['after'])
         np.testing.assert_allclose(vehicles, expected, rtol=0.0, atol=1e-6)
         objects = np.array(frame['objects'], dtype=float).reshape(-1, 6)[:, :3]

@@ -22,6 +22,7 @@ from typing import Any
 from browser_support import Browser
 from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.cockpit.frames import STATE_COLUMNS
 from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.recording.run_log import read_run_log, RunLog
 from crgame_ros.simulation.offline import OfflineResult
@@ -97,7 +98,7 @@ def drawn(page: Browser) -> dict[str, Any]:
 def last_frame(page: Browser) -> dict[str, Any]:
     """Take the frame that the world has drawn last."""
     frame: dict[str, Any] = page.run(DRAWN)
-    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, 12)
+    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, STATE_COLUMNS)
     frame['objects'] = np.array(frame['objects'], dtype=float).reshape(-1, 6)
     return frame
 

@@ -19,6 +19,7 @@ import time
 from typing import Any
 
 from browser_support import Browser
+from crgame_ros.cockpit.frames import STATE_COLUMNS
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +57,7 @@ def page(run: RecordedRun, browser: Browser) -> Iterator[Served]:
 def shown(browser: Browser) -> dict[str, Any]:
     """Take the last frame as it was drawn."""
     frame: dict[str, Any] = browser.run(SHOWN)
-    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, 12)
+    frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, STATE_COLUMNS)
     frame['objects'] = np.array(frame['objects'], dtype=float).reshape(-1, 6)
     return frame
 

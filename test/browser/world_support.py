@@ -25,7 +25,7 @@ from typing import Any, Literal
 
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.frames import encode_objects, encode_plan, encode_state
+from crgame_ros.cockpit.frames import encode_objects, encode_plan, encode_state, STATE_COLUMNS
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
@@ -43,7 +43,7 @@ FloatArray = NDArray[np.float64]
 
 class RecordedRun:
     """
-    A game's run, computed offline: (n, V, 12) states at all steps, (ticks, M, 6) objects.
+    A game's run, computed offline: (n, V, 13) states at all steps, (ticks, M, 6) objects.
 
     :param path: game file.
     :param duration_s: simulated.
@@ -58,7 +58,7 @@ class RecordedRun:
             setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
         self.scene = scene_document(setup.loaded, setup.descriptions, game)
         count, vehicles, columns = result.vehicle_states.shape
-        self.states: FloatArray = np.full((count, vehicles, 12), np.nan)
+        self.states: FloatArray = np.full((count, vehicles, STATE_COLUMNS), np.nan)
         self.states[:, :, :columns] = result.vehicle_states
         self.states[:, :len(setup.humans), 8:] = result.commands
         self.objects: FloatArray = np.concatenate(
@@ -82,6 +82,8 @@ class RunBackend:
         self.state = 'paused'
         self.stalled = False
         self.factor = 1.0
+        # As the status says it.
+        self.drivability: dict[str, dict[str, Any]] = {}
         self.n = self.epoch = 0
         self.messages: list[Mapping[str, Any]] = []
         self._random = np.random.default_rng(1)
@@ -177,7 +179,8 @@ class RunBackend:
             'run': self.state, 't': self.n * self.run.dt_s, 'n': self.n,
             'k': self.n // self.run.steps_per_tick, 'epoch': self.epoch,
             'real_time_factor': self.factor, 'measured_factor': self.factor,
-            'frames_skipped': False, 'timing': None, 'planners': {}, 'drivability': {},
+            'frames_skipped': False, 'timing': None, 'planners': {},
+            'drivability': self.drivability,
             'recording': {'state': 'none', 'messages': 0, 'megabytes': 0, 'text': ''},
             'seats_lost': {}, 'clients': 1})
 

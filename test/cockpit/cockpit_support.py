@@ -99,7 +99,7 @@ class PumpBackend:
         while True:
             self.pumped += 1
             hub.send_frame('state', self._frame or encode_state(
-                0, self.pumped, 0, 0.01 * self.pumped, np.zeros((2, 12))))
+                0, self.pumped, 0, 0.01 * self.pumped, np.zeros((2, 13))))
             await asyncio.sleep(self._period_s)
 
 

@@ -207,6 +207,8 @@ GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({'type': 'layers', 'perception': 'av0', 'scans': 1},
      {'type': 'layers', 'perception': 'av0', 'scans': True}),
     ({'type': 'layers', 'perception': ''}, {'type': 'layers', 'perception': ''}),
+    ({'type': 'sound', 'on': 1, 'volume': 0.5, 'rumble': 1, 'pitch': 2},
+     {'type': 'sound', 'on': True, 'volume': 0.5, 'rumble': 1.0}),
     ({'type': 'ping', 't': 12}, {'type': 'ping', 't': 12.0}),
 ]
 
@@ -257,6 +259,9 @@ BAD = {
     'perception of a human': '{"type": "layers", "perception": "hv0"}',
     'perception of nobody': '{"type": "layers", "perception": null}',
     'scans are text': '{"type": "layers", "scans": "yes"}',
+    'sound without': '{"type": "sound"}',
+    'sound too loud': '{"type": "sound", "on": 1, "volume": 1.01, "rumble": 0}',
+    'sound on is 2': '{"type": "sound", "on": 2, "volume": 1, "rumble": 0}',
     'ping without': '{"type": "ping"}',
 }
 

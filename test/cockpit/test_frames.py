@@ -38,13 +38,13 @@ def numbers(frame: bytes) -> list[float]:
 
 
 def test_state_holds_header_count_and_rows() -> None:
-    rows = np.arange(24.0).reshape(2, 12)
+    rows = np.arange(26.0).reshape(2, 13)
     assert numbers(encode_state(3, 150, 15, 1.5, rows)) == [
-        1, 3, 150, 15, 1.5, 2, *range(24)]
+        1, 3, 150, 15, 1.5, 2, *range(26)]
 
 
 def test_state_without_vehicles_is_the_header() -> None:
-    assert numbers(encode_state(0, 0, 0, 0.0, np.empty((0, 12)))) == [1, 0, 0, 0, 0.0, 0]
+    assert numbers(encode_state(0, 0, 0, 0.0, np.empty((0, 13)))) == [1, 0, 0, 0, 0.0, 0]
 
 
 def test_an_absent_object_is_nan_and_the_others_stay() -> None:
@@ -72,9 +72,9 @@ def test_prediction_puts_each_column_before_its_points() -> None:
         4, 0, 10, 1, 0.1, 1, 2, 2, 0, *range(6), 7, *range(6, 12)]
 
 
-@pytest.mark.parametrize('shape', [(12,), (2, 11), (1, 2, 12)], ids=str)
+@pytest.mark.parametrize('shape', [(13,), (2, 12), (1, 2, 13)], ids=str)
 def test_a_state_of_another_width_is_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(InputError, match=r'STATE of shape .*give \(any, 12\)'):
+    with pytest.raises(InputError, match=r'STATE of shape .*give \(any, 13\)'):
         encode_state(0, 0, 0, 0.0, np.zeros(shape))
 
 
@@ -85,7 +85,7 @@ def test_predictions_without_their_columns_are_refused() -> None:
 
 def test_a_state_costs_little_of_a_cycle() -> None:
     # 100 Hz leave 10 ms; the best of many is what the code costs, not what the machine does.
-    rows = np.random.default_rng(0).random((10, 12))
+    rows = np.random.default_rng(0).random((10, 13))
     best = min(_seconds(rows) for _ in range(2000))
     assert best < 20e-6
 

@@ -97,12 +97,12 @@ def test_every_state_is_that_of_the_message(bag: Path, backend: ReplayBackend,
     for _, head, body in frames.states:
         n = int(head[2])
         assert head.tolist() == [1, 0, n, n // N, n * 0.01]
-        rows = body[1:].reshape(2, 12)
+        rows = body[1:].reshape(2, 13)
         joints = [np.array(values).reshape(2, 4) for values in (
             raw[n].positions, raw[n].velocities, raw[n].accelerations)]
         np.testing.assert_array_equal(rows[:, :3], joints[0][:, :3])
         np.testing.assert_array_equal(rows[:, :8], vehicles_from_joints(*joints))
-    commands = np.array([body[1:].reshape(2, 12)[:, 8:] for _, _, body in frames.states])
+    commands = np.array([body[1:].reshape(2, 13)[:, 8:] for _, _, body in frames.states])
     assert np.isnan(commands[0]).all() and np.isnan(commands[:, 1]).all()
     np.testing.assert_array_equal(commands[1:, 0], parked.commands[1:, 0])
 
@@ -111,7 +111,7 @@ def test_ticks_are_those_of_the_run_log(bag: Path, backend: ReplayBackend) -> No
     """Vehicles and objects at each scenario step agree with the reader of conversions."""
     log = read_run_log(bag)
     frames = read_frames(*map(backend.chunk, range(3)))
-    at_ticks = np.array([body[1:].reshape(2, 12)[:, :8] for _, head, body in frames.states
+    at_ticks = np.array([body[1:].reshape(2, 13)[:, :8] for _, head, body in frames.states
                          if head[2] % N == 0])
     np.testing.assert_array_equal(at_ticks, log.vehicle_states)
     objects = {int(head[3]): body[1:].reshape(-1, 6) for _, head, body in frames.objects}
@@ -240,7 +240,7 @@ def test_each_run_of_a_recording(tmp_path: Path, parked: OfflineResult) -> None:
         assert [len(info['events']) for info in infos[1:]] == [4, 0]
         for epoch, result in ((0, parked), (1, second)):
             frames = read_frames(backend.chunk(0, epoch))
-            poses = np.array([body[1:].reshape(2, 12)[:, :3] for _, _, body in frames.states])
+            poses = np.array([body[1:].reshape(2, 13)[:, :3] for _, _, body in frames.states])
             assert [head[1] for _, head, _ in frames.states] == [epoch] * len(poses)
             np.testing.assert_array_equal(poses, result.vehicle_states[:500, :, :3])
         assert len(read_frames(backend.chunk(0, 1)).plans) == 16

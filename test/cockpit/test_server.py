@@ -33,6 +33,7 @@ from cockpit_support import (
 )
 from crgame_ros.cockpit import hub, page_files, server, session
 from crgame_ros.cockpit.access import Access
+from crgame_ros.cockpit.client import Sound
 from crgame_ros.cockpit.frames import FrameKind
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError, InputError
@@ -192,14 +193,16 @@ async def test_too_many_waiting_requests_are_refused_one_by_one() -> None:
 
 
 @in_loop
-async def test_names_and_layers_are_kept() -> None:
+async def test_names_layers_and_sound_are_kept() -> None:
     async with cockpit() as running:
         socket = await running.join()
         await socket.send_json({'type': 'name', 'name': 'Ada'})
+        await socket.send_json({'type': 'sound', 'on': 1, 'volume': 0.5, 'rumble': 0.25})
         await socket.send_json({'type': 'layers', 'predictions': True})
         client = running.hub.clients['c1']
         await wait_until(lambda: client.wants_predictions, 'the layers')
         assert client.name == 'Ada' and not running.backend.commands
+        assert client.sound == Sound(True, 0.5, 0.25)
         # What was not named stays; who wants more gets the newest of it, also in a pause.
         wanted = running.hub.send_frame
         wanted('seen:1', b'12345678', only_if=lambda other: other.perceives_as == 'av0')

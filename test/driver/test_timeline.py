@@ -97,8 +97,8 @@ def test_axes_may_be_few() -> None:
 
 
 def test_reverse_lasts_for_its_intervals() -> None:
-    """The gear button is held in [2, 2.5)."""
-    assert [bool(joy().raw_at(t).pressed) for t in (1.99, 2.0, 2.49, 2.5)] == [
+    """The gear is asked for in [2, 2.5)."""
+    assert [joy().held.keys_at(t).reverse for t in (1.99, 2.0, 2.49, 2.5)] == [
         False, True, True, False]
 
 

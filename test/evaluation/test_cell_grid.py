@@ -127,6 +127,20 @@ def test_games_that_need_a_person_are_refused(tmp_path: Path) -> None:
         grid({'games': [str(game)]}, tmp_path)
 
 
+def test_scenarios_of_one_id_are_named_by_their_files(tmp_path: Path) -> None:
+    scenario = GAME.with_name('ZAM_CutIn-1_1_T-1.xml')
+    for name in ('one', 'two'):
+        (tmp_path / f'{name}.xml').write_bytes(scenario.read_bytes())
+    found = grid({'scenarios': [str(tmp_path)], 'games': [str(GAME)], 'planners': ['idm']},
+                 tmp_path)
+    assert [cell.label.partition(' ·')[0] for cell in found] == [
+        'cut_in', 'ZAM_CutIn-1_1_T-1 (one)', 'ZAM_CutIn-1_1_T-1 (two)']
+    (tmp_path / 'sub').mkdir()
+    (tmp_path / 'sub' / 'one.xml').write_bytes(scenario.read_bytes())
+    with pytest.raises(InputError, match='rename one of them'):
+        grid({'scenarios': [str(tmp_path), str(tmp_path / 'sub')]}, tmp_path)
+
+
 def test_two_scenes_of_one_name_are_refused(tmp_path: Path) -> None:
     other = tmp_path / 'cut_in.yaml'
     other.write_text(f'scenario: {GAME.parent}/ZAM_CutIn-1_1_T-1.xml\nhumans: []\n')

@@ -20,14 +20,16 @@ import sys
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.result_parts import EARLIER, ResultParts
+from crgame_ros.evaluation.results.result_parts import EARLIER, ResultParts
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 FILL = """
 import os, sys
 from pathlib import Path
-from crgame_ros.evaluation.result_parts import ResultParts
+from crgame_ros.evaluation.results.result_parts import ResultParts
 sys.path.insert(0, sys.argv[2])
 from test_result_parts import rows
 parts = ResultParts(Path(sys.argv[1]), part_cells=4)
@@ -110,3 +112,19 @@ def test_what_is_not_wanted_is_put_away_and_comes_back(tmp_path: Path) -> None:
     assert sorted(seeds(tmp_path, 'vehicles', 'distance')) == sorted(
         number + 0.1 for number in (0, 1, 2, 4, 5, 6, 7) for _ in (0, 1))
     assert seeds(tmp_path / EARLIER) == [3]
+
+
+def test_a_summary_knows_of_cells_that_are_only_in_the_journal(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, '-c', FILL, tmp_path, Path(__file__).parent])
+    parts = EvaluatedParts(tmp_path)
+    assert parts.rows == 10
+    for table, column, kind, wanted in (
+            ('cells', 'seed', pa.int64(), [*range(10)]),
+            ('vehicles', 'distance', pa.float64(), [n + 0.1 for n in range(10) for _ in (0, 1)])):
+        assert [value for batch in parts.batches(table, {column: kind})
+                for value in batch.rows[column].to_pylist()] == wanted
+    # A journal whose part is written, and a line that is cut off, count once and not.
+    kept = next(tmp_path.glob('journal*'))
+    (tmp_path / 'journal-000000.jsonl').write_text(kept.read_text())
+    kept.write_text(kept.read_text()[:-9])
+    assert EvaluatedParts(tmp_path).rows == 9

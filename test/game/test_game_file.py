@@ -106,6 +106,7 @@ def test_defaults(tmp_path: Path) -> None:
     game = load_game(write(tmp_path, 'scenario: road.xml\n'))
     assert game.humans == (HumanSpec('hv0', 'auto', 'bmw_320i', None),)
     assert game.avs is None
+    assert game.sound == 'on'
     assert (game.timing.rate, game.duration, game.seed) == (100.0, math.inf, 0)
     assert (game.prediction.mode, game.prediction.horizon) == ('constant', 3.0)
     assert (game.timing.realign, game.timing.sample, game.timing.clip) == (
@@ -269,3 +270,13 @@ def test_own_games_round_trip(tmp_path: Path, path: Path) -> None:
         kind, _, name = before.driver.partition(':')
         assert after == replace(before, driver=f'{kind}:{path.parent / name}')
     assert again.avs == game.avs
+
+
+@pytest.mark.parametrize(('written', 'meant'), [('on', 'on'), ("'on'", 'on'), ('none', 'none')])
+def test_sound_is_on_or_none(tmp_path: Path, written: str, meant: str) -> None:
+    """YAML reads a bare on as a truth value; only what is not the default is written back."""
+    game = load_game(write(tmp_path, f'scenario: road.xml\nsound: {written}\n'))
+    assert game.sound == meant
+    again = dump_game(game)
+    assert ('\nsound:' in again) == (meant == 'none')
+    assert load_game(write(tmp_path, again, 'again.yaml')).sound == meant

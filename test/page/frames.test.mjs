@@ -11,7 +11,7 @@ import { close, frameOf, stateFrame } from './support.mjs';
 
 const HEAD = [3, 120, 12, 1.2];
 
-test('a state has its head and a row of 12 for each vehicle', () => {
+test('a state has its head and a row of 13 for each vehicle', () => {
   const frame = decodeFrame(stateFrame({ epoch: 3, n: 120, k: 12, t: 1.2 },
     [1, 2, 0.5, 20], [4, 5, -0.5, 10, 0, 0, 0, 0, 0, 0, 0, 1]));
   assert.deepEqual([frame.kind, frame.epoch, frame.n, frame.k, frame.t], [1, 3, 120, 12, 1.2]);
@@ -94,7 +94,7 @@ test('an unknown kind is no error: a newer server may send it', () => {
 });
 
 for (const [name, values] of Object.entries({
-  'two vehicles and one row': [KIND.STATE, ...HEAD, 2, ...Array(12).fill(0)],
+  'two vehicles and one row': [KIND.STATE, ...HEAD, 2, ...Array(13).fill(0)],
   'no number of vehicles': [KIND.STATE, ...HEAD, NaN],
   'fewer than none': [KIND.OBJECTS, ...HEAD, -1],
   'a plan without its points': [KIND.PLAN, ...HEAD, 0, 3, 1, 2, 3, 4, 5],

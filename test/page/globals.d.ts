@@ -8,7 +8,9 @@ import type { createPerson } from '../../crgame_ros/cockpit/page/js/person.js';
 import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
 import type { createPerception } from
   '../../crgame_ros/cockpit/page/js/perception/perception.js';
+import type { Sound } from '../../crgame_ros/cockpit/page/js/sound/sound.js';
 import type { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import type { View3d } from '../../crgame_ros/cockpit/page/js/view3d/view3d.js';
 import type { World } from '../../crgame_ros/cockpit/page/js/world/world.js';
 
 /** main.js fills it: every part may be missing, because each is loaded by itself. */
@@ -19,6 +21,8 @@ interface Crgame {
   driving?: Driving;
   person?: ReturnType<typeof createPerson>;
   perception?: ReturnType<typeof createPerception>;
+  sound?: Sound;
+  view3d?: View3d;
   ready?: boolean;
   [part: string]: unknown;
 }

@@ -37,12 +37,12 @@ export function frameOf(...values) {
  * Write a STATE frame.
  *
  * @param {{epoch?: number, n: number, k?: number, t: number}} head
- * @param {...number[]} rows of 12 values; what is left out is 0
+ * @param {...number[]} rows of 13 values; what is left out is 0
  * @returns {ArrayBuffer}
  */
 export function stateFrame({ epoch = 0, n, k = 0, t }, ...rows) {
   return frameOf(1, epoch, n, k, t, rows.length,
-    ...rows.flatMap((row) => Array.from({ length: 12 }, (_, i) => row[i] ?? 0)));
+    ...rows.flatMap((row) => Array.from({ length: 13 }, (_, i) => row[i] ?? 0)));
 }
 
 /** Stands for Path2D: keeps what is drawn, as straight pieces and the points that bound them. */

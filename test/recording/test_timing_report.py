@@ -211,3 +211,21 @@ def test_recordings_without_timing(tmp_path: Path, recorder: Any, drive: Drive) 
     with pytest.raises(CrgameError, match='too few to measure'):
         write_timing_report(one, tmp_path / 'timing.json')
     assert not (tmp_path / 'timing.json').exists()
+
+
+def test_the_sound_of_seats(tmp_path: Path, recorder: Any, drive: Drive) -> None:
+    """How long it was on, and how loudly then; what cannot be read is passed over."""
+    messages = documents(recorder, drive(CUT_IN, duration_s=0.1)) + cycles(recorder, {}, {}, 30)
+    quiet = timing_report(recorder.ours(tmp_path / 'quiet', messages))
+    assert quiet['sound'] == {}
+    told = [('hv0', 'true', '0.60', '0.50'), ('hv0', 'true', '0.80', '0.50'),
+            ('hv0', 'true', '0.80', '0.50'), ('hv0', 'false', '0.10', '0.50'),
+            ('av0', 'false', '0.70', '0.00'), ('hv0', 'true', 'loud', '0.50'),
+            ('hv0', 'true', '1.50', '0.50'), ('nobody', 'true', '1.00', '1.00')]
+    for number, (seat, on, volume, rumble) in enumerate(told):
+        stamp_ns = 10_000_000 * (number + 1)
+        messages.append(('/diagnostics', DIAGNOSTICS, START + stamp_ns, recorder.status(
+            stamp_ns, f'cockpit_node: {seat} sound', '', on=on, volume=volume, rumble=rumble)))
+    assert timing_report(recorder.ours(tmp_path / 'bag', messages))['sound'] == {
+        'hv0': {'on_share': 0.75, 'volume': 0.8, 'rumble': 0.5},
+        'av0': {'on_share': 0.0, 'volume': None, 'rumble': 0.0}}

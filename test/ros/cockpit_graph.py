@@ -150,7 +150,8 @@ async def _run(check: Check) -> None:
     node = rclpy.create_node('cockpit_node', context=context)
     hub, backend = Hub('live'), LiveBackend(node)
     try:
-        with Peer(domain, '/seats/order', ('/<v>/driver_command', 'hv0')) as peer:
+        with Peer(domain, '/seats/order', ('/<v>/driver_command', 'hv0'),
+                  '/diagnostics') as peer:
             await backend.start(hub)
             await check(Graph(peer, hub, backend, node))
             assert backend._pump is not None and not backend._pump.done()

@@ -20,11 +20,13 @@ import json
 from typing import Any
 
 from cockpit_graph import Graph, lived, OFFSET_NS
+from crgame_ros.cockpit.client import Sound
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import events_document
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.game_file import load_game
-from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.messages.status_values import read_status
+from crgame_ros.ros.ros_messages import from_time, to_time
 from crgame_ros.simulation.setup import build_setup, Setup
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from live_support import SCENARIOS
@@ -147,6 +149,35 @@ def test_giving_back_lets_go_of_the_pedals(setup: Setup) -> None:
         await graph.ask(page, 'release', seat='hv0')
         await graph.pause(0.3)
         assert graph.throttles()[-1] == 0.0
+    lived(check)
+
+
+def test_what_the_person_in_a_seat_hears_is_told(setup: Setup) -> None:
+    """At each change and once a second, with the time of the run; of nobody else."""
+    def told(graph: Graph) -> list[tuple[int, dict[str, str]]]:
+        return [(from_time(message.header.stamp), read_status(status).values)
+                for message in graph.peer.messages['/diagnostics'] for status in message.status
+                if status.name == 'cockpit_node: hv0 sound']
+
+    async def check(graph: Graph) -> None:
+        page, other = graph.page(), graph.page()
+        await graph.meet(('/vehicles/state', ''))
+        await graph.begin(setup)
+        await graph.seats('cockpit')
+        await graph.state(setup, 20)
+        other.sound = Sound(True, 1.0, 1.0)
+        await graph.pause(0.3)
+        assert told(graph) == []
+        await graph.ask(page, 'claim', seat='hv0')
+        await graph.until(lambda: told(graph), 'the sound of the seat')
+        silent = {'on': 'false', 'volume': '0.00', 'rumble': '0.00'}
+        assert told(graph)[0] == (OFFSET_NS + 200_000_000, silent)
+        page.sound = Sound(True, 0.6, 0.5)
+        loud = {'on': 'true', 'volume': '0.60', 'rumble': '0.50'}
+        await graph.until(lambda: told(graph)[-1][1] == loud, 'the new sound')
+        await graph.until(lambda: [values for _, values in told(graph)].count(loud) > 1,
+                          'the same once more')
+        assert all(values in (silent, loud) for _, values in told(graph))
     lived(check)
 
 

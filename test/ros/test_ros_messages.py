@@ -254,13 +254,16 @@ def test_message_that_is_no_plan_is_refused(names: tuple[str, ...], times_ns: Se
 
 
 @pytest.mark.parametrize('command', [
-    DriverCommand(), DriverCommand(1.0, 0.0, -1.0, True), DriverCommand(0.1, 0.7, 1.0 / 3.0)])
+    DriverCommand(), DriverCommand(1.0, 0.0, -1.0, True, 5), DriverCommand(0.1, 0.7, 1.0 / 3.0),
+    DriverCommand(lights=2)])
 def test_command_is_rounded_once(command: DriverCommand) -> None:
     """A Joy holds float32, to which every command is rounded: what comes is what was meant."""
     message = _sent(to_joy(command, 1_230_000_000, 'cockpit'))
     assert message.header.frame_id == 'cockpit'
     assert from_time(message.header.stamp) == 1_230_000_000
-    assert message.axes.typecode == 'f' and list(message.buttons) == [int(command.reverse)]
+    left, right, horn = (int(command.lights) >> bit & 1 for bit in range(3))
+    assert message.axes.typecode == 'f'
+    assert list(message.buttons) == [int(command.reverse), left, right, horn]
     read = from_joy(message, '/hv0/driver_command')
     assert read == command.rounded()
     assert read == from_joy(_sent(to_joy(read, 0, 'game')), '/hv0/driver_command')
@@ -269,10 +272,11 @@ def test_command_is_rounded_once(command: DriverCommand) -> None:
 
 def test_command_of_a_stranger_is_clipped() -> None:
     """Values out of range are clipped, no numbers count as released, further axes are ignored."""
-    message = Joy(axes=[3.0, -1.0, -math.inf, 9.0], buttons=[5, 1])
-    assert from_joy(_sent(message), 'joy') == DriverCommand(1.0, 0.0, -1.0, True)
+    message = Joy(axes=[3.0, -1.0, -math.inf, 9.0], buttons=[5, 1, 0, 7, 9])
+    assert from_joy(_sent(message), 'joy') == DriverCommand(1.0, 0.0, -1.0, True, 5)
+    # As recordings of earlier versions have it: one button.
     message = Joy(axes=[math.nan, 0.5, math.nan], buttons=[0])
-    assert from_joy(_sent(message), 'joy') == DriverCommand(0.0, 0.5, 0.0, False)
+    assert from_joy(_sent(message), 'joy') == DriverCommand(0.0, 0.5, 0.0, False, 0)
 
 
 @pytest.mark.parametrize(('axes', 'buttons'), [(0, 1), (2, 1), (3, 0), (0, 0)])

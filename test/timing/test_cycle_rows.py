@@ -39,7 +39,7 @@ def test_columns_name_what_is_in_them() -> None:
     """Each value is found under its name after the way through the flat message."""
     rows = filled()
     table = CycleTable.from_message(','.join(rows.columns), rows.taken())
-    assert table.rows.shape == (2, 12 + 9 + 8)
+    assert table.rows.shape == (2, 12 + 9 + 2 * 5)
     expected = {'epoch': (4, 4), 'n': (7, 8), 'k': (12, 13), 'ideal_s': (0.07, 0.08),
                 'actual_s': (0.0701, 0.0805), 'step_error_s': (0.0001, 0.0002),
                 'cumulative_error_s': (0.0002, 0.0005), 'busy_s': (0.002, 0.003),
@@ -62,13 +62,25 @@ def test_commands_keep_their_bits() -> None:
 
 
 def test_an_av_that_follows_its_plan_has_no_command() -> None:
-    """It is NaN in its four columns; the command of whoever takes it over otherwise."""
+    """It is NaN in its five columns; the command of whoever takes it over otherwise."""
     rows = CycleRows(('hv0', 'av0'), 2)
     rows.add(0, 1, FIRST, 0.0, 0.0, (LEFT, None))
     rows.add(0, 1, SECOND, 0.0, 0.0, (LEFT, BACK))
     commands = CycleTable.from_message(','.join(rows.columns), rows.taken()).commands('av0')
     assert np.isnan(commands[0]).all()
     assert commands[1].tolist() == list(map(float, BACK))
+
+
+def test_rows_of_earlier_versions_have_no_lights() -> None:
+    """They had four columns a vehicle; no lights were on, and who did not drive stays NaN."""
+    rows = CycleRows(('hv0', 'av0'), 2)
+    rows.add(0, 1, FIRST, 0.0, 0.0, (LEFT._replace(lights=3), None))
+    table = CycleTable.from_message(','.join(rows.columns), rows.taken())
+    assert table.commands('hv0')[0, 4] == 3.0
+    kept = [i for i, name in enumerate(table.columns) if not name.endswith('/lights')]
+    old = CycleTable([table.columns[i] for i in kept], table.rows[:, kept])
+    assert old.commands('hv0').tolist() == [[*map(float, LEFT[:4]), 0.0]]
+    assert np.isnan(old.commands_of(['av0'])).all() and old.commands_of(['av0']).shape == (1, 1, 5)
 
 
 def test_rows_for_the_metrics() -> None:
@@ -85,7 +97,7 @@ def test_taking_empties_the_buffer() -> None:
     rows.add(4, 13, FIRST, 0.0, 0.0, (LEFT, BACK))
     assert rows.full
     taken = rows.taken()
-    assert len(taken) == 3 * 29
+    assert len(taken) == 3 * 31
     assert (rows.count, rows.full, len(rows.taken())) == (0, False, 0)
     rows.add(5, 1, SECOND, 0.0, 0.0, (BACK, LEFT))
     assert (taken[0], taken[1]) == (4.0, 7.0)

@@ -77,6 +77,21 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     yield 'traffic', _traffic(game)
     yield 'others', _others(run)
     yield 'run', f'{game.epoch + 1} of its session'
+    sound = '; '.join(_sound(run))
+    if sound:
+        yield 'sound', sound
+
+
+def _sound(run: ReportRun) -> Iterator[str]:
+    """Say what people in the cockpit's seats had on; nothing of recordings that do not tell."""
+    for seat, told in ((run.timing or {}).get('sound') or {}).items():
+        words = 'off' if told['volume'] is None else \
+            f'on for {_percent(told["on_share"])} of the time, volume {_percent(told["volume"])}'
+        yield f'{free(seat)} {words}, rumble {_percent(told["rumble"])}'
+
+
+def _percent(share: float) -> str:
+    return f'{100.0 * share:.0f} %'
 
 
 def _traffic(game: GameDocument) -> str:

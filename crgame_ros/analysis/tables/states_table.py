@@ -34,6 +34,7 @@ from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
+from crgame_ros.vehicle.lights import Light
 from crgame_ros.vehicle.state import pose_rates, STATE_WIDTH, StateColumn
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +79,11 @@ STATES = TableDeclaration(
                empty=UNCONSUMED),
         Column('reverse', FLAG, '', 'whether the gear was reverse, of the same step',
                empty=UNCONSUMED),
+        Column('left_indicator', FLAG, '', 'whether the left indicator was on (with the right '
+               'one: hazard lights), of the same step', empty=UNCONSUMED),
+        Column('right_indicator', FLAG, '', 'whether the right indicator was on, of the same step',
+               empty=UNCONSUMED),
+        Column('horn', FLAG, '', 'whether the horn sounded, of the same step', empty=UNCONSUMED),
         Column('lanelet_id', INTEGER, '', 'of the lanelet under it; of several, whose direction '
                'agrees best', CENTER, empty=OFF_ROAD),
         Column('lane_s', NUMBER, 'm', "arc length along that lanelet's centre line, from its "
@@ -153,13 +159,11 @@ class _StateRows:
                 ('acceleration_rear_axle', StateColumn.ACCELERATION),
                 ('steering_angle', StateColumn.STEERING_ANGLE),
                 ('steering_rate', StateColumn.STEERING_RATE))},
-            **{name: commands[here, column] for column, name in enumerate(COMMAND_COLUMNS)}}
-        reverse = found['reverse']
-        found['reverse'] = pa.array(reverse > 0.5, FLAG, mask=np.isnan(reverse))
+            **_consumed(commands[here])}
         return found | self._lanes(poses, here)
 
     def _commands(self, part: slice, everybody: int) -> FloatArray:
-        """Give what led to each state (steps, everybody, 4), NaN where nothing did."""
+        """Give what led to each state (steps, everybody, 5), NaN where nothing did."""
         log, record = self._run.record.log, self._run.record
         found = np.full((part.stop - part.start, everybody, len(COMMAND_COLUMNS)), np.nan)
         wanted = self._run.steps_of(log.ks[part])
@@ -190,3 +194,12 @@ class _StateRows:
         ids = np.array((*self._roads.lanelet_ids, 0), dtype=np.int64)[places]
         return {'lanelet_id': pa.array(ids, INTEGER, mask=places < 0),
                 'lane_s': s, 'lane_offset': offset}
+
+
+def _consumed(commands: FloatArray) -> dict[str, Any]:
+    """Give the columns of what was consumed (R, 5)."""
+    found: dict[str, Any] = dict(zip(COMMAND_COLUMNS, commands.T, strict=True))
+    lights, nobody = np.nan_to_num(found.pop('lights')).astype(int), np.isnan(found['reverse'])
+    flags = {'reverse': found['reverse'] > 0.5, 'left_indicator': lights & Light.LEFT > 0,
+             'right_indicator': lights & Light.RIGHT > 0, 'horn': lights & Light.HORN > 0}
+    return found | {name: pa.array(each, FLAG, mask=nobody) for name, each in flags.items()}

@@ -41,11 +41,12 @@ class TableWriter(TableRows):
     empty field. CSV is RFC 4180, UTF-8; infinite numbers are inf and -inf.
 
     :param declaration: the table.
-    :param path: of the file to write.
+    :param path: of the file to write; Parquet also into an open stream.
     :param file_format: Parquet or CSV.
     """
 
-    def __init__(self, declaration: TableDeclaration, path: Path, file_format: Format) -> None:
+    def __init__(self, declaration: TableDeclaration, path: Path | pa.NativeFile,
+                 file_format: Format) -> None:
         super().__init__(declaration)
         self._kept: list[pa.RecordBatch] = []
         self._kept_rows = 0

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.results.result_parts import newest_parts
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -42,7 +43,7 @@ class PartBatch(NamedTuple):
 
 class EvaluatedParts:
     """
-    The parts that were there when it was made: whatever is added later is not read.
+    The cells that were finished when it was made: whatever is added later is not read.
 
     :param folder: of the evaluation.
     :ivar rows: how many the parts of `cells` have.
@@ -53,14 +54,16 @@ class EvaluatedParts:
     def __init__(self, folder: Path) -> None:
         if not folder.is_dir():
             raise InputError('no such folder', str(folder), 'give the folder of an evaluation')
-        self._parts = {table: sorted((folder / table).glob('part-*.parquet'))
-                       for table in _REQUIRED}
+        newest = newest_parts(folder)
+        self._parts: dict[str, list[Path | pa.Buffer]] = {
+            table: [*sorted((folder / table).glob('part-*.parquet'))]
+            + ([newest[table]] if table in newest else []) for table in _REQUIRED}
         if not self._parts['cells']:
             raise InputError('no cell is finished', str(folder),
                              'give the folder of an evaluation, or wait until its first cells are')
-        self.rows = sum(_look_at(path, 'cells').num_rows for path in self._parts['cells'])
-        self.columns = frozenset(name for path in self._parts['vehicles']
-                                 for name in _look_at(path, 'vehicles').schema.names)
+        self.rows = sum(_look_at(part, 'cells').num_rows for part in self._parts['cells'])
+        self.columns = frozenset(name for part in self._parts['vehicles']
+                                 for name in _look_at(part, 'vehicles').schema.names)
 
     def batches(self, table: str, columns: Mapping[str, pa.DataType],
                 batch_rows: int = 32_768) -> Iterator[PartBatch]:
@@ -73,11 +76,11 @@ class EvaluatedParts:
         :raises InputError: if a part is broken, or a column is of another kind.
         """
         kept: list[PartBatch] = []
-        for path in self._parts[table]:
+        for part in self._parts[table]:
             try:
-                with pq.ParquetFile(path) as part:
-                    there = frozenset(part.schema_arrow.names)
-                    for batch in part.iter_batches(
+                with pq.ParquetFile(_opened(part)) as file:
+                    there = frozenset(file.schema_arrow.names)
+                    for batch in file.iter_batches(
                             batch_rows, columns=list(there & columns.keys()), use_threads=False):
                         found = PartBatch(_wanted(batch, columns), there)
                         # Small parts together: each batch costs its reader the same.
@@ -87,7 +90,7 @@ class EvaluatedParts:
                             kept = []
                         kept.append(found)
             except (pa.ArrowException, OSError) as error:
-                raise _unreadable(path, error) from error
+                raise _unreadable(part, error) from error
         if kept:
             yield _together(kept)
 
@@ -105,19 +108,27 @@ def _wanted(batch: pa.RecordBatch, columns: Mapping[str, pa.DataType]) -> pa.Rec
          for name, kind in columns.items()], list(columns))
 
 
-def _look_at(path: Path, table: str) -> pq.FileMetaData:
+def _opened(part: Path | pa.Buffer) -> Path | pa.BufferReader:
+    return part if isinstance(part, Path) else pa.BufferReader(part)
+
+
+def _look_at(part: Path | pa.Buffer, table: str) -> pq.FileMetaData:
     try:
-        found = pq.read_metadata(path)
+        found = pq.read_metadata(_opened(part))
     except (pa.ArrowException, OSError) as error:
-        raise _unreadable(path, error) from error
+        raise _unreadable(part, error) from error
     lacking = [name for name in _REQUIRED[table] if name not in found.schema.names]
     if lacking:
-        raise InputError(f'has no column {", ".join(lacking)}', str(path),
+        raise InputError(f'has no column {", ".join(lacking)}', _named(part),
                          'give the folder of an evaluation')
     return found
 
 
-def _unreadable(path: Path, error: Exception) -> InputError:
+def _named(part: Path | pa.Buffer) -> str:
+    return str(part) if isinstance(part, Path) else 'journal'
+
+
+def _unreadable(part: Path | pa.Buffer, error: Exception) -> InputError:
     reason = str(error).partition('\n')[0]
-    return InputError(f'cannot be read ({reason})', str(path),
+    return InputError(f'cannot be read ({reason})', _named(part),
                       'take it out of the folder: the cells in it are then missing')

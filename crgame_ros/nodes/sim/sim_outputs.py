@@ -38,6 +38,7 @@ from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.publishing import steps_between_messages
+from crgame_ros.vehicle.lights import signals_document
 from crgame_ros.vehicle.state import VehicleState
 from geometry_msgs.msg import AccelStamped
 from nav_msgs.msg import Odometry
@@ -118,7 +119,7 @@ class SimOutputs:
         self._cycle = endpoints.publisher('/timing/cycle')
         self._latched = {name: endpoints.publisher(name) for name in (
             '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
-            '/scenario/signals', '/seats', '/seats/drivers')}
+            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers')}
         self._diagnostics = endpoints.diagnostics
         # Where perception stands between, it makes the plan request of the true one.
         self._request_topics = {
@@ -132,6 +133,7 @@ class SimOutputs:
         self._epoch = 0
         self._lights = TrafficLights(setup.loaded.scenario)
         self._light_states: dict[int, str] | None = None
+        self._vehicle_lights: list[int] | None = None
         self._build_messages()
 
     def _build_messages(self) -> None:
@@ -154,6 +156,7 @@ class SimOutputs:
         """Publish what describes the run: scenario, game and objects."""
         setup = self._setup
         self._epoch = epoch
+        self._vehicle_lights = None
         texts = {'/scenario/xml': setup.loaded.xml_text,
                  '/scenario/objects': objects_document(setup.descriptions),
                  '/scenario/events': events_document(epoch, ()),
@@ -196,6 +199,7 @@ class SimOutputs:
             return
         stamp_ns = simulation.scheduler.stamp_ns(result.n)
         self.publish_clock(stamp_ns)
+        self._publish_lights(simulation)
         if result.objects is not None:
             self._publish_objects(result.objects, stamp_ns)
             self._publish_signals(result.k)
@@ -252,6 +256,13 @@ class SimOutputs:
             self._light_states = states
             self._latched['/scenario/signals'].publish(
                 String(data=json.dumps({'k': k, 'states': states})))
+
+    def _publish_lights(self, simulation: Simulation) -> None:
+        lights = [command.lights if command else 0 for command in simulation.commands]
+        if lights != self._vehicle_lights:
+            self._vehicle_lights = lights
+            self._latched['/vehicles/signals'].publish(String(data=signals_document(
+                simulation.n, dict(zip(self._setup.vehicle_ids, lights, strict=True)))))
 
     def publish_rows(self) -> None:
         """Publish the cycles collected so far."""

@@ -181,6 +181,20 @@ def test_late_steps_are_told_by_their_causes(page: Page, run: ReportRun) -> None
         assert any(words in text for text in notes)
 
 
+def test_what_people_in_the_seats_heard_is_told(run: ReportRun) -> None:
+    assert run.timing is not None
+    sound = {'hv0': {'on_share': 0.75, 'volume': 0.8, 'rumble': 0.5},
+             'av0': {'on_share': 0.0, 'volume': None, 'rumble': 0.0}}
+    for told, row in ((sound, ['hv0', ' on for 75 % of the time, volume 80 %, rumble 50 %; ',
+                               'av0', ' off, rumble 0 %']), ({}, [])):
+        page = Page(report_html([replace(run, timing={**run.timing, 'sound': told})]))
+        texts = [text for _, text in page.texts]
+        assert ('sound' in texts) == bool(told)
+        if told:
+            place = texts.index('sound')
+            assert ''.join(texts[place + 1:place + 5]).split() == ''.join(row).split()
+
+
 def test_what_a_recording_does_not_tell_is_left_out(run: ReportRun) -> None:
     """Without cycles there are neither inputs nor timing, and the page says so."""
     bare = replace(run, timing=None, record=replace(

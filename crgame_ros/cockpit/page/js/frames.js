@@ -12,10 +12,11 @@ export const KIND = Object.freeze({
 export const VEHICLE = Object.freeze({
   x: 0, y: 1, yaw: 2, speed: 3, steering_angle: 4, acceleration: 5, yaw_rate: 6,
   steering_rate: 7, throttle: 8, brake: 9, steering: 10, reverse: 11,
+  lights: 12,
 });
 
 /** Values per vehicle in a STATE frame, per object in an OBJECTS frame, per plan point. */
-export const VEHICLE_WIDTH = 12;
+export const VEHICLE_WIDTH = 13;
 export const OBJECT_WIDTH = 6;
 export const PLAN_WIDTH = 5;
 

@@ -32,7 +32,8 @@ export function interpolateVehicles(out, before, after, share) {
     const column = i % VEHICLE_WIDTH;
     if (column === VEHICLE.yaw) {
       out[i] = turn(before[i], after[i], share);
-    } else if (column === VEHICLE.reverse || Number.isNaN(after[i])) {
+    } else if (column === VEHICLE.reverse || column === VEHICLE.lights
+        || Number.isNaN(after[i])) {
       out[i] = before[i];
     } else {
       out[i] = before[i] + share * (after[i] - before[i]);

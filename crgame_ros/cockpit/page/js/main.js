@@ -16,6 +16,7 @@ const PARTS = [
   ['./people.js', 'createPeople', '#panel-drive', 'people'],
   ['./run_control.js', 'createRunControl', '#bar', 'runControl'],
   ['./panels/settings.js', 'createSettings', '#bar-end', 'settings'],
+  ['./sound/sound.js', 'createSound', '#bar-end', 'sound'],
   ['./panels/title.js', 'createTitle', '#title', 'title'],
   ['./panels/alarms.js', 'createAlarms', '#alarms', 'alarms'],
   ['./panels/tabs.js', 'createTabs', '#panels', 'panels'],
@@ -27,6 +28,7 @@ const PARTS = [
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
   ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
+  ['./view3d/view3d.js', 'createView3d', '#stage', 'view3d'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
 

@@ -21,6 +21,10 @@ const TEXTS = {
   throttle: ['Throttle', 'Press the throttle fully, then let it go.'],
   brake: ['Brake', 'Press the brake fully, then let it go.'],
   reverse: ['Reverse', 'Press the button that shall change between forward and reverse.'],
+  left_indicator: ['Indicator left', 'Press the button that shall indicate to the left.'],
+  right_indicator: ['Indicator right', 'Press the button that shall indicate to the right.'],
+  hazard: ['Hazard', 'Press the button of the hazard lights.'],
+  horn: ['Horn', 'Press the button of the horn.'],
   test: ['Test', 'Try it. Dead zones and directions can be changed here; Save keeps everything '
     + 'in this browser for this device.'],
 };

@@ -6,7 +6,9 @@
  * It has no clock and no page: samples and times are handed to it.
  */
 
-/** @import { Control, Profile, Sample } from './gamepad_profile.js' */
+import { LIGHT_BUTTONS } from '../lights.js';
+
+/** @import { Control, LightButtons, Profile, Sample } from './gamepad_profile.js' */
 
 /**
  * The steering's axis at its left end, as measured in its step.
@@ -15,14 +17,15 @@
  */
 
 /**
- * @typedef {'centre'|'left'|'right'|'throttle'|'brake'|'reverse'|'test'} CalibrationStep
+ * @typedef {'centre'|'left'|'right'|'throttle'|'brake'|'reverse'|'test'
+ *   |typeof LIGHT_BUTTONS[number]} CalibrationStep
  * @typedef {Control['kind']} Kind
  * @typedef {{kind: Kind, index: number}} Place of an axis or button
  */
 
 /** The steps in their order. */
 export const STEPS = Object.freeze(/** @type {CalibrationStep[]} */ ([
-  'centre', 'left', 'right', 'throttle', 'brake', 'reverse', 'test',
+  'centre', 'left', 'right', 'throttle', 'brake', 'reverse', ...LIGHT_BUTTONS, 'test',
 ]));
 
 // A smaller movement of an axis or button is none that was asked for.
@@ -140,12 +143,30 @@ export class CalibrationRun {
     } else if (this.step === 'right') {
       this.profile.steering = this.#steering(low, high);
     } else if (this.step === 'reverse') {
+      this.#free(index);
       this.profile.reverse = { on: [], off: [], toggle: [index], held: [] };
+    } else if (isLight(this.step)) {
+      this.#free(index);
+      this.profile.lights[this.step] = [index];
     } else if (this.step === 'throttle' || this.step === 'brake') {
       const rest = this.#rest(kind, index);
       const full = farther(low, high, rest);
       this.profile[this.step] = { kind, index, min: Math.min(rest, full),
         max: Math.max(rest, full), invert: full < rest, deadzone: DEADZONE };
+    }
+  }
+
+  /**
+   * Take a button away from whatever it did: a button that was asked for does that alone.
+   *
+   * @param {number} index
+   */
+  #free(index) {
+    const { reverse, lights } = this.profile;
+    for (const group of [reverse, lights]) {
+      for (const [name, buttons] of Object.entries(group)) {
+        Object.assign(group, { [name]: buttons.filter((button) => button !== index) });
+      }
     }
   }
 
@@ -168,7 +189,7 @@ export class CalibrationRun {
     /** @type {(Place & {span: number})|null} */
     let best = null;
     /** @type {Kind[]} */
-    const kinds = this.step === 'reverse' ? ['button'] : ['axis', 'button'];
+    const kinds = this.step === 'reverse' || isLight(this.step) ? ['button'] : ['axis', 'button'];
     for (const kind of kinds) {
       for (const index of listOf(this.#sample, kind).keys()) {
         const span = valueOf(this.#high, kind, index) - valueOf(this.#low, kind, index);
@@ -233,6 +254,14 @@ export class CalibrationRun {
     const first = valueOf(this.#first, kind, index);
     return kind === 'axis' && start === 0 && Math.abs(first) > MADE_UP ? Math.sign(first) : start;
   }
+}
+
+/**
+ * @param {CalibrationStep} step
+ * @returns {step is keyof LightButtons}
+ */
+function isLight(step) {
+  return LIGHT_BUTTONS.some((name) => name === step);
 }
 
 /**

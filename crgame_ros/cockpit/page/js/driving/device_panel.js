@@ -30,7 +30,8 @@ export class DevicePanel {
   list() {
     const { active, devices } = this.#gamepads;
     this.#list.replaceChildren(
-      this.#row('Keyboard', 'W A S D or arrows, space brakes, R reverse', active === null,
+      this.#row('Keyboard', 'W A S D or arrows, space brakes, R reverse; comma and period '
+        + 'indicate, J hazard lights, G horn', active === null,
         () => this.#gamepads.choose(null)),
       ...devices.map((device) => this.#row(shortName(device.id),
         device.calibrated ? 'calibrated' : 'default mapping, not calibrated', device === active,

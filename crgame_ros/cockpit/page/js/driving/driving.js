@@ -80,9 +80,12 @@ export class Driving {
     if (this.away !== null) {
       return { away: true };
     }
-    const reverse = Number(this.#reverse);
+    const rest = {
+      reverse: Number(this.#reverse),
+      lights: this.keyboard.lights.map((held, i) => held | this.gamepads.lights[i]),
+    };
     const axes = this.keyboard.anyHeld ? null : this.gamepads.axes;
-    return axes === null ? { keys: this.keyboard.keys, reverse } : { axes, reverse };
+    return axes === null ? { keys: this.keyboard.keys, ...rest } : { axes, ...rest };
   }
 
   /** @returns {HTMLElement} the list of input devices, for the Drive panel */

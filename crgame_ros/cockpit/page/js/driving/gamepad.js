@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Gamepads and wheels of the Gamepad API: which one drives, and what it asks for. */
 
+import { LIGHT_BUTTONS } from '../lights.js';
 import {
   gearAfter, loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
 } from './gamepad_profile.js';
@@ -99,6 +100,12 @@ export class Gamepads {
   /** @returns {number[]|null} throttle, brake and steering of the active device */
   get axes() {
     return this.#active?.axes ?? null;
+  }
+
+  /** @returns {number[]} left and right indicator, hazard, horn: 1 while a button of it is held */
+  get lights() {
+    return LIGHT_BUTTONS.map((name) => Number(
+      this.#active?.profile.lights[name].some((i) => this.#pressed[i]) ?? false));
   }
 
   /** @returns {boolean} whether the lever of the active device stands in reverse */
@@ -208,7 +215,7 @@ export class Gamepads {
 
   /** @param {Device} device */
   #reportChange({ axes }) {
-    const text = axes.join();
+    const text = [...axes, ...this.lights].join();
     if (text !== this.#last) {
       this.#last = text;
       this.#report.changed();

@@ -1,5 +1,7 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
+import { LIGHT_BUTTONS } from '../lights.js';
+
 /**
  * Which axis or button of a gamepad or wheel does what, and over which range.
  *
@@ -7,7 +9,9 @@
  *   deadzone: number, centre?: number}} Control  `centre` only for the steering; the raw value
  *   rises from `min` to `max`, to the right or with the pedal unless `invert`.
  * @typedef {{on: number[], off: number[], toggle: number[], held: number[]}} GearButtons
- * @typedef {{steering: Control, throttle: Control, brake: Control, reverse: GearButtons}} Profile
+ * @typedef {Record<typeof LIGHT_BUTTONS[number], number[]>} LightButtons
+ * @typedef {{steering: Control, throttle: Control, brake: Control, reverse: GearButtons,
+ *   lights: LightButtons}} Profile
  * @typedef {{axes: number[], buttons: number[]}} Sample  raw values at one time.
  */
 
@@ -35,12 +39,17 @@ export function defaultProfile(pad) {
     return {
       steering: steeringOf(0, 0.08), throttle: triggerOf(7), brake: triggerOf(6),
       reverse: { on: [4], off: [5], toggle: [], held: [] },
+      // Back and start, or the cross; B (circle) and A (cross).
+      lights: {
+        left_indicator: [8, 14], right_indicator: [9, 15], hazard: [1], horn: [0],
+      },
     };
   }
   const [throttle, brake] = pedalAxes(pad);
   return {
     steering: steeringOf(0, 0), throttle: pedalOf(throttle), brake: pedalOf(brake),
     reverse: { on: [5], off: [4], toggle: [], held: isLogitechWithGate(pad) ? [18] : [] },
+    lights: lightsOfWheel(pad),
   };
 }
 
@@ -69,6 +78,21 @@ function pedalOf(index) {
   return { kind: 'axis', index, min: -1, max: 1, invert: true, deadzone: 0.02 };
 }
 
+/**
+ * @param {Gamepad} pad
+ * @returns {LightButtons}
+ */
+function lightsOfWheel(pad) {
+  // LSB and RSB of the wheels for the Xbox, L2 and R2 of the others.
+  const [left, right] = isLogitechForXbox(pad) ? [9, 8] : [7, 6];
+  return { left_indicator: [left], right_indicator: [right], hazard: [3], horn: [0] };
+}
+
+/** @param {Gamepad} pad */
+function isLogitechForXbox(pad) {
+  return /046d.*(c262|c26e)/i.test(pad.id);
+}
+
 /** @param {Gamepad} pad */
 function isLogitechWithGate(pad) {
   return /046d.*(c24f|c266)/i.test(pad.id);
@@ -77,7 +101,7 @@ function isLogitechWithGate(pad) {
 /** @param {Gamepad} pad */
 function pedalAxes(pad) {
   // G920 and the Xbox version of the G923 have the clutch on the last axis, the others on 1.
-  if (/046d.*(c262|c26e)/i.test(pad.id)) {
+  if (isLogitechForXbox(pad)) {
     return [1, 2];
   }
   if (isLogitechWithGate(pad)) {
@@ -102,7 +126,10 @@ export function loadProfile(pad) {
     try {
       const profile = JSON.parse(text);
       if (isProfile(profile)) {
-        return { profile, calibrated: true };
+        // What was kept before there were indicators has none.
+        const { lights } = defaultProfile(pad);
+        return { profile: isLights(profile.lights) ? profile : { ...profile, lights },
+          calibrated: true };
       }
     } catch (error) {
       console.warn(`the calibration of ${pad.id} cannot be read and is not used: ${error}`);
@@ -138,6 +165,11 @@ function isProfile(profile) {
       && numbers(control, ['index', 'min', 'max', 'deadzone'])
       && (name !== 'steering' || numbers(control, ['centre']));
   }) && ['on', 'off', 'toggle', 'held'].every((name) => Array.isArray(profile.reverse?.[name]));
+}
+
+/** @param {any} lights */
+function isLights(lights) {
+  return LIGHT_BUTTONS.every((name) => Array.isArray(lights?.[name]));
 }
 
 /**

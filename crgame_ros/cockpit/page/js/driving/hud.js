@@ -6,6 +6,7 @@ import { element, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { PedalBar, SteeringBar } from './gauges.js';
 import { Keycaps } from './keycaps.js';
+import { LightSigns } from './light_signs.js';
 import { SpeedLimits } from './speed_limit.js';
 import { SteeringWheel } from './steering_wheel.js';
 
@@ -98,6 +99,7 @@ export class Hud {
       this.#numbersAt_ms = this.#limitAt_ms = -Infinity;
     }
     this.#show(row, subject);
+    this.#parts.lights.show(row[VEHICLE.lights], this.#store.displayed(now_ms)?.t ?? 0);
     if (now_ms - this.#numbersAt_ms >= NUMBERS_EVERY_MS) {
       this.#numbersAt_ms = now_ms;
       this.#write(row, subject);
@@ -225,6 +227,7 @@ function buildParts() {
     limit: element('span', { class: 'hud-limit', role: 'img', title: 'Speed limit' }),
     throttle: new PedalBar('throttle', 'Throttle'), brake: new PedalBar('brake', 'Brake'),
     steering: new SteeringBar(), wheel: new SteeringWheel(), keycaps: new Keycaps(),
+    lights: new LightSigns(),
     banner: element('div', { class: 'hud-banner', role: 'status', 'aria-live': 'polite' }),
   };
   const board = element('div', { class: 'hud-board' },
@@ -238,9 +241,9 @@ function buildParts() {
   return { ...parts, board };
 }
 
-/** @param {Record<'kmh'|'ms'|'acceleration', HTMLElement>} parts */
-function speedBlock({ kmh, ms, acceleration }) {
-  return element('div', { class: 'hud-speed' },
+/** @param {Record<'kmh'|'ms'|'acceleration', HTMLElement> & {lights: LightSigns}} parts */
+function speedBlock({ kmh, ms, acceleration, lights }) {
+  return element('div', { class: 'hud-speed' }, lights.node,
     element('div', { class: 'hud-main' }, kmh,
       element('span', { class: 'hud-unit', text: 'km/h' })),
     element('div', { class: 'hud-small' }, ms, acceleration));

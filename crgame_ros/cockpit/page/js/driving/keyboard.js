@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The driving keys, raw: which of them are held, and each press of the gear key. */
 
+import { LIGHT_BUTTONS } from '../lights.js';
 import { isTyping } from './focus.js';
 
-/** @typedef {'throttle'|'brake'|'left'|'right'|'reverse'} KeyAction */
+/**
+ * @typedef {'throttle'|'brake'|'left'|'right'|'reverse'|typeof LIGHT_BUTTONS[number]} KeyAction
+ */
 
 /** What each key does, by its place on the keyboard, so that every layout drives alike. */
 export const ACTIONS = Object.freeze(/** @type {Record<string, KeyAction|undefined>} */ ({
@@ -13,6 +16,7 @@ export const ACTIONS = Object.freeze(/** @type {Record<string, KeyAction|undefin
   KeyA: 'left', ArrowLeft: 'left',
   KeyD: 'right', ArrowRight: 'right',
   KeyR: 'reverse',
+  Comma: 'left_indicator', Period: 'right_indicator', KeyJ: 'hazard', KeyG: 'horn',
 }));
 
 /** @type {KeyAction[]} */
@@ -45,13 +49,17 @@ export class Keyboard {
 
   /** @returns {number[]} throttle, brake, left, right: 1 while a key of it is held */
   get keys() {
-    const active = new Set([...this.#held].map((code) => ACTIONS[code]));
-    return ORDER.map((action) => Number(active.has(action)));
+    return this.#active(ORDER);
+  }
+
+  /** @returns {number[]} left and right indicator, hazard, horn: 1 while a key of it is held */
+  get lights() {
+    return this.#active(LIGHT_BUTTONS);
   }
 
   /** @returns {boolean} whether any key that steers or moves a pedal is held */
   get anyHeld() {
-    return this.#held.size > 0;
+    return this.keys.includes(1);
   }
 
   /**
@@ -68,6 +76,12 @@ export class Keyboard {
       this.#held.clear();
       this.#report.changed();
     }
+  }
+
+  /** @param {readonly KeyAction[]} actions */
+  #active(actions) {
+    const active = new Set([...this.#held].map((code) => ACTIONS[code]));
+    return actions.map((action) => Number(active.has(action)));
   }
 
   /** @param {KeyboardEvent} event */

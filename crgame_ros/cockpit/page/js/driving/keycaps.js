@@ -6,12 +6,14 @@ import { element, setAttribute, setText } from '../dom.js';
 
 /** @import { Keyboard } from './keyboard.js' */
 
-// The place of a key, what it reads, and the other key that does the same.
-/** @type {[code: string, text: string, twin: string|null, title: string][]} */
+// The place of a key, what it reads, the other key that does the same, and a sign beside it.
+/** @type {[code: string, text: string, twin: string|null, title: string, sign?: string][]} */
 const CAPS = [
   ['KeyW', 'W', 'ArrowUp', 'Throttle'], ['KeyR', 'R', null, 'Reverse gear'],
   ['KeyA', 'A', 'ArrowLeft', 'Left'], ['KeyS', 'S', 'ArrowDown', 'Brake'],
   ['KeyD', 'D', 'ArrowRight', 'Right'], ['Space', 'Space', null, 'Brake'],
+  ['Comma', ',', null, 'Left indicator', '◄'], ['Period', '.', null, 'Right indicator', '►'],
+  ['KeyJ', 'J', null, 'Hazard lights', '◄►'], ['KeyG', 'G', null, 'Horn', '♪'],
 ];
 
 /** The drawn keys; `node` goes into the page. */
@@ -20,11 +22,13 @@ export class Keycaps {
   #caps = new Map();
 
   constructor() {
-    for (const [code, text, , title] of CAPS) {
-      this.#caps.set(code, element('kbd', { class: `cap cap-${code}`, title, text }));
+    for (const [code, text, , title, sign] of CAPS) {
+      this.#caps.set(code, element('kbd', { class: `cap cap-${code}`, title,
+        text: sign === undefined ? text : `${text} ${sign}` }));
     }
     this.node = element('div', { class: 'keycaps', role: 'img',
-      'aria-label': 'Keys: W throttle, A left, S brake, D right, space brake, R reverse' },
+      'aria-label': 'Keys: W throttle, A left, S brake, D right, space brake, R reverse, '
+        + 'comma and period indicators, J hazard lights, G horn' },
     ...this.#caps.values());
     this.#takeLayout();
   }
@@ -54,8 +58,9 @@ export class Keycaps {
   /** Write what the keys read on this person's keyboard, where the browser knows it. */
   async #takeLayout() {
     const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => undefined);
-    for (const [code, text] of CAPS) {
-      setText(this.#cap(code), layout?.get(code)?.toUpperCase() ?? text);
+    for (const [code, text, , , sign] of CAPS) {
+      const key = layout?.get(code)?.toUpperCase() ?? text;
+      setText(this.#cap(code), sign === undefined ? key : `${key} ${sign}`);
     }
   }
 }

@@ -29,6 +29,8 @@ const PATHS = {
   auto: 'M12 3a9 9 0 1 0 .01 0zM12 3v18M12 7h4.5M12 11h6.8M12 15h5.4M12 19h2.5',
   panel: 'M3 4h18v16H3zM15 4v16',
   upload: 'M12 16V4M7 9l5-5 5 5M4 15v5h16v-5',
+  sound: 'M3 9h4l5-5v16l-5-5H3zM15.5 8.5a5 5 0 0 1 0 7M18 5.5a9 9 0 0 1 0 13',
+  sound_off: 'M3 9h4l5-5v16l-5-5H3zM16 9l6 6M22 9l-6 6',
   stop: 'M6 6h12v12H6z',
   go: 'M7 4.5v15l12-7.5z',
   bolt: 'M13 2L4 14h7l-1 8 9-12h-7z',

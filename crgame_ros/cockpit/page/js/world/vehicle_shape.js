@@ -11,11 +11,12 @@
  * @property {Path2D|null} roof over the glass, in the body's colour
  * @property {Path2D|null} lamps at the front
  * @property {Path2D|null} brakes lamps at the back
+ * @property {{left: Path2D, right: Path2D}|null} indicators at the corners
  * @property {number} extent the longer side [m]
  * @property {number} radius of the circle around it [m]
  */
 
-/** @typedef {Omit<Look, 'extent'|'radius'>} Parts */
+/** @typedef {Omit<Look, 'extent'|'radius'|'indicators'>} Parts */
 
 const LONG_VEHICLES = new Set(['truck', 'bus', 'train']);
 const TWO_WHEELS = new Set(['bicycle', 'motorcycle']);
@@ -31,7 +32,10 @@ const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknow
  */
 export function lookOf(type, shape, moves) {
   const { kind, length, width } = shape;
-  const rest = { extent: Math.max(length, width), radius: 0.5 * Math.hypot(length, width) };
+  const rest = {
+    extent: Math.max(length, width), radius: 0.5 * Math.hypot(length, width),
+    indicators: type === 'pedestrian' || kind !== 'rectangle' ? null : corners(length, width),
+  };
   if (type === 'pedestrian') {
     return { ...pedestrian(length, width), ...rest };
   }
@@ -95,6 +99,21 @@ function lamps(l, w) {
     lamps: boxes([[l - 0.34, 0.5 * w, 0.2, 0.34 * w], [l - 0.34, -0.84 * w, 0.2, 0.34 * w]], 0.06),
     brakes: boxes([[-l, 0.46 * w, 0.26, 0.48 * w], [-l, -0.94 * w, 0.26, 0.48 * w]], 0.06),
   };
+}
+
+/**
+ * @param {number} length
+ * @param {number} width
+ */
+function corners(length, width) {
+  // Half beyond the body, so that they are seen from afar and on a vehicle of any colour.
+  const l = length / 2;
+  const deep = 0.3 * width;
+  const along = 0.16 * length;
+  const at = [l - along, -l];
+  /** @type {(y: number) => Path2D} */
+  const side = (y) => boxes(at.map((x) => [x, y, along, deep]), 0.08);
+  return { left: side(width / 2 - 0.4 * deep), right: side(-width / 2 - 0.6 * deep) };
 }
 
 /**

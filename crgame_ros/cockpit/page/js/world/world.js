@@ -54,6 +54,8 @@ export class World {
   #toolbar = null;
   #follow;
   #dirty = true;
+  // While something else is shown in its place nothing is drawn.
+  #away = false;
   /** @type {View} */
   #view;
   /** @type {(() => void)[]} */
@@ -232,7 +234,7 @@ export class World {
     }
     this.#ends.push(
       store.on('scene', (scene) => this.#load(scene)),
-      store.on('objects', (step) => this.#painter.vehicles.takeStep(step)),
+      store.on('objects', (step) => this.#painter.vehicles.brakeLights.takeStep(step)),
       store.on('hello', () => this.#sendLayers()),
       store.on('events', () => this.#painter.plans.takeEvents(store.scene, store.fired)),
       ...REDRAWN_ON.map((name) => store.on(name, () => this.redraw())));
@@ -241,6 +243,10 @@ export class World {
   /** @param {HTMLElement|null} covered */
   #resize(covered) {
     const { clientWidth: width, clientHeight: height } = this.#canvas;
+    this.#away = width === 0 || height === 0;
+    if (this.#away) {
+      return;
+    }
     const ratio = window.devicePixelRatio || 1;
     const first = this.camera.width <= 1;
     // Setting the size clears a canvas, even to the size that it has.
@@ -297,6 +303,9 @@ export class World {
 
   /** @param {number} now_ms */
   #draw(now_ms) {
+    if (this.#away) {
+      return;
+    }
     const begin_ms = performance.now();
     const shown = this.#store.displayed(now_ms);
     const stands = shown === null

@@ -27,11 +27,10 @@ from typing import Any, IO, Self
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.table_writer import TableWriter
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell_rows import (
+from crgame_ros.evaluation.results.cell_rows import (
     CELLS,
     TABLES_OF_CELLS,
     VEHICLES_OF_CELLS,
-    WORK,
 )
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -155,14 +154,11 @@ class ResultParts:
         """Take up what an earlier process left; give the number of the part to come."""
         number = _next_number(self.folder)
         for path in sorted(self.folder.glob(f'{JOURNAL}-*.jsonl')):
-            if int(path.stem.rpartition('-')[2]) < number:
+            if _journal_number(path) < number:
                 # It died between writing the part and this.
                 path.unlink()
                 continue
-            for line in path.read_text(encoding='utf-8').splitlines():
-                # The last may be cut off: its cell was not finished.
-                with suppress(ValueError):
-                    self._rows.append(json.loads(line))
+            self._rows += _journal_lines(path)
             _write_lines(path, self._rows)
         return number
 
@@ -186,17 +182,65 @@ def _next_number(folder: Path) -> int:
                default=-1) + 1
 
 
+def newest_parts(folder: Path) -> Mapping[str, pa.Buffer]:
+    """
+    Give the rows that are only in a journal yet as a part of each table, as its file would be.
+
+    :return: by the table's name; empty where there is no such row.
+    """
+    journals = {path: _journal_lines(path) for path in sorted(folder.glob(f'{JOURNAL}-*.jsonl'))}
+    # Only now, because a journal is removed after its part is written.
+    number = _next_number(folder)
+    cells = [rows for path, found in journals.items() if _journal_number(path) >= number
+             for rows in found]
+    parts: dict[str, pa.Buffer] = {}
+    if cells:
+        for table in TABLES_OF_CELLS:
+            sink = pa.BufferOutputStream()
+            _write_rows(table, cells, sink)
+            parts[table.name] = sink.getvalue()
+    return parts
+
+
+def _journal_number(path: Path) -> int:
+    return int(path.stem.rpartition('-')[2])
+
+
+def _journal_lines(path: Path) -> list[dict[str, Any]]:
+    """Read the rows of a journal; of one that was removed meanwhile there are none."""
+    try:
+        lines = path.read_text(encoding='utf-8').splitlines()
+    except FileNotFoundError:
+        return []
+    rows = []
+    for line in lines:
+        # The last may be cut off: its cell was not finished.
+        with suppress(ValueError):
+            rows.append(json.loads(line))
+    return rows
+
+
+def _write_rows(table: TableDeclaration, cells: list[dict[str, Any]],
+                sink: Path | pa.NativeFile) -> None:
+    """Write the rows that cells have in a table."""
+    rows = [row for each in cells for row in _rows_of(table, each)]
+    with TableWriter(table, sink, 'parquet') as writer:
+        if rows:
+            writer.add({column.name: [row.get(column.name) for row in rows]
+                        for column in table.columns})
+
+
+def _rows_of(table: TableDeclaration, cell: Mapping[str, Any]) -> list[dict[str, Any]]:
+    if table is VEHICLES_OF_CELLS:
+        rows: list[dict[str, Any]] = cell['vehicles']
+        return rows
+    return [cell['cell'] if table is CELLS else cell['work']]
+
+
 def _write_part(folder: Path, number: int, cells: list[dict[str, Any]]) -> None:
     """Write rows as a part of every table."""
-    rows = {CELLS.name: [each['cell'] for each in cells],
-            VEHICLES_OF_CELLS.name: [row for each in cells for row in each['vehicles']],
-            WORK.name: [each['work'] for each in cells]}
-
     def write(table: TableDeclaration, path: Path) -> None:
-        with TableWriter(table, path, 'parquet') as writer:
-            if rows[table.name]:
-                writer.add({column.name: [row.get(column.name) for row in rows[table.name]]
-                            for column in table.columns})
+        _write_rows(table, cells, path)
     _replace_part(folder, part_name(number), write)
 
 

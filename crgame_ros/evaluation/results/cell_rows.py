@@ -34,7 +34,8 @@ from crgame_ros.simulation.offline import OfflineResult
 STATUSES = ('ok', 'error', 'timeout', 'memory', 'died')
 _KEY = Column('cell', TEXT, '', 'key of the cell: a hash of everything that it depends on')
 _FACTORS = (
-    Column('scenario', TEXT, '', 'benchmark id'),
+    Column('scenario', TEXT, '', "benchmark id, with the file's name where two files have that "
+           'id'),
     Column('game', TEXT, '', "name of the game's file", empty='it is a scenario without a game'),
     Column('human', TEXT, '', 'name of the recorded run whose humans drive',
            empty='nobody recorded drives'),

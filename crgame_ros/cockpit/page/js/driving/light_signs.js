@@ -1,0 +1,37 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The signs of indicators and horn over the speed, lit as the vehicle shows them. */
+
+import { element, setAttribute } from '../dom.js';
+import { LIGHT, shining } from '../lights.js';
+
+/** @type {[name: 'left'|'horn'|'right', sign: string, title: string][]} */
+const SIGNS = [
+  ['left', '◄', 'Left indicator'], ['horn', '♪', 'Horn'], ['right', '►', 'Right indicator'],
+];
+
+/** Three signs; `node` goes into the instruments. */
+export class LightSigns {
+  #signs = SIGNS.map(([name, text, title]) => ({
+    name, title, node: element('span', { class: `sign sign-${name}`, role: 'img', title, text }),
+  }));
+
+  constructor() {
+    this.node = element('div', { class: 'hud-lights' }, ...this.#signs.map(({ node }) => node));
+  }
+
+  /**
+   * Light what shines now.
+   *
+   * @param {number} lights as the vehicle's state has them
+   * @param {number} t simulation time [s]
+   */
+  show(lights, t) {
+    const shines = shining(lights, t);
+    for (const { name, title, node } of this.#signs) {
+      // What is on is said once, and not at each blink.
+      setAttribute(node, 'aria-label', `${title} ${(lights & LIGHT[name]) > 0 ? 'on' : 'off'}`);
+      setAttribute(node, 'data-on', shines[name]);
+    }
+  }
+}

@@ -1,0 +1,106 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * How loud what a driver hears is, as amplitudes before the volume: 1 is full scale.
+ *
+ * The exponents are those of vehicle acoustics: the power of tyre noise grows with 35 dB per
+ * decade of speed (30 to 40: Sandberg and Ejsmont, Tyre/Road Noise Reference Book, 2002), that of
+ * wind with 60 dB (a dipole's, with the sixth power of speed: Curle 1955).
+ */
+
+import { speedShare } from './drive_train.js';
+
+/** @import { DriveTrain } from './drive_train.js' */
+
+const TYRES = { amplitude: 0.07, at: 30, exponent: 1.75 };
+const WIND = { amplitude: 0.06, at: 40, exponent: 3 };
+const LOUDEST_WIND = 0.2;
+// Decelerations at which brakes begin to squeal and do so at their loudest [m/s^2].
+const SQUEAL_FROM = 5;
+const SQUEAL_FULL = 8;
+// Lateral accelerations at which tyres do [m/s^2].
+const SCREECH_FROM = 6;
+const SCREECH_FULL = 9;
+// Slower than this brakes and tyres fall silent again [m/s].
+const CREEP = 2;
+
+/**
+ * @param {DriveTrain} train
+ * @param {number} rpm of the engine
+ * @param {number} load 0 to 1
+ * @returns {number} amplitude of an engine in its vehicle; of a motor 0 at standstill
+ */
+export function engineLevel(train, rpm, load) {
+  const share = speedShare(train, rpm);
+  return train.name === 'electric'
+    ? 0.09 * Math.min(rpm / 400, 1) * (0.3 + 0.7 * load) * (0.5 + 0.5 * share)
+    : 0.07 + 0.16 * share + 0.12 * load * (0.35 + 0.65 * share);
+}
+
+/**
+ * @param {number} speed without a sign [m/s]
+ * @returns {number} amplitude of rolling tyres
+ */
+export function tyreLevel(speed) {
+  return TYRES.amplitude * (speed / TYRES.at) ** TYRES.exponent;
+}
+
+/**
+ * @param {number} speed without a sign [m/s]
+ * @returns {number} amplitude of wind
+ */
+export function windLevel(speed) {
+  return Math.min(WIND.amplitude * (speed / WIND.at) ** WIND.exponent, LOUDEST_WIND);
+}
+
+/**
+ * @param {number} deceleration against the motion [m/s^2]
+ * @param {number} speed without a sign [m/s]
+ * @returns {number} 0 to 1
+ */
+export function hardBraking(deceleration, speed) {
+  return smooth(deceleration, SQUEAL_FROM, SQUEAL_FULL) * smooth(speed, 0, CREEP);
+}
+
+/**
+ * @param {number} lateral acceleration [m/s^2]
+ * @param {number} speed without a sign [m/s]
+ * @returns {number} 0 to 1
+ */
+export function cornering(lateral, speed) {
+  return smooth(Math.abs(lateral), SCREECH_FROM, SCREECH_FULL) * smooth(speed, 0, CREEP);
+}
+
+/**
+ * @param {number} speed without a sign [m/s]
+ * @returns {number} how rough what is beside the road is to drive on, 0 to 1
+ */
+export function roughness(speed) {
+  return smooth(speed, 0, 15);
+}
+
+/**
+ * @param {number} speed without a sign [m/s]
+ * @returns {number} how hard a vehicle hits what it hits, 0 to 1
+ */
+export function impact(speed) {
+  return 0.35 + 0.65 * smooth(speed, 0, 15);
+}
+
+/**
+ * @param {number} volume as people set it, 0 to 1
+ * @returns {number} gain: loudness is nearer to the square root of amplitude than to it
+ */
+export function volumeGain(volume) {
+  return volume * volume;
+}
+
+/**
+ * @param {number} value
+ * @param {number} from below which it gives 0
+ * @param {number} to above which it gives 1
+ */
+function smooth(value, from, to) {
+  const share = Math.min(Math.max((value - from) / (to - from), 0), 1);
+  return share * share * (3 - 2 * share);
+}

@@ -1,0 +1,250 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What the driver of one vehicle hears: its own, and who is near. No sound is made here. */
+
+import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, REVERSE } from './drive_train.js';
+import { arrival, RANGE_M } from './hearing.js';
+
+/** @import { Scene, SceneObject, SceneVehicle } from '../messages.js' */
+/** @import { Shown } from '../store.js' */
+/** @import { DriveTrain } from './drive_train.js' */
+/** @import { Arrival, Moving } from './hearing.js' */
+
+/** So many others are heard at once: the nearest. */
+export const MOST_OTHERS = 6;
+
+// A vehicle that is longer is a lorry or a bus [m].
+const LONG_M = 7.5;
+// Where a driver's head is: shares of the wheelbase ahead of the rear axle, and of the width left.
+const HEAD_AHEAD = 0.45;
+const HEAD_LEFT = 0.2;
+// Where no pedal is told the throttle is guessed: what holds a speed, less below some [m/s], and
+// what gains more [s^2/m].
+const HOLDING = 0.15;
+const HELD_FROM = 5;
+const THROTTLE_PER_ACCELERATION = 0.25;
+// Of CommonRoad's types those that are no cars; null has no engine.
+/** @type {Record<string, DriveTrain|null|undefined>} */
+const TYPES = {
+  truck: HEAVY, bus: HEAVY, bicycle: null, pedestrian: null, parkedVehicle: null, train: null,
+  constructionZone: null, roadBoundary: null, building: null, pillar: null, median_strip: null,
+};
+
+/**
+ * @typedef {object} Driven one's own vehicle
+ * @property {string} id
+ * @property {DriveTrain} train
+ * @property {number} gear index of a ratio, or REVERSE
+ * @property {number} rpm
+ * @property {number} load of the engine, 0 to 1
+ * @property {number} speed without a sign [m/s]
+ * @property {number} deceleration against the motion [m/s^2]
+ * @property {number} lateral acceleration, to the left [m/s^2]
+ * @property {number} lights bits of LIGHT
+ */
+
+/**
+ * @typedef {Arrival & {id: string, train: DriveTrain, rpm: number, speed: number,
+ *   lights: number}} Other somebody near
+ * @typedef {{t: number, own: Driven, others: Other[]}} Heard
+ */
+
+/** Follows one vehicle through a run; remembers which gears are in. */
+export class Listener {
+  /** @type {Map<string, number>} */
+  #gears = new Map();
+
+  /** Forget the gears: another run begins. */
+  reset() {
+    this.#gears.clear();
+  }
+
+  /**
+   * Tell what is heard.
+   *
+   * @param {Scene} scene
+   * @param {Shown} shown what is to be seen at the same time
+   * @param {string} id whose driver listens: a vehicle or an object
+   * @returns {Heard|null} null where there is no such vehicle now
+   */
+  hear(scene, { t, vehicles, objects }, id) {
+    const index = scene.vehicles.findIndex((vehicle) => vehicle.id === id);
+    const column = index < 0 ? scene.objects.findIndex((object) => object.id === id) : -1;
+    if (index < 0 && column < 0) {
+      return null;
+    }
+    const own = index >= 0 ? this.#driven(scene.vehicles[index], vehicles, index)
+      : this.#passenger(scene.objects[column], objects, column);
+    const ear = index >= 0 ? headOf(scene.vehicles[index], vehicles, index)
+      : objectAt(objects, column);
+    if (own === null || !Number.isFinite(ear.x)) {
+      return null;
+    }
+    return { t, own, others: this.#others(scene, vehicles, objects, id, ear) };
+  }
+
+  /**
+   * @param {SceneVehicle} vehicle
+   * @param {Float64Array} rows
+   * @param {number} index
+   * @returns {Driven|null}
+   */
+  #driven(vehicle, rows, index) {
+    const at = index * VEHICLE_WIDTH;
+    const signed = rows[at + VEHICLE.speed];
+    if (!Number.isFinite(signed)) {
+      return null;
+    }
+    const train = trainOf(vehicle);
+    const along = (rows[at + VEHICLE.acceleration] || 0) * (Math.sign(signed) || 1);
+    const pedal = rows[at + VEHICLE.throttle];
+    const throttle = Number.isFinite(pedal) ? pedal : guessThrottle(Math.abs(signed), along);
+    const reverse = signed < 0 || (signed === 0 && rows[at + VEHICLE.reverse] > 0.5);
+    const speed = Math.abs(signed);
+    return {
+      id: vehicle.id, train, ...this.#engine(vehicle.id, train, speed, throttle, reverse),
+      load: throttle, speed, deceleration: -along,
+      lateral: signed * (rows[at + VEHICLE.yaw_rate] || 0), lights: rows[at + VEHICLE.lights] || 0,
+    };
+  }
+
+  /**
+   * @param {SceneObject} object
+   * @param {Float64Array} rows
+   * @param {number} column
+   * @returns {Driven|null} null for what has no driver's seat
+   */
+  #passenger(object, rows, column) {
+    const train = trainOfObject(object);
+    const { vx, vy } = objectAt(rows, column);
+    const speed = Math.hypot(vx, vy);
+    const throttle = guessThrottle(speed, 0);
+    return train === null || !Number.isFinite(speed) ? null : {
+      id: object.id, train, ...this.#engine(object.id, train, speed, throttle, false),
+      load: throttle, speed, deceleration: 0, lateral: 0, lights: 0,
+    };
+  }
+
+  /**
+   * @param {string} id
+   * @param {DriveTrain} train
+   * @param {number} speed
+   * @param {number} throttle
+   * @param {boolean} reverse
+   */
+  #engine(id, train, speed, throttle, reverse) {
+    const gear = reverse ? REVERSE : gearAfter(train, this.#gears.get(id) ?? 0, speed, throttle);
+    this.#gears.set(id, gear);
+    return { gear, rpm: engineSpeed_rpm(train, gear, speed, throttle) };
+  }
+
+  /**
+   * @param {Scene} scene
+   * @param {Float64Array} vehicles
+   * @param {Float64Array} objects
+   * @param {string} id
+   * @param {Moving} ear
+   * @returns {Other[]} the nearest first
+   */
+  #others(scene, vehicles, objects, id, ear) {
+    /** @type {{id: string, train: DriveTrain, source: Moving, lights: number}[]} */
+    const all = [];
+    scene.vehicles.forEach((vehicle, index) => {
+      all.push({ id: vehicle.id, train: trainOf(vehicle),
+        source: centreOf(vehicle, vehicles, index),
+        lights: vehicles[index * VEHICLE_WIDTH + VEHICLE.lights] || 0 });
+    });
+    scene.objects.forEach((object, column) => {
+      const train = trainOfObject(object);
+      if (train !== null) {
+        all.push({ id: object.id, train, source: objectAt(objects, column), lights: 0 });
+      }
+    });
+    return all
+      .filter((other) => other.id !== id && Number.isFinite(other.source.x + other.source.vx))
+      .map(({ source, ...other }) => ({ ...other, ...arrival(ear, source),
+        speed: Math.hypot(source.vx, source.vy) }))
+      .filter(({ distance }) => distance < RANGE_M)
+      .sort((a, b) => a.distance - b.distance).slice(0, MOST_OTHERS)
+      .map((other) => ({ ...other,
+        rpm: this.#engine(other.id, other.train, other.speed, guessThrottle(other.speed, 0), false)
+          .rpm }));
+  }
+}
+
+/**
+ * @param {SceneVehicle} vehicle
+ * @returns {DriveTrain}
+ */
+function trainOf(vehicle) {
+  return vehicle.powertrain === 'electric' ? ELECTRIC
+    : vehicle.shape.length > LONG_M ? HEAVY : CAR;
+}
+
+/**
+ * @param {SceneObject} object
+ * @returns {DriveTrain|null} null for what has no engine
+ */
+function trainOfObject({ type, role, shape }) {
+  const known = TYPES[type];
+  return role === 'static' || known === null ? null
+    : known ?? (shape.length > LONG_M ? HEAVY : CAR);
+}
+
+/**
+ * @param {number} speed without a sign [m/s]
+ * @param {number} acceleration along the motion [m/s^2]
+ */
+function guessThrottle(speed, acceleration) {
+  const holding = HOLDING * Math.min(speed / HELD_FROM, 1);
+  return Math.min(Math.max(holding + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
+}
+
+/**
+ * @param {SceneVehicle} vehicle
+ * @param {Float64Array} rows
+ * @param {number} index
+ * @returns {Moving} the middle of its outline
+ */
+function centreOf(vehicle, rows, index) {
+  return aheadOf(rows, index, vehicle.rear_to_center, 0);
+}
+
+/**
+ * @param {SceneVehicle} vehicle
+ * @param {Float64Array} rows
+ * @param {number} index
+ * @returns {Moving} its driver's head
+ */
+function headOf(vehicle, rows, index) {
+  return aheadOf(rows, index, HEAD_AHEAD * vehicle.wheelbase, HEAD_LEFT * vehicle.shape.width);
+}
+
+/**
+ * @param {Float64Array} rows
+ * @param {number} index
+ * @param {number} ahead of the rear axle [m]
+ * @param {number} left of it [m]
+ * @returns {Moving}
+ */
+function aheadOf(rows, index, ahead, left) {
+  const at = index * VEHICLE_WIDTH;
+  const [yaw, speed] = [rows[at + VEHICLE.yaw], rows[at + VEHICLE.speed]];
+  const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
+  return {
+    x: rows[at + VEHICLE.x] + ahead * cos - left * sin,
+    y: rows[at + VEHICLE.y] + ahead * sin + left * cos,
+    yaw, vx: speed * cos, vy: speed * sin,
+  };
+}
+
+/**
+ * @param {Float64Array} rows
+ * @param {number} column
+ * @returns {Moving}
+ */
+function objectAt(rows, column) {
+  const [x, y, yaw, vx, vy] = rows.subarray(column * OBJECT_WIDTH, (column + 1) * OBJECT_WIDTH);
+  return { x, y, yaw, vx, vy };
+}

@@ -1,0 +1,74 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What one's own speed sounds like: tyres, wind, brakes that squeal, ground beside the road. */
+
+import { cornering, hardBraking, roughness, tyreLevel, windLevel } from './levels.js';
+import { makeFilter, makeGain, playNoise } from './voices.js';
+
+/** @import { Driven } from './listener.js' */
+/** @import { Value } from './voices.js' */
+
+/**
+ * One band of noise.
+ *
+ * @typedef {object} Band
+ * @property {[type: BiquadFilterType, frequency: number, q?: number][]} filters one after another
+ * @property {number} boost what makes up for the power that the filters take away
+ * @property {(own: Road) => number} level amplitude, 0 at standstill
+ *
+ * @typedef {Pick<Driven, 'speed'|'deceleration'|'lateral'> & {offRoad: boolean}} Road
+ */
+
+/** @type {Band[]} */
+const BANDS = [
+  { filters: [['highpass', 70], ['lowpass', 420], ['lowpass', 700]], boost: 8,
+    level: ({ speed }) => tyreLevel(speed) },
+  { filters: [['highpass', 500], ['lowpass', 1800]], boost: 4,
+    level: ({ speed }) => windLevel(speed) },
+  { filters: [['bandpass', 2350, 40]], boost: 12,
+    level: ({ deceleration, speed }) => 0.07 * hardBraking(deceleration, speed) },
+  { filters: [['bandpass', 3310, 60]], boost: 14,
+    level: ({ deceleration, speed }) => 0.04 * hardBraking(deceleration, speed) },
+  { filters: [['bandpass', 940, 14]], boost: 8,
+    level: ({ lateral, speed }) => 0.1 * cornering(lateral, speed) },
+  { filters: [['lowpass', 130]], boost: 14,
+    level: ({ speed, offRoad }) => (offRoad ? 0.16 * roughness(speed) : 0) },
+  { filters: [['bandpass', 2600, 0.8]], boost: 2,
+    level: ({ speed, offRoad }) => (offRoad ? 0.08 * roughness(speed) : 0) },
+];
+
+/** Noise in bands, at `output`. */
+export class RoadVoice {
+  output;
+  /** @type {{gain: Value, band: Band}[]} */
+  #bands;
+
+  /**
+   * @param {BaseAudioContext} context
+   * @param {AudioBuffer} noise
+   */
+  constructor(context, noise) {
+    this.output = context.createGain();
+    const source = playNoise(context, noise);
+    this.#bands = BANDS.map((band) => {
+      const { node, gain } = makeGain(context);
+      /** @type {AudioNode} */
+      let last = source;
+      for (const [type, frequency, q] of band.filters) {
+        last = last.connect(makeFilter(context, type, frequency, q));
+      }
+      last.connect(node).connect(this.output);
+      return { gain, band };
+    });
+  }
+
+  /**
+   * @param {Road} own
+   * @param {number} when time of the context [s]
+   */
+  update(own, when) {
+    for (const { gain, band } of this.#bands) {
+      gain.to(band.boost * band.level(own), when);
+    }
+  }
+}

@@ -1,0 +1,118 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What a driver feels in a gamepad with motors: ground, kerbs, collisions, hard braking. */
+
+import { hardBraking, impact, roughness } from './levels.js';
+
+/** @import { Driven } from './listener.js' */
+/** @import { Trouble } from './sound_graph.js' */
+
+// An effect lasts longer than the time to the next, so that the motors turn evenly [ms].
+const EVERY_MS = 80;
+const EFFECT_MS = 160;
+const KERB_MS = 150;
+const COLLISION_MS = 450;
+
+/**
+ * @typedef {{strong: number, weak: number}} Magnitudes of the two motors, 0 to 1
+ * @typedef {{magnitude: number, until_ms: number}} Pulse
+ */
+
+/** Turns what happens to one's own vehicle into magnitudes of the motors. */
+export class Feeling {
+  /** @type {Trouble|null} */
+  #trouble = null;
+  /** @type {Pulse} */
+  #pulse = { magnitude: 0, until_ms: -Infinity };
+  #beat = false;
+
+  /** Forget: what was is not felt later. */
+  reset() {
+    this.#trouble = null;
+    this.#pulse = { magnitude: 0, until_ms: -Infinity };
+  }
+
+  /**
+   * @param {Pick<Driven, 'speed'|'deceleration'>} own
+   * @param {Trouble} trouble
+   * @param {number} now_ms
+   * @returns {Magnitudes}
+   */
+  of({ speed, deceleration }, trouble, now_ms) {
+    const before = this.#trouble ?? trouble;
+    this.#trouble = trouble;
+    if (trouble.collision && !before.collision) {
+      this.#pulse = { magnitude: impact(speed), until_ms: now_ms + COLLISION_MS };
+    } else if (trouble.offRoad !== before.offRoad) {
+      this.#pulse = { magnitude: 0.7 * impact(speed), until_ms: now_ms + KERB_MS };
+    }
+    const pulse = now_ms < this.#pulse.until_ms ? this.#pulse.magnitude : 0;
+    const rough = trouble.offRoad ? roughness(speed) : 0;
+    // The pedal of an antilock brake beats: here with every second effect.
+    this.#beat = !this.#beat;
+    const brakes = hardBraking(deceleration, speed) * (this.#beat ? 1 : 0.3);
+    return {
+      strong: Math.max(pulse, 0.4 * rough, 0.3 * brakes),
+      weak: Math.max(pulse, 0.6 * rough, 0.7 * brakes),
+    };
+  }
+}
+
+/** The motors of one gamepad after another. */
+export class Rumble {
+  #feeling = new Feeling();
+  /** @type {GamepadHapticActuator|null} */
+  #running = null;
+  #next_ms = -Infinity;
+
+  /**
+   * Let a gamepad feel what happens.
+   *
+   * @param {GamepadHapticActuator} actuator
+   * @param {Pick<Driven, 'speed'|'deceleration'>} own
+   * @param {Trouble} trouble
+   * @param {number} strength 0 to 1
+   * @param {number} now_ms
+   */
+  feel(actuator, own, trouble, strength, now_ms) {
+    if (this.#running !== null && this.#running !== actuator) {
+      this.stop();
+    }
+    if (now_ms < this.#next_ms) {
+      return;
+    }
+    this.#next_ms = now_ms + EVERY_MS;
+    const { strong, weak } = this.#feeling.of(own, trouble, now_ms);
+    if (strength * Math.max(strong, weak) < 0.01) {
+      this.#still();
+      return;
+    }
+    this.#running = actuator;
+    // A browser that cannot, or whose gamepad is gone, says so by rejecting: nothing to be done.
+    actuator.playEffect('dual-rumble', {
+      startDelay: 0, duration: EFFECT_MS, strongMagnitude: strength * strong,
+      weakMagnitude: strength * weak,
+    }).catch(() => {});
+  }
+
+  /** Stand still, and forget what was. */
+  stop() {
+    this.#feeling.reset();
+    this.#next_ms = -Infinity;
+    this.#still();
+  }
+
+  #still() {
+    this.#running?.reset().catch(() => {});
+    this.#running = null;
+  }
+}
+
+/**
+ * @param {Gamepad|undefined} pad
+ * @returns {GamepadHapticActuator|null} null where the gamepad or the browser has none
+ */
+export function actuatorOf(pad) {
+  const actuator = pad?.vibrationActuator ?? null;
+  return typeof actuator?.playEffect === 'function' ? actuator : null;
+}

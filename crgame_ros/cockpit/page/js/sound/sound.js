@@ -1,0 +1,247 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Sound and rumble of the vehicle whose seat this page holds, else of the followed one. */
+
+import { connectedPads } from '../driving/gamepad.js';
+import { isTyping } from '../driving/focus.js';
+import { recall, remember } from '../panels/memory.js';
+import { Listener } from './listener.js';
+import { actuatorOf, Rumble } from './rumble.js';
+import { createSoundControl } from './sound_control.js';
+import { Speaker } from './speaker.js';
+
+/** @import { Connection } from '../connection.js' */
+/** @import { Store } from '../store.js' */
+/** @import { Heard } from './listener.js' */
+/** @import { Trouble } from './sound_graph.js' */
+
+// Ears do not need every frame of the picture [ms].
+const EVERY_MS = 30;
+const KEY = 'KeyM';
+const VOLUME = 0.7;
+const RUMBLE = 0.5;
+// A time that moves farther between two looks was jumped to [s].
+const JUMP_S = 0.5;
+
+/** @typedef {'volume'|'rumble'} Amount both from 0 to 1 */
+
+/** The page's sound; in `window.crgame.sound`. */
+export class Sound {
+  /** Whether a person wants it; a browser may still wait for a gesture. */
+  wanted = recall('sound') === 'on';
+  volume = recallShare('volume', VOLUME);
+  rumble = recallShare('rumble', RUMBLE);
+  /**
+   * What is heard now; null in silence.
+   *
+   * @type {Heard|null}
+   */
+  heard = null;
+
+  #store;
+  #connection;
+  #listener = new Listener();
+  #speaker = new Speaker(() => this.#tell());
+  #motors = new Rumble();
+  #control;
+  #next_ms = -Infinity;
+  #subject = '';
+  #t = NaN;
+  #told = '';
+
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   * @param {Connection} connection
+   */
+  constructor(root, store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    this.#control = createSoundControl(root, this);
+    window.addEventListener('pointerdown', () => this.#gesture(), true);
+    window.addEventListener('keydown', (event) => this.#key(event), true);
+    document.addEventListener('visibilitychange', () => this.#look(performance.now()));
+    store.on('scene', () => this.#tell());
+    store.on('epoch', () => {
+      this.#subject = '';
+      this.#listener.reset();
+    });
+    store.on('hello', () => {
+      this.#told = '';
+      this.#tell();
+    });
+    /** @param {number} now_ms */
+    const frame = (now_ms) => {
+      requestAnimationFrame(frame);
+      if (now_ms >= this.#next_ms) {
+        this.#next_ms = now_ms + EVERY_MS;
+        this.#look(now_ms);
+      }
+    };
+    requestAnimationFrame(frame);
+    this.#tell();
+  }
+
+  /** Whether the game lets pages sound and gamepads rumble. */
+  get allowed() {
+    return this.#store.scene?.sound !== 'none';
+  }
+
+  /** Whether there is sound as soon as there is something to be heard. */
+  get on() {
+    return this.wanted && this.allowed && this.#speaker.begun;
+  }
+
+  /** Whether the gamepad that drives, or any if none does, has motors. */
+  get canRumble() {
+    return this.#pads().some((pad) => actuatorOf(pad) !== null);
+  }
+
+  /** Turn the sound on or off; on in a gesture. */
+  toggle() {
+    this.wanted = !this.wanted;
+    remember('sound', this.wanted ? 'on' : '');
+    if (this.wanted && this.allowed) {
+      this.#speaker.begin();
+    }
+    this.#look(performance.now());
+    this.#tell();
+  }
+
+  /**
+   * @param {Amount} amount
+   * @param {number} share 0 to 1
+   */
+  set(amount, share) {
+    this[amount] = Math.min(Math.max(share, 0), 1);
+    remember(amount, String(this[amount]));
+    this.#tell();
+  }
+
+  #gesture() {
+    if (this.wanted && this.allowed && !this.#speaker.begun) {
+      this.#speaker.begin();
+    }
+  }
+
+  /** @param {KeyboardEvent} event */
+  #key(event) {
+    const free = !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey
+      && !isTyping(event.target) && !document.querySelector('dialog[open]');
+    if (event.code === KEY && free && this.allowed) {
+      event.preventDefault();
+      this.toggle();
+    } else {
+      this.#gesture();
+    }
+  }
+
+  /**
+   * Make heard and felt what is so now.
+   *
+   * @param {number} now_ms
+   */
+  #look(now_ms) {
+    const heard = (this.on || this.#drives) && this.#runs ? this.#hear(now_ms) : null;
+    this.heard = this.on ? heard : null;
+    if (heard === null) {
+      this.#speaker.hush();
+      this.#motors.stop();
+      this.#subject = '';
+      return;
+    }
+    const trouble = this.#troubleOf(heard.own.id);
+    if (this.#jumped(heard)) {
+      // Another ear, or another time: a moment of silence between the two.
+      this.#speaker.hush();
+      this.#motors.stop();
+      return;
+    }
+    if (this.on) {
+      this.#speaker.play(heard, trouble, this.volume);
+    } else {
+      this.#speaker.hush();
+    }
+    const actuator = this.#drives && this.rumble > 0 ? actuatorOf(this.#pads()[0]) : null;
+    if (actuator !== null) {
+      this.#motors.feel(actuator, heard.own, trouble, this.rumble, now_ms);
+    } else {
+      this.#motors.stop();
+    }
+  }
+
+  get #runs() {
+    const { connected, mode, status } = this.#store;
+    return (connected || mode === 'replay') && status?.run === 'running' && this.allowed
+      && document.visibilityState === 'visible';
+  }
+
+  /** Whether the hands of this page are on the controls of a seat. */
+  get #drives() {
+    const { driving } = window.crgame;
+    return driving !== undefined && driving.seat !== null && driving.away === null;
+  }
+
+  /** @param {number} now_ms */
+  #hear(now_ms) {
+    const { scene } = this.#store;
+    const shown = this.#store.displayed(now_ms);
+    const id = window.crgame.driving?.seat ?? window.crgame.world.followed;
+    return scene === null || shown === null || id === null ? null
+      : this.#listener.hear(scene, shown, id);
+  }
+
+  /** @param {Heard} heard */
+  #jumped({ t, own }) {
+    const jumped = own.id !== this.#subject || !(Math.abs(t - this.#t) < JUMP_S);
+    this.#subject = own.id;
+    this.#t = t;
+    return jumped;
+  }
+
+  /**
+   * @param {string} id
+   * @returns {Trouble}
+   */
+  #troubleOf(id) {
+    const verdict = this.#store.status?.drivability?.[id];
+    return { collision: verdict?.collision ?? false, offRoad: verdict?.off_road ?? false };
+  }
+
+  #pads() {
+    const active = window.crgame?.driving?.gamepads.active ?? null;
+    const pads = connectedPads();
+    return active === null ? pads : pads.filter((pad) => pad.index === active.index);
+  }
+
+  /** Show how it is, and tell the server, which records it. */
+  #tell() {
+    this.#control.show();
+    const told = { on: Number(this.on), volume: this.volume, rumble: this.rumble };
+    const text = JSON.stringify(told);
+    if (text !== this.#told && this.#connection.send({ type: 'sound', ...told })) {
+      this.#told = text;
+    }
+  }
+}
+
+/**
+ * @param {Amount} amount
+ * @param {number} usual where none was kept
+ */
+function recallShare(amount, usual) {
+  const kept = Number.parseFloat(recall(amount));
+  return kept >= 0 && kept <= 1 ? kept : usual;
+}
+
+/**
+ * Put the sound's control into the header, and make heard what is to be heard.
+ *
+ * @param {HTMLElement} root of the control
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {Sound}
+ */
+export function createSound(root, store, connection) {
+  return new Sound(root, store, connection);
+}

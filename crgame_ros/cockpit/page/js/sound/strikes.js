@@ -1,0 +1,107 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What sounds once and is over: a relay that clicks, a kerb, a collision. */
+
+import { makeFilter } from './voices.js';
+
+// Nothing begins with a jump [s].
+const ATTACK_S = 0.002;
+// By then an exponential has fallen to a thousandth.
+const TIME_CONSTANTS = 7;
+
+/** Strikes, heard at what it is given. */
+export class Strikes {
+  #context;
+  #noise;
+  #out;
+
+  /**
+   * @param {BaseAudioContext} context
+   * @param {AudioBuffer} noise
+   * @param {AudioNode} out
+   */
+  constructor(context, noise, out) {
+    this.#context = context;
+    this.#noise = noise;
+    this.#out = out;
+  }
+
+  /**
+   * The relay of an indicator.
+   *
+   * @param {boolean} lit whether its lamps go on: higher than when they go off
+   * @param {number} when time of the context [s]
+   */
+  click(lit, when) {
+    this.#burst(when, 0.5, 0.006, makeFilter(this.#context, 'bandpass', lit ? 2900 : 2200, 3));
+  }
+
+  /**
+   * Wheels that go over an edge.
+   *
+   * @param {number} strength 0 to 1
+   * @param {number} when time of the context [s]
+   */
+  kerb(strength, when) {
+    this.#thump(when, 0.45 * strength, 0.05, 75);
+    this.#burst(when, 0.25 * strength, 0.03, makeFilter(this.#context, 'lowpass', 700));
+  }
+
+  /**
+   * Something hits something.
+   *
+   * @param {number} strength 0 to 1
+   * @param {number} when time of the context [s]
+   */
+  collision(strength, when) {
+    this.#thump(when, 0.9 * strength, 0.12, 55);
+    this.#burst(when, 1.2 * strength, 0.09, makeFilter(this.#context, 'lowpass', 1500));
+    this.#burst(when + 0.03, 0.4 * strength, 0.22, makeFilter(this.#context, 'bandpass', 3200, 2));
+  }
+
+  /**
+   * @param {number} when [s]
+   * @param {number} amplitude
+   * @param {number} decay_s time constant [s]
+   * @param {BiquadFilterNode} filter
+   */
+  #burst(when, amplitude, decay_s, filter) {
+    const source = this.#context.createBufferSource();
+    source.buffer = this.#noise;
+    source.connect(filter).connect(this.#envelope(source, when, amplitude, decay_s));
+    source.start(when);
+    source.stop(when + TIME_CONSTANTS * decay_s);
+  }
+
+  /**
+   * @param {number} when [s]
+   * @param {number} amplitude
+   * @param {number} decay_s time constant [s]
+   * @param {number} frequency at which it begins, and falls [Hz]
+   */
+  #thump(when, amplitude, decay_s, frequency) {
+    const source = this.#context.createOscillator();
+    source.frequency.setValueAtTime(frequency, when);
+    source.frequency.setTargetAtTime(0.5 * frequency, when, decay_s);
+    source.connect(this.#envelope(source, when, amplitude, decay_s));
+    source.start(when);
+    source.stop(when + TIME_CONSTANTS * decay_s);
+  }
+
+  /**
+   * @param {AudioScheduledSourceNode} source ended with it
+   * @param {number} when [s]
+   * @param {number} amplitude
+   * @param {number} decay_s
+   * @returns {GainNode}
+   */
+  #envelope(source, when, amplitude, decay_s) {
+    const level = this.#context.createGain();
+    level.gain.setValueAtTime(0, when);
+    level.gain.linearRampToValueAtTime(amplitude, when + ATTACK_S);
+    level.gain.setTargetAtTime(0, when + ATTACK_S, decay_s);
+    level.connect(this.#out);
+    source.onended = () => level.disconnect();
+    return level;
+  }
+}

@@ -1,0 +1,151 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What every voice is made of: values that move without a click, noise, waves. */
+
+/** @import { DriveTrain } from './drive_train.js' */
+
+// A voice's values go to new ones with this time constant: no click, and no lag to be heard [s].
+const SETTLE_S = 0.025;
+const NOISE_S = 3;
+// Less than this cannot be heard: no event for it.
+const SAME = 2e-4;
+const PARTIALS = 128;
+
+/** One value of an audio node, moved smoothly. */
+export class Value {
+  #param;
+  #settle_s;
+  #last;
+
+  /**
+   * @param {AudioParam} param
+   * @param {number} initial
+   * @param {number} [settle_s] time constant [s]
+   */
+  constructor(param, initial, settle_s = SETTLE_S) {
+    this.#param = param;
+    this.#settle_s = settle_s;
+    this.#last = initial;
+    param.value = initial;
+  }
+
+  /**
+   * Move to a value from a time on.
+   *
+   * @param {number} value
+   * @param {number} when time of the context [s]
+   */
+  to(value, when) {
+    if (Math.abs(value - this.#last) > SAME * Math.abs(this.#last)) {
+      this.#param.setTargetAtTime(value, when, this.#settle_s);
+      this.#last = value;
+    }
+  }
+
+  /**
+   * Jump to a value, for what nobody hears just then.
+   *
+   * @param {number} value
+   * @param {number} when time of the context [s]
+   */
+  jump(value, when) {
+    this.#param.cancelScheduledValues(when);
+    this.#param.setValueAtTime(value, when);
+    this.#last = value;
+  }
+}
+
+/**
+ * Make a gain that begins at an amplitude and moves smoothly.
+ *
+ * @param {BaseAudioContext} context
+ * @param {number} [amplitude]
+ * @returns {{node: GainNode, gain: Value}}
+ */
+export function makeGain(context, amplitude = 0) {
+  const node = context.createGain();
+  return { node, gain: new Value(node.gain, amplitude) };
+}
+
+/**
+ * @param {BaseAudioContext} context
+ * @param {BiquadFilterType} type
+ * @param {number} frequency [Hz]
+ * @param {number} [q]
+ * @returns {BiquadFilterNode}
+ */
+export function makeFilter(context, type, frequency, q = Math.SQRT1_2) {
+  const filter = context.createBiquadFilter();
+  filter.type = type;
+  filter.frequency.value = frequency;
+  filter.Q.value = q;
+  return filter;
+}
+
+/**
+ * Make some seconds of white noise, the same every time, of variance 1/3.
+ *
+ * @param {BaseAudioContext} context
+ * @returns {AudioBuffer}
+ */
+export function makeNoise(context) {
+  const buffer = context.createBuffer(1, NOISE_S * context.sampleRate, context.sampleRate);
+  const samples = buffer.getChannelData(0);
+  // A linear congruential generator (Numerical Recipes): only its upper bits are used.
+  let state = 1;
+  for (let i = 0; i < samples.length; i += 1) {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    samples[i] = state / 2 ** 31 - 1;
+  }
+  return buffer;
+}
+
+/**
+ * Play noise for ever.
+ *
+ * @param {BaseAudioContext} context
+ * @param {AudioBuffer} noise
+ * @param {number} [offset_s] where it begins: two players of one noise must not be alike
+ * @returns {AudioBufferSourceNode}
+ */
+export function playNoise(context, noise, offset_s = 0) {
+  const source = context.createBufferSource();
+  source.buffer = noise;
+  source.loop = true;
+  source.start(0, offset_s);
+  return source;
+}
+
+/**
+ * Give the base of an engine's wave below its strongest tone: a four-stroke engine repeats itself
+ * every two turns, a motor with every pulse.
+ *
+ * @param {DriveTrain} train
+ * @returns {number} the partial that is the strongest tone
+ */
+export function mainPartial(train) {
+  return train.name === 'electric' ? 1 : 2 * train.order;
+}
+
+/**
+ * Make the wave of an engine: the strongest tone and its multiples, weaker ones between them.
+ *
+ * @param {BaseAudioContext} context
+ * @param {DriveTrain} train
+ * @param {number} falling exponent with which the partials fall: less is harsher
+ * @returns {PeriodicWave} of amplitude 1
+ */
+export function engineWave(context, train, falling) {
+  const main = mainPartial(train);
+  const real = new Float32Array(PARTIALS + 1);
+  const imag = new Float32Array(PARTIALS + 1);
+  for (let k = 1; k <= PARTIALS; k += 1) {
+    const kind = main === 1 ? k % 2 : k % main === 0 ? 1 : k % (main / 2) === 0 ? 0.3 : 0.12;
+    const amplitude = k < main ? 0.8 * kind * k / main : kind * (k / main) ** -falling;
+    // Phases that are spread evenly keep the crest low (Schroeder 1970).
+    const phase = Math.PI * k * k / PARTIALS;
+    real[k] = amplitude * Math.cos(phase);
+    imag[k] = amplitude * Math.sin(phase);
+  }
+  return context.createPeriodicWave(real, imag);
+}

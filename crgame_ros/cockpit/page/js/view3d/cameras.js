@@ -1,0 +1,77 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** From where the 3D view looks: the poses of its cameras, in the map's coordinates. */
+
+const DEGREE = Math.PI / 180;
+const CHASE_BEHIND_M = 6.5;
+const CHASE_ABOVE_M = 3.4;
+const CHASE_PITCH = -12 * DEGREE;
+const BIRD_ABOVE_M = 55;
+const BIRD_AHEAD_M = 12;
+
+/** What one can look from. */
+export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
+
+/**
+ * @typedef {typeof VIEWPOINTS[number]} Viewpoint
+ * @typedef {{x: number, y: number, z: number}} Point [m]
+ */
+
+/**
+ * Where a vehicle stands: its rear axle on the road, its heading, and the way's slope upwards.
+ *
+ * @typedef {Point & {yaw: number, slope: number}} Stand [m, rad]
+ */
+
+/**
+ * Where a camera is and looks. It is turned with the vehicle, by yaw and slope, then within it to
+ * the left and upwards; never rolled.
+ *
+ * @typedef {Point & {yaw: number, slope: number, aside: number, pitch: number}} CameraPose [m, rad]
+ */
+
+/**
+ * Put a camera at a point of a vehicle.
+ *
+ * @param {Stand} stand
+ * @param {Point} point ahead of the rear axle, to the left, above the road [m]
+ * @param {number} [aside] how far it looks to the left of straight ahead [rad]
+ * @param {number} [pitch] how far it looks upwards [rad]
+ * @returns {CameraPose}
+ */
+export function mountedAt(stand, point, aside = 0, pitch = 0) {
+  const { yaw, slope } = stand;
+  // How far on in the plane: what is higher on a vehicle that climbs is farther back.
+  const ahead = point.x * Math.cos(slope) - point.z * Math.sin(slope);
+  return {
+    x: stand.x + Math.cos(yaw) * ahead - Math.sin(yaw) * point.y,
+    y: stand.y + Math.sin(yaw) * ahead + Math.cos(yaw) * point.y,
+    z: stand.z + point.x * Math.sin(slope) + point.z * Math.cos(slope),
+    yaw, slope, aside, pitch,
+  };
+}
+
+/**
+ * Follow a vehicle from behind and above.
+ *
+ * @param {Stand} stand
+ * @param {{front: number, rear: number}} ends of the vehicle ahead of its rear axle [m]
+ * @param {number} [aside] how far it looks to the left of straight ahead [rad]
+ * @returns {CameraPose}
+ */
+export function chasing(stand, { rear }, aside = 0) {
+  const level = { ...stand, slope: 0.5 * stand.slope };
+  return mountedAt(level, { x: rear - CHASE_BEHIND_M, y: 0, z: CHASE_ABOVE_M }, aside,
+    CHASE_PITCH);
+}
+
+/**
+ * Look down on a vehicle, which drives upwards in the picture.
+ *
+ * @param {Stand} stand
+ * @returns {CameraPose}
+ */
+export function above(stand) {
+  return mountedAt({ ...stand, slope: 0 }, { x: BIRD_AHEAD_M, y: 0, z: BIRD_ABOVE_M }, 0,
+    -90 * DEGREE);
+}

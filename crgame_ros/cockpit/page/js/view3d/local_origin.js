@@ -1,0 +1,23 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * Where the 3D view's coordinates begin.
+ *
+ * They are the map's, x east, y north, and z up (also what three.js calls up, for all cameras),
+ * in metres, but from a point amid the map: the graphics card computes in float32, which at the
+ * 1e6 m of UTM coordinates knows steps of 0.1 m only.
+ */
+
+/** @import { Scene } from '../messages.js' */
+
+/** @typedef {{x: number, y: number}} Origin in the map's coordinates [m] */
+
+/**
+ * Give the origin of a scene: always the same one for the same scene.
+ *
+ * @param {Pick<Scene, 'bounds'>} scene the scene document
+ * @returns {Origin} whole metres, amid the map; local x = map x - origin x
+ */
+export function localOrigin({ bounds: [xmin, ymin, xmax, ymax] }) {
+  return { x: Math.round((xmin + xmax) / 2), y: Math.round((ymin + ymax) / 2) };
+}

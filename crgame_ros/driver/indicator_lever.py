@@ -1,0 +1,97 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The lever that switches a vehicle's indicators, and the button of its horn."""
+
+from collections.abc import Iterable, Set
+from dataclasses import dataclass
+
+from crgame_ros.vehicle.lights import HAZARD, Light
+
+# The wheel was turned into the indicated direction beyond the first, and is back below the
+# second: of a wheel of 450 degrees to either side 90 and 45 degrees, as levers of cars have it.
+TURNED = 0.2
+BACK = 0.1
+
+
+@dataclass(frozen=True)
+class LightButtons:
+    """
+    Buttons or keys of the lights, as evdev codes or indices in `Joy.buttons`.
+
+    :param left: a press switches the left indicator on or off.
+    :param right: a press switches the right indicator on or off.
+    :param hazard: a press switches both on or off.
+    :param horn: it sounds while held.
+    """
+
+    left: frozenset[int] = frozenset()
+    right: frozenset[int] = frozenset()
+    hazard: frozenset[int] = frozenset()
+    horn: frozenset[int] = frozenset()
+
+
+NO_LIGHTS = LightButtons()
+
+
+class IndicatorLever:
+    """
+    What is switched on, from presses of buttons; an indicator is off again after the turn.
+
+    :param buttons: what does what.
+    """
+
+    def __init__(self, buttons: LightButtons = NO_LIGHTS) -> None:
+        self._buttons = buttons
+        self._pressed: frozenset[int] = frozenset()
+        self._side = 0
+        self._hazard = False
+        self._turned = False
+
+    @property
+    def lights(self) -> int:
+        """Give what is on, as `DriverCommand.lights`."""
+        horn = 0 if self._buttons.horn.isdisjoint(self._pressed) else Light.HORN
+        return int((HAZARD if self._hazard else self._side) | horn)
+
+    def hold(self, pressed: Iterable[int]) -> None:
+        """Take which buttons are held now; each that was not held before counts as a press."""
+        held = frozenset(pressed)
+        for button in sorted(held - self._pressed):
+            self._press(button)
+        self._pressed = held
+
+    def overlook(self, pressed: Set[int]) -> None:
+        """Take which buttons are held now, where presses may have been missed: none counts."""
+        self._pressed = frozenset(pressed)
+
+    def turn(self, steering: float) -> None:
+        """
+        Switch an indicator off once the wheel has been turned its way and is back.
+
+        :param steering: normalised, -1 to 1, positive to the left.
+        """
+        inwards = steering if self._side == Light.LEFT else -steering
+        if self._side and inwards > TURNED:
+            self._turned = True
+        elif self._turned and inwards < BACK:
+            self._side, self._turned = 0, False
+
+    def _press(self, button: int) -> None:
+        if button in self._buttons.hazard:
+            self._hazard = not self._hazard
+        for buttons, side in ((self._buttons.left, Light.LEFT),
+                              (self._buttons.right, Light.RIGHT)):
+            if button in buttons:
+                self._side, self._turned = 0 if self._side == side else int(side), False

@@ -1,0 +1,53 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a vehicle shows and sounds to others: its indicators and its horn."""
+
+from collections.abc import Mapping
+from enum import IntFlag
+import json
+
+
+class Light(IntFlag):
+    """
+    A bit of `DriverCommand.lights`; both indicators together are the hazard lights.
+
+    It is what a driver has switched on: that indicators blink is for whoever draws them.
+    """
+
+    LEFT = 1
+    RIGHT = 2
+    HORN = 4
+
+
+HAZARD = int(Light.LEFT | Light.RIGHT)
+ALL_LIGHTS = int(HAZARD | Light.HORN)
+INDICATORS = {0: 'off', int(Light.LEFT): 'left', int(Light.RIGHT): 'right', HAZARD: 'hazard'}
+
+
+def lights_of(left: object, right: object, horn: object) -> int:
+    """Give the bit field of three switches."""
+    return (Light.LEFT * bool(left)) | (Light.RIGHT * bool(right)) | (Light.HORN * bool(horn))
+
+
+def signals_document(n: int, lights: Mapping[str, int]) -> str:
+    """
+    Write /vehicles/signals.
+
+    :param n: the step from which on they hold.
+    :param lights: of each driven vehicle, by id.
+    """
+    return json.dumps({'n': n, 'vehicles': {
+        name: {'indicator': INDICATORS[bits & HAZARD], 'horn': bool(bits & Light.HORN)}
+        for name, bits in lights.items()}})

@@ -1,0 +1,49 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Indicators and horn: what shines when, and which of a device's buttons work them. */
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { defaultProfile, loadProfile, saveProfile } from
+  '../../crgame_ros/cockpit/page/js/driving/gamepad_profile.js';
+import { interpolateVehicles } from '../../crgame_ros/cockpit/page/js/interpolation.js';
+import { VEHICLE, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.js';
+import { LIGHT, shining } from '../../crgame_ros/cockpit/page/js/lights.js';
+import { keepStorage } from './support.mjs';
+
+test('indicators blink three times in two seconds of simulation time, the horn sounds on', () => {
+  const all = LIGHT.left | LIGHT.right | LIGHT.horn;
+  const times = Array.from({ length: 2000 }, (_, i) => i / 1000);
+  const lit = times.map((t) => shining(all, t).left);
+  assert.equal(lit.filter((on, i) => on && !(i > 0 && lit[i - 1])).length, 3);
+  assert.ok(Math.abs(lit.filter(Boolean).length - 1000) <= 3, 'half of the time');
+  assert.ok(times.every((t) => shining(all, t).horn));
+  assert.deepEqual(shining(LIGHT.right, 0), { left: false, right: true, horn: false });
+});
+
+test('who has no command has no lights', () => {
+  for (const lights of [NaN, undefined, 0]) {
+    assert.deepEqual(shining(lights, 0), { left: false, right: false, horn: false });
+  }
+});
+
+test('lights are never between two samples', () => {
+  const [before, after, out] = [0, 0, 0].map(() => new Float64Array(VEHICLE_WIDTH));
+  before[VEHICLE.lights] = LIGHT.left;
+  after[VEHICLE.lights] = LIGHT.horn;
+  interpolateVehicles(out, before, after, 0.5);
+  assert.equal(out[VEHICLE.lights], LIGHT.left);
+});
+
+test('a calibration from before there were indicators gets the default buttons', () => {
+  const kept = keepStorage();
+  const wheel = { id: 'X (Vendor: 046d Product: c26e)', index: 0, axes: [0, 1, 1, 1], buttons: [],
+    mapping: '' };
+  const { lights, ...own } = defaultProfile(wheel);
+  assert.deepEqual(lights, { left_indicator: [9], right_indicator: [8], hazard: [3], horn: [0] });
+  own.steering.deadzone = 0.25;
+  saveProfile(wheel.id, own);
+  assert.deepEqual(loadProfile(wheel), { profile: { ...own, lights }, calibrated: true });
+  kept.clear();
+});

@@ -1,0 +1,216 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Engine speeds, levels, directions and what a driver hears and feels, as numbers. */
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import {
+  CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, lockedSpeed_rpm, REVERSE, tone_Hz,
+} from '../../crgame_ros/cockpit/page/js/sound/drive_train.js';
+import {
+  arrival, attenuation, dopplerFactor, RANGE_M,
+} from '../../crgame_ros/cockpit/page/js/sound/hearing.js';
+import {
+  cornering, engineLevel, hardBraking, tyreLevel, volumeGain, windLevel,
+} from '../../crgame_ros/cockpit/page/js/sound/levels.js';
+import {
+  Listener, MOST_OTHERS,
+} from '../../crgame_ros/cockpit/page/js/sound/listener.js';
+import { Feeling, Rumble } from '../../crgame_ros/cockpit/page/js/sound/rumble.js';
+import { close } from './support.mjs';
+
+const QUIET = { collision: false, offRoad: false };
+
+test('an engine turns as its wheels and gears have it', () => {
+  // 30 m/s: 96.77 rad/s at wheels of 0.31 m, in the sixth gear 0.691 * 3.46 times as fast.
+  close(lockedSpeed_rpm(CAR, 5, 30), 2209.5, 0.5);
+  close(engineSpeed_rpm(CAR, 5, 30, 0.4), 2209.5, 0.5);
+  close(tone_Hz(CAR, 3000), 100);
+  // Four pole pairs: eight pulses a turn. 20 m/s is 64.5 rad/s, 9 times as fast at the motor.
+  close(tone_Hz(ELECTRIC, engineSpeed_rpm(ELECTRIC, 0, 20, 1)), 8 * 9 * 20 / 0.31 / (2 * Math.PI));
+  close(engineSpeed_rpm(ELECTRIC, 0, 0, 1), 0);
+  close(engineSpeed_rpm(CAR, 0, 0, 0), 800);
+  assert.ok(engineSpeed_rpm(CAR, 0, 0, 1) > 1500, 'the clutch slips');
+  close(engineSpeed_rpm(CAR, REVERSE, 3, 0), lockedSpeed_rpm(CAR, REVERSE, 3));
+});
+
+test('gears change in order, later with more throttle, and never to and fro', () => {
+  for (const train of [CAR, HEAVY, ELECTRIC]) {
+    for (const throttle of [0, 0.3, 0.7, 1]) {
+      let gear = 0;
+      for (let speed = 0; speed < 50; speed += 0.05) {
+        const next = gearAfter(train, gear, speed, throttle);
+        assert.ok(next >= gear, `${train.name} changes down at ${speed} m/s while it gains speed`);
+        assert.equal(gearAfter(train, next, speed, throttle), next, 'it stays in the new gear');
+        assert.ok(gear === next || lockedSpeed_rpm(train, next, speed) >= train.idle_rpm);
+        gear = next;
+      }
+      assert.equal(gear, throttle === 1 && train === CAR ? 4 : train.ratios.length - 1);
+      assert.equal(gearAfter(train, gear, 0, throttle), 0);
+    }
+  }
+  const speedOfSecond = (throttle) => {
+    let speed = 0;
+    while (gearAfter(CAR, 0, speed, throttle) === 0) {
+      speed += 0.01;
+    }
+    return speed;
+  };
+  assert.ok(speedOfSecond(1) > 2 * speedOfSecond(0));
+});
+
+test('Doppler, distance and direction', () => {
+  close(dopplerFactor(0, 0), 1);
+  close(dopplerFactor(34.3, 0), 1 / 0.9);
+  close(dopplerFactor(-34.3, 0), 1 / 1.1);
+  close(dopplerFactor(0, 34.3), 1.1);
+  assert.ok(Number.isFinite(dopplerFactor(1e9, -1e9)));
+  close(attenuation(1), attenuation(2), 1e-3);
+  close(attenuation(20) / attenuation(10), 0.5 * (1 - 0.04) / (1 - 0.01));
+  assert.equal(attenuation(RANGE_M), 0);
+  assert.equal(attenuation(1e9), 0);
+
+  // To the north, and somebody on each side: west is left.
+  const north = { x: 0, y: 0, yaw: Math.PI / 2, vx: 0, vy: 0 };
+  const at = (x, y, vx = 0, vy = 0) => arrival(north, { x, y, yaw: 0, vx, vy });
+  close(at(-10, 0).pan, -1);
+  close(at(10, 0).pan, 1);
+  close(at(0, 10).pan, 0);
+  close(at(0, -10).pan, 0);
+  close(at(10, 10).pan, Math.SQRT1_2);
+  close(at(10, 0, -20).doppler, 343 / (343 - 20));
+  close(at(10, 0, 20).doppler, 343 / (343 + 20));
+  // Who drives alongside is heard as he is.
+  close(arrival({ ...north, vy: 30 }, { x: 3, y: 0, yaw: 0, vx: 0, vy: 30 }).doppler, 1);
+  close(at(0, 0).doppler, 1);
+});
+
+test('levels grow with speed as vehicle acoustics has it', () => {
+  const decibel = (ratio) => 20 * Math.log10(ratio);
+  close(decibel(tyreLevel(30) / tyreLevel(3)), 35);
+  close(decibel(windLevel(30) / windLevel(3)), 60);
+  assert.equal(tyreLevel(0), 0);
+  assert.equal(windLevel(0), 0);
+  assert.ok(windLevel(200) <= 0.2);
+  assert.equal(engineLevel(ELECTRIC, 0, 1), 0);
+  for (const train of [CAR, HEAVY, ELECTRIC]) {
+    const { idle_rpm: idle, limit_rpm: limit } = train;
+    assert.ok(engineLevel(train, limit, 0.5) > engineLevel(train, idle + 500, 0.5));
+    assert.ok(engineLevel(train, limit, 1) > engineLevel(train, limit, 0));
+    assert.ok(engineLevel(train, limit, 1) <= 0.36);
+  }
+  assert.equal(hardBraking(4, 20), 0);
+  assert.equal(hardBraking(9, 20), 1);
+  assert.equal(hardBraking(9, 0), 0);
+  assert.equal(cornering(-9.5, 20), 1);
+  assert.equal(cornering(3, 20), 0);
+  close(volumeGain(0.5), 0.25);
+});
+
+const shape = { kind: 'rectangle', length: 4.5, width: 1.8, vertices: [] };
+const vehicle = (id, more = {}) => ({
+  id, role: 'human', shape, rear_to_center: 1.3, wheelbase: 2.6, max_steering_angle: 0.9,
+  powertrain: 'combustion', perception: null, ...more,
+});
+const row = (x, y, yaw, speed, more = {}) => [
+  x, y, yaw, speed, 0, more.acceleration ?? 0, more.yaw_rate ?? 0, 0, more.throttle ?? NaN,
+  more.brake ?? NaN, NaN, more.reverse ?? NaN, more.lights ?? NaN,
+];
+const sceneOf = (vehicles, objects = []) => ({ vehicles, objects });
+const shownOf = (vehicles, objects = [], t = 0) => ({
+  t, vehicles: new Float64Array(vehicles.flat()), objects: new Float64Array(objects.flat()),
+});
+
+test('a driver hears the own vehicle, and who is near', () => {
+  const listener = new Listener();
+  const objects = [
+    { id: '1', type: 'truck', role: 'recorded', shape: { ...shape, length: 12 } },
+    { id: '2', type: 'pedestrian', role: 'recorded', shape },
+    { id: '3', type: 'car', role: 'static', shape },
+    { id: '4', type: 'car', role: 'recorded', shape },
+  ];
+  const scene = sceneOf([vehicle('hv0'), vehicle('av0', { powertrain: 'electric' })], objects);
+  const shown = shownOf(
+    [row(0, 0, 0, 20, { throttle: 0.5, acceleration: 1, yaw_rate: 0.1, lights: 1 }),
+      row(10, -4, 0, 25, { lights: 4 })],
+    [[-20, 4, 0, 18, 0, 0], [5, 5, 0, 1, 0, 0], [5, -5, 0, 0, 0, 0], Array(6).fill(NaN)]);
+  const { own, others } = listener.hear(scene, shown, 'hv0');
+  assert.equal(own.train, CAR);
+  assert.equal(own.load, 0.5);
+  assert.deepEqual([own, ...others].map(({ lights }) => lights), [1, 4, 0]);
+  close(own.deceleration, -1);
+  close(own.lateral, 2);
+  assert.deepEqual(others.map(({ id, train }) => [id, train]), [['av0', ELECTRIC], ['1', HEAVY]]);
+  assert.ok(others[0].pan > 0 && others[1].pan < 0);
+  assert.equal(listener.hear(scene, shown, 'nobody'), null);
+  assert.equal(listener.hear(scene, shown, '2'), null, 'on foot nobody has an engine');
+  assert.equal(listener.hear(scene, shown, '1').own.train, HEAVY);
+  assert.equal(listener.hear(scene, shown, 'av0').own.train, ELECTRIC);
+});
+
+test('backwards is the reverse gear, and braking there too slows down', () => {
+  const scene = sceneOf([vehicle('hv0')]);
+  const { own } = new Listener().hear(
+    scene, shownOf([row(0, 0, 0, -4, { acceleration: 6, throttle: 0, reverse: 1 })]), 'hv0');
+  assert.equal(own.gear, REVERSE);
+  close(own.speed, 4);
+  close(own.deceleration, 6);
+});
+
+test('of many only the nearest are heard', () => {
+  const count = 30;
+  const scene = sceneOf(Array.from({ length: count }, (_, i) => vehicle(`av${i}`)));
+  const rows = Array.from({ length: count }, (_, i) => row(3 * i, 0, 0, 10));
+  const { others } = new Listener().hear(scene, shownOf(rows), 'av0');
+  assert.deepEqual(others.map(({ id }) => id),
+    Array.from({ length: MOST_OTHERS }, (_, i) => `av${i + 1}`));
+});
+
+test('a gamepad feels ground, kerbs, collisions and hard braking, and nothing else', () => {
+  const feeling = new Feeling();
+  const calm = { speed: 20, deceleration: 0 };
+  const still = { strong: 0, weak: 0 };
+  assert.deepEqual(feeling.of(calm, QUIET, 0), still);
+  const kerb = feeling.of(calm, { ...QUIET, offRoad: true }, 100);
+  assert.ok(kerb.strong > 0.5);
+  const rough = feeling.of(calm, { ...QUIET, offRoad: true }, 600);
+  assert.ok(rough.weak > 0 && rough.strong < kerb.strong);
+  feeling.of(calm, QUIET, 700);
+  assert.deepEqual(feeling.of(calm, QUIET, 1200), still);
+  assert.equal(feeling.of(calm, { ...QUIET, collision: true }, 1300).strong, 1);
+  assert.deepEqual(feeling.of(calm, { ...QUIET, collision: true }, 2000), still, 'once');
+  const hard = { speed: 20, deceleration: 9 };
+  const beats = [2100, 2200].map((now) => feeling.of(hard, QUIET, now).weak);
+  assert.ok(Math.min(...beats) > 0 && Math.max(...beats) > 2 * Math.min(...beats), 'it beats');
+  // What was before a pause is not felt after it.
+  feeling.reset();
+  assert.deepEqual(feeling.of(calm, { ...QUIET, collision: true }, 2300), still);
+});
+
+test('motors get the strength that is set, and stand when they are to', () => {
+  const calls = [];
+  const actuator = {
+    playEffect: (type, effect) => {
+      calls.push([type, effect.strongMagnitude, effect.weakMagnitude]);
+      return Promise.resolve('complete');
+    },
+    reset: () => {
+      calls.push(['reset']);
+      return Promise.resolve('complete');
+    },
+  };
+  const rumble = new Rumble();
+  const own = { speed: 20, deceleration: 0 };
+  rumble.feel(actuator, own, { ...QUIET, offRoad: true }, 0.5, 0);
+  close(calls[0].slice(1), [0.5 * 0.4, 0.5 * 0.6]);
+  rumble.feel(actuator, own, { ...QUIET, offRoad: true }, 0.5, 10);
+  assert.equal(calls.length, 1, 'not in every frame');
+  rumble.feel(actuator, own, { ...QUIET, offRoad: true }, 0, 100);
+  assert.deepEqual(calls.at(-1), ['reset']);
+  rumble.feel(actuator, own, QUIET, 1, 200);
+  rumble.stop();
+  assert.equal(calls.at(-1)[0], 'reset');
+  rumble.stop();
+  assert.equal(calls.filter(([name]) => name === 'reset').length, 2, 'only what turns is stopped');
+});
