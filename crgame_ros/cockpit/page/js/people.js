@@ -5,7 +5,7 @@
 import { element, setAttribute, setText } from './dom.js';
 
 /** @import { Connection } from './connection.js' */
-/** @import { Present } from './messages.js' */
+/** @import { Present } from './people_messages.js' */
 /** @import { Store } from './store.js' */
 
 /** @type {[role: string, text: string][]} */
