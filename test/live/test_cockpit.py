@@ -94,7 +94,7 @@ def test_frames_carry_the_published_poses(graph: Graph, page: PageClient) -> Non
     compared = 0
     for frame in list(page.frames):
         if frame[0] == STATE and int(frame[2]) in published:
-            rows = frame[6:].reshape(-1, 12)
+            rows = frame[6:].reshape(-1, 13)
             positions = np.array(published[int(frame[2])]).reshape(-1, 4)
             assert np.array_equal(rows[:, :3], positions[:, :3])
             assert np.array_equal(rows[:, 4], positions[:, 3])
