@@ -36,6 +36,7 @@ from cockpit_person import Browser, open_browser, Person
 from crgame_ros.paths import scenarios_directory, share_directory
 from PIL import Image, ImageOps
 
+EXAMPLES = Path(__file__).resolve().parents[1] / 'examples'
 FOLDER = share_directory() / 'docs' / 'images'
 START_LIMIT_S, END_LIMIT_S = 60.0, 30.0
 ATTEMPTS = 4
@@ -179,6 +180,25 @@ def take_light(folder: Path) -> None:
         shoot(person.browser, 'light')
 
 
+def take_people(folder: Path) -> None:
+    """Two people are ready, each in a browser of their own, and the countdown runs."""
+    game_file = str(EXAMPLES / 'two_humans.yaml')
+    with launched(folder, game_file, '--out', str(folder / 'run')) as where, \
+            open_browser(folder / 'anna') as anna, open_browser(folder / 'bert') as bert:
+        for browser, name, seat in ((bert, 'Bert', 'hv1'), (anna, 'Anna', 'hv0')):
+            browser.prefer('light')
+            browser.open(where)
+            browser.wait(HAS_BEGUN, 'the page', START_LIMIT_S)
+            browser.run('const field = document.querySelector("#my-name");'
+                        'field.value = arguments[0]; field.dispatchEvent(new Event("change"));',
+                        name)
+            person = Person(browser)
+            person.take_seat(seat)
+            person.click('.lobby .primary')
+        anna.wait('crgame.store.status.countdown_s > 0', 'the countdown')
+        shoot(anna, 'people')
+
+
 def take_4k(folder: Path) -> None:
     """Somebody drives past parked cars and an AV follows; a large screen."""
     with page(folder, 'dark', *waiting(folder, 'parked_cars')) as person:
@@ -275,6 +295,7 @@ SESSIONS = (
     Session(('4k',), take_4k), Session(('history', 'timing'), take_figures),
     Session(('events', 'scenario'), take_events), Session(('alarm', 'replay'), take_alarm),
     Session(('perception',), take_perception), Session(('over',), take_over),
+    Session(('people',), take_people),
 )
 
 

@@ -54,7 +54,8 @@ SAID_OF_FAULTS = re.compile(r'Traceback|^error: ', re.M)
 NOT_RUN: dict[str, Callable[[], str | bool]] = {
     r'\bros2\b|\brviz2\b': lambda: shutil.which('ros2') is None and 'no ros2 here',
     r'^\./test\.sh': lambda: 'runs every test',
-    r'CRGAME_OPEN_NETWORK=1|0\.0\.0\.0|^python3 external': lambda: 'opens the network',
+    r'CRGAME_OPEN_NETWORK=1|0\.0\.0\.0|--open-cockpit|^python3 external':
+        lambda: 'opens the network',
     r'evdev:G29|--driver auto': lambda: not any(Path('/dev/input').glob('event*'))
     and 'no device here',
 }

@@ -29,6 +29,7 @@ from crgame_ros.game.documents import (
     parse_signals_document,
 )
 from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.seat_documents import parse_tenants
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.status_values import read_status, Status
 from crgame_ros.recording.reader import DecodedMessage
@@ -170,7 +171,7 @@ class TrackCollector:
                 n = (k - self._scheduler.k0) * self._scheduler.steps_per_tick
                 self._put(kind, max(n, 0), {'k': k, 'states': states})
             elif kind == 'seats':
-                self._put(kind, newest or 0, {'seats': parse_seats_document(text)})
+                self._put(kind, newest or 0, {'seats': _seats(text)})
             else:
                 epoch, fired = parse_events_document(text)
                 if epoch == self._game.epoch:
@@ -187,3 +188,12 @@ class TrackCollector:
                 self._marks.add(event.n, 'trigger', event.name, f'by {event.by}')
         self._put('events', max((event.n for event in fired), default=newest),
                   {'fired': [asdict(event) for event in fired]})
+
+
+def _seats(text: str) -> dict[str, dict[str, str]]:
+    """Read who drove, by name where it was somebody at a page."""
+    seats: dict[str, dict[str, str]] = parse_seats_document(text)
+    for name, tenant in parse_tenants(text).items():
+        if tenant.here:
+            seats[name]['holder_name'] = tenant.person.name
+    return seats

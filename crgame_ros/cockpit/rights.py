@@ -49,7 +49,7 @@ class Rights:
 
     @property
     def role(self) -> str:
-        """The role in words."""
+        """Give the role in words."""
         words = [word for has, word in ((self.directs, 'director'), (self.drives, 'driver'))
                  if has]
         return ' and '.join(words) or 'spectator'

@@ -59,7 +59,6 @@ class RunRequest:
     :param game: game file, if any.
     :param scenario: CommonRoad file instead of the game's.
     :param driver: driver source of the first human.
-    :param drivers: driver sources of humans by their ids.
     :param planners: planners of the AVs in their order; a single one serves all.
     :param problems: planning problems that become AVs, where the game names none; all of them
         where empty, of those that start on one spot the first.
@@ -76,13 +75,13 @@ class RunRequest:
     :param realtime_priority: SCHED_FIFO for the simulation.
     :param namespace: of all nodes, topics and services.
     :param no_report: without the report, one HTML file, at the end of each run.
+    :param drivers: driver sources of humans by their ids.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
     game: Path | None = None
     scenario: Path | None = None
     driver: str | None = None
-    drivers: tuple[tuple[str, str], ...] = ()
     planners: tuple[str, ...] = ()
     duration_s: float | None = None
     rate_hz: float | None = None
@@ -100,6 +99,7 @@ class RunRequest:
     problems: tuple[int, ...] = ()
     namespace: str = '/'
     no_report: bool = False
+    drivers: tuple[tuple[str, str], ...] = ()
 
 
 class _Parser(argparse.ArgumentParser):

@@ -21,6 +21,7 @@ from datetime import datetime
 from errno import ENOTDIR
 import os
 from pathlib import Path
+import shutil
 
 from crgame_ros.cockpit.access import check_address
 from crgame_ros.cockpit.opening import check_certificate
@@ -252,6 +253,8 @@ def _plan_in(folder: Path, request: RunRequest, setup: Setup) -> RunPlan:
         scenario.write_bytes(guard.encode(setup.loaded.xml_text))
         setup = replace(setup, game=replace(setup.game, scenario=scenario))
     plan = RunPlan(request, setup, folder)
+    # Of a launcher that was killed; its links hold no longer.
+    shutil.rmtree(plan.private, ignore_errors=True)
     plan.private.mkdir(mode=0o700)
     plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
     return plan

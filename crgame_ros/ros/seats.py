@@ -115,7 +115,7 @@ class Seats:
 
     @property
     def of_cockpits(self) -> list[Seat]:
-        """The seats that the game leaves to people at pages, and that nobody else has taken."""
+        """Give the seats that the game leaves to people at pages, and that nobody else has."""
         return [seat for seat in self.humans if seat.home == seat.source == COCKPIT]
 
     def document(self) -> str:

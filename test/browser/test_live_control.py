@@ -83,6 +83,14 @@ def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
     page.hold('w')
     graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
     page.click(page.seat_button('hv0', 'hand_over'))
+    # It is an offer: he may not want it, and nothing changes until he has said so.
+    other.wait_for_text('.drive-news', 'offers you hv0')
+    other.click(other.seat_button('hv0', 'decline'))
+    page.wait_for_text('.drive-news', 'You keep hv0')
+    graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
+    other.click(other.seat_button('hv0', 'ask'))
+    page.click(page.seat_button('hv0', 'hand_over'))
+    other.click(other.seat_button('hv0', 'accept'))
     other.wait("crgame.driving.seat === 'hv0'", 'the seat that was handed over')
     # The key of the one who had it is still down.
     graph.wait_for_command('hv0', THROTTLE, 0.0, 0.0)

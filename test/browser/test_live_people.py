@@ -178,7 +178,9 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
     ActionBuilder(anna.driver).clear_actions()
     anna.graph = anna.graph._replace(address=link(graph, 'drive hv0').partition('?')[0])
     anna.open()
-    anna.wait('crgame.driving.seat === "hv0" && crgame.driving.away === null', 'her seat')
+    anna.wait('crgame.driving.seat === "hv0"', 'her seat')
+    anna.driver.execute_cdp_cmd('Page.bringToFront', {})
+    anna.wait('crgame.driving.away === null', 'her hands')
     anna.hold('w')
     graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
 
@@ -196,8 +198,8 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
                        'crgame.store.seats.hv1.holder_name]') == ['Anna', 'Bert']
     assert 'Traceback' not in launcher.text + '\n'.join(launcher.errors)
 
-    check_recording(graph)
     assert bert.browser.console_errors() == watcher.browser.console_errors() == []
+    check_recording(graph)
 
 
 def crash(person: Person) -> None:

@@ -123,13 +123,13 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
     page.wait_for_text('.preview-card', UPLOADED)
     epoch = page.run('return crgame.store.scene.time.epoch')
     driver = page.driver.find_element(By.CSS_SELECTOR, '.who select[aria-label^="hv0"]')
-    Select(driver).select_by_value('cockpit')
+    assert Select(driver).first_selected_option.get_attribute('value') == 'cockpit'
     page.click('.start-area button.primary')
     page.wait('crgame.store.scene.time.epoch > arguments[0]'
               ' && crgame.store.scene.benchmark_id === arguments[1]', 'the uploaded scenario',
               epoch, UPLOADED)
     page.wait('crgame.world.shown?.epoch === crgame.store.scene.time.epoch', 'its picture')
-    page.claim('hv0')
+    page.wait("crgame.driving.seat === 'hv0'", 'the seat of who has brought it')
     page.wait_for_run('running')
     page.wait('crgame.store.status.planners.av0?.accepted > 3', 'plans of its AV')
     page.hold('w')

@@ -250,6 +250,7 @@ async def test_what_is_no_http_leaves_no_traceback() -> None:
     lines: list[str] = []
 
     class Keep(logging.Handler):
+
         def emit(self, record: logging.LogRecord) -> None:
             lines.append(self.format(record))
 

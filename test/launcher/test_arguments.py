@@ -17,7 +17,7 @@
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.launcher.arguments import parse_arguments, RunRequest
+from crgame_ros.launcher.arguments import cockpit_host, parse_arguments, RunRequest
 import pytest
 
 
@@ -38,6 +38,28 @@ def test_every_argument() -> None:
         Path('games/mine.yaml'), Path('road.xml'), 'evdev:Logitech G29', ('idm', 'mine.py:Mine'),
         20.0, 200.0, 0.5, True, 9000, '0.0.0.0', realtime_priority=True, no_report=True,
         out=Path('there'))
+
+
+def test_each_human_gets_the_driver_that_is_named_for_it() -> None:
+    """Without a name it is the first human's, whatever the source holds."""
+    request = parse_arguments(['--driver', 'hv1=evdev:G29', '--driver', 'keys:a=b.yaml',
+                               '--driver', 'hv0=cockpit'])
+    assert request.driver == 'keys:a=b.yaml'
+    assert request.drivers == (('hv1', 'evdev:G29'), ('hv0', 'cockpit'))
+    with pytest.raises(InputError, match='--driver: names hv0 twice'):
+        parse_arguments(['--driver', 'hv0=idle', '--driver', 'hv0=auto'])
+
+
+def test_a_cockpit_is_opened_on_purpose() -> None:
+    """On all addresses unless one is given; what does not go together is refused."""
+    request = parse_arguments(['--open-cockpit', '--certificate', 'c.pem', '--key', 'k.pem'])
+    assert cockpit_host(request) == '0.0.0.0' and cockpit_host(RunRequest()) == '127.0.0.1'
+    assert cockpit_host(parse_arguments(['--open-cockpit', '--listen', '10.0.0.4'])) == '10.0.0.4'
+    for words, named in ((['--certificate', 'c.pem'], '--key'), (['--key', 'k.pem'], '--key'),
+                         (['--headless', '--token'], 'there is no page'),
+                         (['--replay', 'bag', '--open-cockpit'], '--replay')):
+        with pytest.raises(InputError, match=named):
+            parse_arguments(words)
 
 
 @pytest.mark.parametrize(('arguments', 'named'), [

@@ -20,7 +20,7 @@ from pathlib import Path
 import socket
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.game import HumanSpec
+from crgame_ros.game.game import Game, HumanSpec
 from crgame_ros.game.game_file import load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, plan_run
@@ -134,6 +134,15 @@ def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('', encoding='utf-8')
     with pytest.raises(InputError, match='file/run: cannot be made .*--out'):
         plan_run(RunRequest(CUT_IN, out=Path('file/run')), noon)
+
+
+def test_drivers_are_given_by_name() -> None:
+    """Who is named gets them, the others keep theirs; who takes no part is told."""
+    game = Game(CUT_IN_XML, humans=(HumanSpec('hv0'), HumanSpec('hv1', 'idle')))
+    named = effective_game(RunRequest(drivers=(('hv1', 'cockpit'),)), game)
+    assert [human.driver for human in named.humans] == ['auto', 'cockpit']
+    with pytest.raises(InputError, match='--driver: the game has no hv7; it has hv0, hv1'):
+        effective_game(RunRequest(drivers=(('hv7', 'idle'),)), game)
 
 
 def test_written_game_is_the_run() -> None:

@@ -120,10 +120,10 @@ class PageClient:
         return next((frame for frame in reversed(list(self.frames)) if frame[0] == kind), None)
 
     def vehicle(self, index: int) -> NDArray[np.float64]:
-        """Give the newest 12 numbers of a vehicle."""
+        """Give the newest 13 numbers of a vehicle."""
         frame = self.newest(STATE)
         assert frame is not None
-        return frame[6:].reshape(-1, 12)[index]
+        return frame[6:].reshape(-1, 13)[index]
 
     def close(self) -> None:
         """Close the connection."""

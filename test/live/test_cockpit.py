@@ -94,7 +94,7 @@ def test_frames_carry_the_published_poses(graph: Graph, page: PageClient) -> Non
     compared = 0
     for frame in list(page.frames):
         if frame[0] == STATE and int(frame[2]) in published:
-            rows = frame[6:].reshape(-1, 12)
+            rows = frame[6:].reshape(-1, 13)
             positions = np.array(published[int(frame[2])]).reshape(-1, 4)
             assert np.array_equal(rows[:, :3], positions[:, :3])
             assert np.array_equal(rows[:, 4], positions[:, 3])
@@ -191,6 +191,9 @@ def test_a_seat_changes_hands(graph: Graph, page: PageClient) -> None:
         assert page.seat('hv0')['requests'][0]['client'] == other.id
         assert not other.request('hand_over', seat='hv0', to=other.id)['ok']
         assert page.request('hand_over', seat='hv0', to=other.id)['ok']
+        wait_until(lambda: page.seat('hv0')['offer'] is not None, 'the offer')
+        assert page.seat('hv0')['holder'] == page.id
+        assert other.request('answer', seat='hv0', accept=True)['ok']
         wait_until(lambda: page.seat('hv0')['holder'] == other.id, 'the new holder')
         # Input of the one who has handed over is ignored.
         other.hold_keys('hv0', [0, 1, 0, 0])
@@ -306,7 +309,10 @@ def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
         # It hears of the graph's seats a moment after it serves.
         wait_until(lambda: 'hv0' in client.documents.get('seats', {}).get('seats', {}),
                    'the seats')
-        assert client.seat('hv0')['source'] == 'cockpit' and client.seat('hv0')['holder'] is None
+        # The seat is kept for who had it at the dead one; here everybody is a director.
+        wait_until(lambda: client.seat('hv0')['source'] == 'cockpit'
+                   and client.seat('hv0')['holder'] is None, 'the empty seat')
+        assert client.seat('hv0')['kept']['name'].startswith('Guest')
         assert client.request('claim', seat='hv0')['ok']
         assert client.request('release', seat='hv0')['ok']
 

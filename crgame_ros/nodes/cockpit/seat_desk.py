@@ -184,7 +184,7 @@ class SeatDesk:
 
     @property
     def cockpit_seats(self) -> list[str]:
-        """The seats that the game leaves to people at pages."""
+        """Give the seats that the game leaves to people at pages."""
         return [name for name, entry in self.table.seats.items()
                 if entry['driver'] == entry['source'] == COCKPIT]
 

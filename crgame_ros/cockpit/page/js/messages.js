@@ -14,6 +14,8 @@
 
 export {};
 
+/** @import { PeopleMessage, Rights, YouMessage } from './people_messages.js' */
+
 /**
  * @typedef {object} Shape
  * @property {'rectangle'|'circle'|'polygon'} kind
@@ -158,24 +160,6 @@ export {};
 /** @typedef {{client: string, name: string}} Person */
 
 /**
- * What this page may do: `directs` and `drives` now, `may_…` if it wants to.
- *
- * @typedef {{role: string, directs: boolean, drives: boolean, seat: string, may_direct: boolean,
- *   may_drive: boolean}} Rights
- */
-
-/**
- * @typedef {object} Present somebody at a page
- * @property {string} client
- * @property {string} name
- * @property {string} role
- * @property {string|null} seat
- * @property {boolean} away whether the hands are off the controls
- * @property {number|null} round_trip_ms
- * @property {number|null} input_delay_ms from the hand to the picture
- */
-
-/**
  * @typedef {object} Seat
  * @property {string} source whose commands the vehicle obeys
  * @property {string} driver the source that the game names
@@ -288,8 +272,6 @@ export {};
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
  *   version: string, rights: Rights}} HelloMessage
- * @typedef {{type: 'you', rights: Rights, accepted: boolean}} YouMessage
- * @typedef {{type: 'people', people: Present[]}} PeopleMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
  * @typedef {{type: 'signals', k: number, states: Record<string, string>}} SignalsMessage

@@ -5,12 +5,14 @@
 import { element, setAttribute, setText } from './dom.js';
 
 /** @import { Connection } from './connection.js' */
-/** @import { Present } from './messages.js' */
+/** @import { Present } from './people_messages.js' */
 /** @import { Store } from './store.js' */
 
 /** @type {[role: string, text: string][]} */
 const ROLES = [['all', 'Director and driver'], ['direct', 'Director'], ['drive', 'Driver'],
   ['watch', 'Spectator']];
+
+const ROLE = 'crgame.role';
 
 /** The section of the Drive panel. */
 class People {
@@ -49,6 +51,8 @@ class People {
         this.#show();
       });
     }
+    store.on('hello', () => this.#chooseAgain());
+    this.#chooseAgain();
     this.#show();
   }
 
@@ -89,10 +93,25 @@ class People {
       element('span', { class: 'drive-note', text: delays }));
   }
 
-  async #choose() {
-    const role = this.#role.value;
+  #choose() {
     // A select that keeps the focus would take the driving keys.
     this.#role.blur();
+    sessionStorage.setItem(ROLE, this.#role.value);
+    this.#take(this.#role.value);
+  }
+
+  /** A new connection begins with all that is granted; what was chosen before holds on. */
+  #chooseAgain() {
+    const role = sessionStorage.getItem(ROLE)
+      ?? new URLSearchParams(window.location.search).get('role');
+    if (this.#store.me.id !== '' && this.#store.mode === 'live'
+        && ROLES.some(([known]) => known === role)) {
+      this.#take(/** @type {string} */ (role));
+    }
+  }
+
+  /** @param {string} role */
+  async #take(role) {
     const { ok, text } = await this.#connection.request({ type: 'role', role });
     if (!ok) {
       this.#store.receive({ type: 'notice', level: 'warn', text });

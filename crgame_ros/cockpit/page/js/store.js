@@ -16,7 +16,7 @@ import { SampleRing } from './samples.js';
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
 /** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
-/** @import { PeopleMessage, Present, Rights, YouMessage } from './messages.js' */
+/** @import { PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
 
 // At 100 Hz the ring of raw samples holds 5 s, that of scenario steps at 10 Hz 10 s.

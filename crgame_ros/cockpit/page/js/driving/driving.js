@@ -238,8 +238,8 @@ export class Driving {
       return '';
     }
     if (mode === 'replay' && seats[id]?.source === 'cockpit') {
-      // Who held the seat is not recorded.
-      return 'Driven in a cockpit';
+      const name = seats[id].holder_name;
+      return name ? `Driven by ${name} in a cockpit` : 'Driven in a cockpit';
     }
     const role = scene?.vehicles[this.#store.vehicleIndex(id)]?.role;
     return connected && seats[id]
