@@ -33,6 +33,7 @@ from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import group_outline, LoadedScenario
+from crgame_ros.vehicle.driver_place import driver_place
 import numpy as np
 import shapely
 
@@ -87,6 +88,7 @@ def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) 
     return {'id': item.id, 'role': role, 'shape': _shape(vehicle.shape),
             'rear_to_center': vehicle.rear_to_center, 'wheelbase': vehicle.wheelbase,
             'max_steering_angle': vehicle.max_steering_angle,
+            'driver_place': asdict(driver_place(vehicle)),
             'perception': None if perception is None else _perception(perception)}
 
 

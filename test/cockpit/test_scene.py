@@ -106,7 +106,12 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
         'id': 'hv0', 'role': 'human', 'max_steering_angle': 0.91, 'perception': None,
         'rear_to_center': pytest.approx(1.4227, abs=5e-5),
         'wheelbase': pytest.approx(2.5789, abs=5e-5),
-        'shape': {'kind': 'rectangle', 'length': 4.508, 'width': 1.61, 'vertices': []}}
+        'shape': {'kind': 'rectangle', 'length': 4.508, 'width': 1.61, 'vertices': []},
+        # config/vehicles/bmw_320i.yaml; the inner mirror hangs below the roof.
+        'driver_place': {
+            'height': 1.42, 'bonnet_height': 0.95, 'eye': [1.25, 0.36, 1.17],
+            'left_mirror': [1.78, 0.92, 0.98], 'right_mirror': [1.78, -0.92, 0.98],
+            'inner_mirror': [1.75, 0.0, pytest.approx(1.26)]}}
     assert document['time'] == {
         'epoch': 3, 'dt_s': 0.01, 'dt_c_s': 0.1, 'k0': 0, 'clock_offset_s': 2.5,
         'duration_s': setup.game.duration}

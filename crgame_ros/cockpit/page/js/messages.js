@@ -60,6 +60,14 @@ export {};
 /** @typedef {{light: 'day'|'dusk', visibility: number}} Environment visibility [m] */
 
 /**
+ * Points of a vehicle: ahead of the rear axle, to the left, above the road.
+ *
+ * @typedef {[x: number, y: number, z: number]} Mount [m]
+ * @typedef {{height: number, bonnet_height: number, eye: Mount, left_mirror: Mount,
+ *   right_mirror: Mount, inner_mirror: Mount}} DriverPlace [m]
+ */
+
+/**
  * @typedef {object} SceneVehicle
  * @property {string} id
  * @property {'human'|'autonomous'} role
@@ -67,6 +75,7 @@ export {};
  * @property {number} rear_to_center [m]
  * @property {number} wheelbase [m]
  * @property {number} max_steering_angle [rad]
+ * @property {DriverPlace} driver_place
  * @property {{localisation: boolean, sensors: string[], range: number|null}|null} perception
  *   range [m], null for no limit
  */
