@@ -22,7 +22,8 @@ import { standOf } from './vehicle_stand.js';
 
 const NEAR_M = 0.2;
 const FAR_M = 3000;
-const SKY = 0xbcd3e6;
+// In a mirror nobody can tell what is farther away [m].
+const FAR_IN_MIRROR_M = 300;
 
 /**
  * What is to be drawn.
@@ -38,7 +39,8 @@ const SKY = 0xbcd3e6;
 
 /** Draws what a store shows. */
 export class Picture {
-  stats = { frames: 0, draw_calls: 0, triangles: 0, frame_ms: 0, cost_ms: NaN, width: 0,
+  /** Of the last picture; `t` is the simulation time that it shows [s]. */
+  stats = { frames: 0, t: NaN, draw_calls: 0, triangles: 0, frame_ms: 0, cost_ms: NaN, width: 0,
     height: 0, ratio: 1, renderer: '', software: false };
   mirrors;
   #three;
@@ -76,7 +78,6 @@ export class Picture {
     this.#quality = new Quality(software, window.devicePixelRatio);
     this.#cost = new FrameCost(this.#renderer.getContext());
     this.#scene = new three.Scene();
-    this.#scene.background = new three.Color(SKY);
     this.#camera = new three.PerspectiveCamera(60, 1, NEAR_M, FAR_M);
     this.#camera.rotation.order = 'ZXY';
     const bodies = new three.Group();
@@ -160,14 +161,15 @@ export class Picture {
     this.#traffic.update(shown, vehicle.id, road.heightAt, eye);
     this.#plans.update(looks.plans, shown, this.#origin, road.heightAt);
     const measures = this.#cost.begin();
-    if (inside && looks.mirrors) {
+    // A processor that draws has a mirror for every other picture only.
+    if (inside && looks.mirrors && !(this.stats.software && this.stats.frames % 2 === 1)) {
       this.#drawMirror(stand, vehicle);
     }
     this.#drawMain(stand, vehicle, inside);
     if (inside && looks.mirrors) {
       this.mirrors.drawOver(this.#renderer);
     }
-    this.#note(begin_ms, now_ms, measures);
+    this.#note(shown.t, begin_ms, now_ms, measures);
     return true;
   }
 
@@ -221,7 +223,7 @@ export class Picture {
       this.#cabin.mesh.visible = false;
     }
     this.#traffic.showOwn(true);
-    this.mirrors.fit(vehicle.driver_place, FAR_M);
+    this.mirrors.fit(vehicle.driver_place, FAR_IN_MIRROR_M);
     this.mirrors.drawNext(this.#renderer, this.#scene, (camera, { point, aside, pitch }) => {
       this.#aim(camera, mountedAt(stand, point, aside, pitch));
     });
@@ -251,13 +253,14 @@ export class Picture {
   }
 
   /**
+   * @param {number} t
    * @param {number} begin_ms
    * @param {number} now_ms
    * @param {boolean} measures
    */
-  #note(begin_ms, now_ms, measures) {
+  #note(t, begin_ms, now_ms, measures) {
     const { calls, triangles } = this.#renderer.info.render;
-    Object.assign(this.stats, { frames: this.stats.frames + 1, draw_calls: calls, triangles,
+    Object.assign(this.stats, { frames: this.stats.frames + 1, t, draw_calls: calls, triangles,
       frame_ms: performance.now() - begin_ms });
     if (measures) {
       this.stats.cost_ms = this.#cost.end();

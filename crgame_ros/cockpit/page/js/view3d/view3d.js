@@ -17,8 +17,8 @@ import { readViewWindow } from './view_window.js';
 const MISSING = 'The 3D view needs three.js, which the server does not have: '
   + '`crgame cockpit-3d` fetches it.';
 const LOST = 'The graphics card took the 3D view back: it returns when the card is free.';
-// After what changes nothing in the world, mirrors are drawn one after the other.
-const PICTURES_AFTER_CHANGE = 4;
+// While nothing moves, the mirrors are still drawn one after the other.
+const PICTURES_AFTER_CHANGE = 7;
 // Animation frames come as they come: one that is that early is in time [ms].
 const EARLY_MS = 4;
 
