@@ -128,8 +128,8 @@ test('fog: the contrast that Koschmieder leaves, as the product over thin layers
 });
 
 test('limits are written as on signs', () => {
-  assert.deepEqual(['13.89', '13.888888888888889', '8.33', '27.7778', '11.176', '16.666666666666668']
-    .map(speedText), ['50', '50', '30', '100', '40', '60']);
+  const told = ['13.89', '13.888888888888889', '8.33', '27.7778', '11.176', '16.666666666666668'];
+  assert.deepEqual(told.map(speedText), ['50', '50', '30', '100', '40', '60']);
   assert.deepEqual([speedText(''), speedText('30 zone'), speedText('Infinity'), speedText('4')],
     ['', '30 z', 'Infi', '14']);
 });
