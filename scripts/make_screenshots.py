@@ -266,10 +266,12 @@ def take_3d(folder: Path) -> None:
     """Somebody waits at a junction, sees it from the seat, and from behind."""
     with page(folder, 'dark', *waiting(folder, 'intersection')) as person:
         person.take_seat('hv0')
-        person.browser.run("crgame.view3d.settings.set('sharp', true); crgame.view3d.show(true)")
+        person.browser.run_async('return await crgame.view3d.show(true)')
+        person.browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view')
         person.click('[data-action="start"]')
         time.sleep(DRIVEN_S)
         person.click('[data-action="pause"]')
+        person.browser.run("crgame.view3d.settings.set('sharp', true)")
         for viewpoint in ('driver', 'chase'):
             person.browser.run('crgame.view3d.viewpoint = arguments[0]', viewpoint)
             frames = person.browser.run('return crgame.view3d.stats.frames')
