@@ -263,8 +263,8 @@ def take_perception(folder: Path) -> None:
 
 
 def take_3d(folder: Path) -> None:
-    """Somebody waits at a junction, sees it from the seat, and from behind."""
-    with page(folder, 'dark', *waiting(folder, 'intersection')) as person:
+    """Look from the seat beside parked cars, and from behind."""
+    with page(folder, 'light', *waiting(folder, 'parked_cars')) as person:
         person.take_seat('hv0')
         person.browser.run_async('return await crgame.view3d.show(true)')
         person.browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view')
@@ -273,8 +273,8 @@ def take_3d(folder: Path) -> None:
         person.click('[data-action="pause"]')
         person.browser.run("crgame.view3d.settings.set('sharp', true)")
         for viewpoint in ('driver', 'chase'):
-            person.browser.run('crgame.view3d.viewpoint = arguments[0]', viewpoint)
             frames = person.browser.run('return crgame.view3d.stats.frames')
+            person.browser.run('crgame.view3d.viewpoint = arguments[0]', viewpoint)
             # Every mirror has had its turn.
             person.browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures',
                                 arguments=(frames,))
