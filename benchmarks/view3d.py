@@ -67,10 +67,12 @@ def measure(folder: Path, game: Path, view: str, trials: int, seconds: float) ->
     try:
         control.wait_until_running()
         browser = Browser(graph.page())
-        browser.drive('hv0')
         show(browser, view)
+        # Before somebody holds the seat: a seat's holder would have to press start after it.
         control.call('reset')
+        control.wait_until_running()
         control.deafen()
+        browser.drive('hv0')
         browser.driver.execute_script(LOGGER)
         time.sleep(seconds)
         tell(browser, view)
@@ -81,6 +83,8 @@ def measure(folder: Path, game: Path, view: str, trials: int, seconds: float) ->
             probe.listen(1.0)
             _, picture = measure_keys(browser, probe, trials, offset_s)
             probe.close()
+            if not picture:
+                raise SystemExit(f'{view}: no key came to a picture')
             report(f'{view}: key to picture [ms]', picture, 'p50 <= 50')
         browser.close()
         browser = None

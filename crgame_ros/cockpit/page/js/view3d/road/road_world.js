@@ -1,6 +1,6 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The world in which the vehicles of the 3D view are: roads and what stands at them, land, sky. */
+/** The world of the vehicles in the 3D view: roads and what stands at them, land, sky. */
 
 import { localOrigin } from '../local_origin.js';
 import { Atmosphere } from './atmosphere.js';

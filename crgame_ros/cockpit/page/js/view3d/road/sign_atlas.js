@@ -6,7 +6,7 @@ import { SYMBOLS } from './sign_symbols.js';
 
 /** @import { Face, PlateShape } from './sign_faces.js' */
 /** @typedef {CanvasRenderingContext2D} Context */
-/** @typedef {[left: number, top: number, right: number, bottom: number]} Cell of the texture, 0-1 */
+/** @typedef {[left: number, top: number, right: number, bottom: number]} Cell 0 to 1 */
 
 const CELL_PX = 128;
 const COLUMNS = 8;

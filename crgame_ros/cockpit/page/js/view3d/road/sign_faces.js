@@ -36,7 +36,7 @@ const wide = (style, text) => ({ shape: 'wide', style, symbol: '', text });
 const KMH = 3.6;
 // Limits are multiples of this, which files round [km/h].
 const EVEN_KMH = 5;
-const NEARLY_KMH = 0.6;
+const NEARLY_KMH = 0.3;
 // Other words on a plate than its name, at most so many letters.
 const LONGEST = 24;
 

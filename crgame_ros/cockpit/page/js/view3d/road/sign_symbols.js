@@ -30,7 +30,11 @@ function dot(context, x, y, radius) {
   context.fill();
 }
 
-/** An arrow upwards, turned by so many quarters to the right. @type {(c: Context, q: number) => void} */
+/**
+ * An arrow upwards, turned by so many quarters to the right.
+ *
+ * @type {(context: Context, quarters: number) => void}
+ */
 function arrow(context, quarters) {
   context.save();
   context.rotate(quarters * Math.PI / 2);
@@ -38,7 +42,11 @@ function arrow(context, quarters) {
   context.restore();
 }
 
-/** An arrow that turns: up, then to a side. @type {(context: Context, side: number) => void} */
+/**
+ * An arrow that turns: up, then to a side.
+ *
+ * @type {(context: Context, side: number) => void}
+ */
 function turning(context, side) {
   stroke(context, 0.26, -0.3 * side, 0.8, -0.3 * side, -0.1, 0.2 * side, -0.1);
   fill(context, [0.1 * side, -0.55, 0.75 * side, -0.1, 0.1 * side, 0.35]);
@@ -109,7 +117,10 @@ export const SYMBOLS = {
       c.restore();
     }
   },
-  overtaking: (c) => { vehicle(c, -0.38, '#c8102e', 0.8); vehicle(c, 0.38, c.fillStyle.toString(), 0.8); },
+  overtaking: (c) => {
+    vehicle(c, -0.38, '#c8102e', 0.8);
+    vehicle(c, 0.38, c.fillStyle.toString(), 0.8);
+  },
   'overtaking-truck': (c) => {
     lorry(c, -0.4, '#c8102e');
     vehicle(c, 0.38, c.fillStyle.toString(), 0.8);
@@ -134,8 +145,14 @@ export const SYMBOLS = {
     stroke(c, 0.11, 0.03, -0.42, -0.32, -0.05);
     stroke(c, 0.11, 0.03, -0.42, 0.36, -0.02);
   },
-  danger: (c) => { fill(c, [-0.16, -0.8, 0.16, -0.8, 0.08, 0.28, -0.08, 0.28]); dot(c, 0, 0.58, 0.15); },
-  cross: (c) => { stroke(c, 0.24, -0.5, -0.5, 0.5, 0.6); stroke(c, 0.24, 0.5, -0.5, -0.5, 0.6); },
+  danger: (c) => {
+    fill(c, [-0.16, -0.8, 0.16, -0.8, 0.08, 0.28, -0.08, 0.28]);
+    dot(c, 0, 0.58, 0.15);
+  },
+  cross: (c) => {
+    stroke(c, 0.24, -0.5, -0.5, 0.5, 0.6);
+    stroke(c, 0.24, 0.5, -0.5, -0.5, 0.6);
+  },
   'right-of-way': (c) => {
     stroke(c, 0.28, 0, 0.75, 0, -0.3);
     fill(c, [-0.32, -0.2, 0, -0.8, 0.32, -0.2]);
@@ -168,7 +185,8 @@ export const SYMBOLS = {
     stroke(c, 0.2, 0.35, 0.75, 0.35, -0.3);
     fill(c, [0.05, -0.2, 0.35, -0.75, 0.65, -0.2]);
     c.fillStyle = '#d8232a';
-    fill(c, [-0.45, -0.6, -0.25, -0.6, -0.25, 0.25, -0.12, 0.25, -0.35, 0.7, -0.58, 0.25, -0.45, 0.25]);
+    fill(c, [-0.45, -0.6, -0.25, -0.6, -0.25, 0.25, -0.12, 0.25, -0.35, 0.7, -0.58, 0.25,
+      -0.45, 0.25]);
   },
   second: (c) => {
     stroke(c, 0.18, -0.3, -0.6, -0.3, 0.25);
