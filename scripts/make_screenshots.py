@@ -45,6 +45,8 @@ WIDE_PX = 2000
 SETTLES_S = 1.0
 # A new alarm flashes so long [s].
 PULSES_S = 2.5
+# Until the others have come near [s].
+DRIVEN_S = 3.0
 HAS_BEGUN = 'window.crgame?.ready && crgame.world.shown && crgame.store.status'
 ALARMS = 'return crgame.alarms.kinds()'
 HIDDEN = Path(__file__).with_name('hidden_pedestrian.yaml')
@@ -260,6 +262,26 @@ def take_perception(folder: Path) -> None:
         shoot(person.browser, 'perception')
 
 
+def take_3d(folder: Path) -> None:
+    """Somebody waits at a junction, sees it from the seat, and from behind."""
+    with page(folder, 'dark', *waiting(folder, 'intersection')) as person:
+        person.take_seat('hv0')
+        person.browser.run_async('return await crgame.view3d.show(true)')
+        person.browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view')
+        person.click('[data-action="start"]')
+        time.sleep(DRIVEN_S)
+        person.click('[data-action="pause"]')
+        person.browser.run("crgame.view3d.settings.set('sharp', true)")
+        for viewpoint in ('driver', 'chase'):
+            person.browser.run('crgame.view3d.viewpoint = arguments[0]', viewpoint)
+            frames = person.browser.run('return crgame.view3d.stats.frames')
+            # Every mirror has had its turn.
+            person.browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures',
+                                arguments=(frames,))
+            time.sleep(SETTLES_S)
+            shoot(person.browser, viewpoint)
+
+
 def take_over(folder: Path) -> None:
     """Let a script drive to the end of its game, and see what the page says then."""
     # Where its files are is in the picture, too: as with run.sh.
@@ -274,7 +296,8 @@ SESSIONS = (
     Session(('driving',), take_driving), Session(('light',), take_light),
     Session(('4k',), take_4k), Session(('history', 'timing'), take_figures),
     Session(('events', 'scenario'), take_events), Session(('alarm', 'replay'), take_alarm),
-    Session(('perception',), take_perception), Session(('over',), take_over),
+    Session(('perception',), take_perception), Session(('driver', 'chase'), take_3d),
+    Session(('over',), take_over),
 )
 
 

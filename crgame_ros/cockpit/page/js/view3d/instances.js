@@ -40,7 +40,6 @@ export class Instances {
     // Set at once: the program of a mesh is made for instances with colours or without.
     this.#meshes[0].setColorAt(0, this.#color);
     group.add(...this.#meshes);
-    this.triangles = mesh.triangles;
   }
 
   /** Begin a frame. */
@@ -79,11 +78,6 @@ export class Instances {
     for (const mesh of this.#meshes) {
       mesh.count = shown ? this.#count : this.#shared;
     }
-  }
-
-  /** How many are there. */
-  get count() {
-    return this.#count;
   }
 
   /** Free what the graphics card holds. */

@@ -59,8 +59,6 @@ export class Picture {
   /** @type {{mesh: Mesh, vehicle: SceneVehicle}|null} */
   #cabin = null;
   #origin = { x: 0, y: 0 };
-  /** @type {(() => void)[]} */
-  #ends;
 
   /**
    * @param {Three} three the library
@@ -85,7 +83,7 @@ export class Picture {
     this.#traffic = new Traffic(three, bodies, store);
     this.#plans = new PlanRibbons(three, bodies, store);
     this.mirrors = new Mirrors(three, software);
-    this.#ends = [store.on('scene', (scene) => this.#load(scene))];
+    store.on('scene', (scene) => this.#load(scene));
     if (store.scene !== null) {
       this.#load(store.scene);
     }
@@ -171,15 +169,6 @@ export class Picture {
     }
     this.#note(shown.t, begin_ms, now_ms, measures);
     return true;
-  }
-
-  /** Free everything; the canvas stays as it was drawn last. */
-  dispose() {
-    this.#ends.forEach((end) => end());
-    this.#traffic.dispose();
-    this.#plans.dispose();
-    this.#road?.dispose();
-    this.#renderer.dispose();
   }
 
   /**
@@ -272,15 +261,18 @@ export class Picture {
 
   /** @param {Scene} scene */
   #load(scene) {
-    if (this.#road !== null) {
-      this.#scene.remove(this.#road.group);
-      this.#road.dispose();
+    // A reset sends the same scene again: its roads stay.
+    if (this.#road === null || this.#document?.id !== scene.id) {
+      this.#road?.group.removeFromParent();
+      this.#road?.dispose();
+      this.#origin = localOrigin(scene);
+      this.#road = createRoadWorld(this.#three, scene);
+      this.#scene.add(this.#road.group);
+      this.#scene.fog = this.#road.fog;
+    } else {
+      this.#road.setEnvironment(scene.environment);
     }
     this.#document = scene;
-    this.#origin = localOrigin(scene);
-    this.#road = createRoadWorld(this.#three, scene);
-    this.#scene.add(this.#road.group);
-    this.#scene.fog = this.#road.fog;
     this.#traffic.load(scene, this.#origin, roleColor(this.#three));
   }
 }

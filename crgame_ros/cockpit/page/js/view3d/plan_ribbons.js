@@ -61,12 +61,6 @@ export class PlanRibbons {
     this.#mesh.geometry.setAttribute('position',
       new this.#three.Float32BufferAttribute(positions, 3));
   }
-
-  /** Free what the graphics card holds. */
-  dispose() {
-    this.#mesh.geometry.dispose();
-    this.#mesh.material.dispose();
-  }
 }
 
 /**

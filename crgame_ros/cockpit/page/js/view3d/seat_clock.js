@@ -35,12 +35,17 @@ export class SeatClock {
   /**
    * @param {Store} store
    * @param {boolean} follows whether this window goes with another one
+   * @param {string|null} wanted id of the vehicle whose leader is followed; null for any
    */
-  constructor(store, follows) {
+  constructor(store, follows, wanted) {
     this.#store = store;
     this.#follows = follows;
     if (follows) {
-      this.#channel.addEventListener('message', ({ data }) => { this.#heard = data; });
+      this.#channel.addEventListener('message', ({ data }) => {
+        if (wanted === null || data.vehicle === wanted) {
+          this.#heard = data;
+        }
+      });
     }
   }
 

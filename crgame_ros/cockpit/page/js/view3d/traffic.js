@@ -69,7 +69,7 @@ export class Traffic {
     this.#matrix = new three.Matrix4();
     this.#scaling = new three.Vector3();
     this.#parts = new FittedParts(three, group);
-    this.end = store.on('objects', (step) => this.#brakeLights.takeStep(step));
+    store.on('objects', (step) => this.#brakeLights.takeStep(step));
   }
 
   /**
@@ -167,13 +167,6 @@ export class Traffic {
    */
   paintOf(id) {
     return this.#vehicles.find((thing) => thing.id === id)?.look.paint ?? 0;
-  }
-
-  /** Free what the graphics card holds. */
-  dispose() {
-    this.end();
-    this.#clear();
-    this.#parts.dispose();
   }
 
   /** @param {number} t simulation time that is shown [s] */

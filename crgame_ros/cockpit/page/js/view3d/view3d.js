@@ -37,6 +37,7 @@ export class View3d {
     hidden: true });
   #buttons;
   #on = false;
+  #frame = 0;
   #due = 0;
   #drawn_ms = -Infinity;
   #shown_t = NaN;
@@ -49,7 +50,8 @@ export class View3d {
   constructor(stage, store) {
     this.#stage = stage;
     this.#store = store;
-    this.#clock = new SeatClock(store, this.window !== null);
+    this.#clock = new SeatClock(store, this.window !== null,
+      this.window?.vehicle ?? null);
     stage.prepend(this.#canvas);
     this.settings = new ViewSettings(() => this.redraw());
     this.#buttons = createViewButtons(stage, this.settings, {
@@ -59,7 +61,7 @@ export class View3d {
     window.addEventListener('keydown', (event) => this.#pressed(event));
     new ResizeObserver(() => this.#resize()).observe(stage);
     for (const name of /** @type {const} */ (['scene', 'epoch', 'plan', 'state', 'signals'])) {
-      store.on(name, () => this.redraw());
+      store.on(name, () => { this.#due = PICTURES_AFTER_CHANGE; });
     }
     if (this.window !== null) {
       document.documentElement.classList.add('view-window');
@@ -107,8 +109,9 @@ export class View3d {
     this.#canvas.hidden = !this.#on;
     this.redraw();
     this.#resize();
+    cancelAnimationFrame(this.#frame);
     if (this.#on) {
-      requestAnimationFrame((now_ms) => this.#animate(now_ms));
+      this.#frame = requestAnimationFrame((now_ms) => this.#animate(now_ms));
     }
     return this.#on;
   }
@@ -183,7 +186,7 @@ export class View3d {
     if (!this.#on || this.picture === null) {
       return;
     }
-    requestAnimationFrame((next_ms) => this.#animate(next_ms));
+    this.#frame = requestAnimationFrame((next_ms) => this.#animate(next_ms));
     this.#tellLoss(this.picture);
     this.#clock.follow(now_ms);
     const shown = this.#store.displayed(now_ms);
