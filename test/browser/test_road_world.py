@@ -216,7 +216,8 @@ def test_fog_leaves_the_contrast_that_it_should(page: Browser, light: str,
             roadTest.board.position.set(x - origin.x, y - origin.y, 300);
             stage.add(roadTest.board);""", x - distance, y, 0.15 * distance)
         picture = look(page, x, y, 300.0, yaw=math.pi)
-        page.run('roadTest.stage.remove(roadTest.board);')
+        page.run('roadTest.stage.remove(roadTest.board); roadTest.board.geometry.dispose(); '
+                 'roadTest.board.material.dispose();')
         middle = SIZE_PX // 2
         board = as_light(picture[middle - 3:middle + 3, middle - 3:middle + 3])
         sky = as_light(picture[middle - 3:middle + 3, :6])

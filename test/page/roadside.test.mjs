@@ -165,7 +165,8 @@ test('signs stand to the right of the road that they are for', () => {
   const [there] = placeSigns({ signs: [sign({ x: 50, y: -6 })], lanelets }, index);
   assert.deepEqual([there.x, there.y], [50, -6]);
   const wide = [laneletOf({ id: 1, width: 60 })];
-  assert.ok(placeSigns({ signs: [sign({ x: 50 })], lanelets: wide }, new RoadIndex(wide))[0].hangs);
+  const [above] = placeSigns({ signs: [sign({ x: 50 })], lanelets: wide }, new RoadIndex(wide));
+  assert.ok(above.hangs);
 });
 
 test('a limit of each lanelet is put up once, where it begins', () => {
