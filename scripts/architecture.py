@@ -38,11 +38,12 @@ PICTURE = ROOT / 'docs' / 'images' / 'architecture.svg'
 LOWEST, HIGHEST = 'errors, paths, …', 'cli, doctor'
 AT_THE_TOP = {'cli', 'doctor', 'new_command', 'replay_command', 'requirements', 'schema_command'}
 FOLDERS = (
-    LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints', 'occupancy',
-    'scripted', 'messages', 'driver', 'timing', 'drivability', 'control', 'planner', 'perception',
-    'policy', 'traffic', 'simulation', 'recording', 'analysis/criticality', 'analysis/behaviour',
-    'analysis/scores', 'analysis/tables', 'analysis/pictures', 'analysis/report', 'analysis',
-    'evaluation/results', 'evaluation/summary', 'evaluation', 'cockpit', 'gym', 'ros', 'nodes/sim',
+    LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints',
+    'occupancy', 'scripted', 'messages', 'driver', 'timing', 'drivability', 'control',
+    'planner', 'perception', 'policy', 'traffic', 'simulation', 'recording',
+    'analysis/criticality', 'analysis/behaviour', 'analysis/scores', 'analysis/tables',
+    'analysis/pictures', 'analysis/report', 'analysis', 'evaluation/results',
+    'evaluation/summary', 'evaluation', 'study', 'cockpit', 'gym', 'ros', 'nodes/sim',
     'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher', 'analysis/reproduction',
     'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'

@@ -38,12 +38,13 @@ from crgame_ros.schema.declaration import (
     form_of,
     Key,
     keys_of,
+    mark_of,
     sentences_of,
     split,
     wanted,
 )
 from crgame_ros.schema.file_kinds import FILE_KINDS
-from crgame_ros.schema.marks import Folder, Keyed, Meaning, Numbered, OnlyWith
+from crgame_ros.schema.marks import Folder, Keyed, Meaning, Numbered, OnlyWith, Special
 from crgame_ros.schema.writing import write
 
 DOCS = Path(__file__).resolve().parent.parent / 'docs'
@@ -53,7 +54,7 @@ NOTICE = (
     '`scripts/make_key_tables.py`.\n`crgame schema` gives the same as JSON Schema. What the keys '
     'are for stands in the pages about [games](games.md),\n[objects](objects.md), '
     '[perception](perception.md), [traffic](traffic.md), [control](control.md), '
-    '[drivers and devices](driving.md)\nand [maps](occupancy.md).')
+    '[drivers and devices](driving.md),\n[maps](occupancy.md) and [studies](studies.md).')
 _TABLE = re.compile(r'(<!-- keys: ([\w.]+):(\w+) -->\n).*?(<!-- keys: end -->)', re.DOTALL)
 
 
@@ -74,7 +75,7 @@ def sections(label: str, kind: Any) -> Iterator[tuple[str, Any]]:
     yield label, kind
     for key in keys_of(kind):
         keyed = key.mark(Keyed)
-        several = list(held(key.hint))
+        several = [] if key.mark(Special) else list(held(key.hint))
         inner = [(f'{keyed.noun} `{name}`', one) for name, hint in keyed.kinds.items()
                  for one in held(hint)] if keyed \
             else [(f'`{key.name}`' + (f' with `{keys_of(one)[0].name}`' if several[1:] else ''),
@@ -85,7 +86,8 @@ def sections(label: str, kind: Any) -> Iterator[tuple[str, Any]]:
 
 def held(hint: Any) -> Iterator[Any]:
     """Give the dataclasses that a type is made of."""
-    for choice in choices_of(split(hint)[0]):
+    kind, marks = split(hint)
+    for choice in () if mark_of(marks, Special) else choices_of(kind):
         if is_dataclass(choice):
             yield choice
         else:

@@ -15,35 +15,30 @@
 """The scene document: all that the page draws and lists and that stays as it is during a run."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 import math
 from typing import Any
 
 from commonroad.geometry.shape import Circle, ShapeGroup
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.planning.planning_problem import PlanningProblem
-from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
-from commonroad.scenario.traffic_light import TrafficLight
+from commonroad.scenario.lanelet import LaneletNetwork
+from crgame_ros.cockpit.flat_points import flat, rounded, TOLERANCE
+from crgame_ros.cockpit.map_lanelets import gap_outlines, lanelet_entries, stop_line_entries
+from crgame_ros.cockpit.road_furniture import light_entries, sign_entries
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_network import RoadNetwork
-from crgame_ros.roads.road_surface import lanelet_areas
-from crgame_ros.roads.signs import stop_line_ends
+from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import group_outline, LoadedScenario
+from crgame_ros.vehicle.driver_place import driver_place
 import numpy as np
-from numpy.typing import NDArray
 import shapely
 
 Document = dict[str, Any]
-Points = NDArray[np.float64]
 
-# Bounds lose vertices that the eye would not miss [m]; neighbours share theirs, and keep so.
-_TOLERANCE = 0.01
-_DECIMALS = 3
-# A hole in the road that is narrower is a gap of the map [m].
-_GAP_WIDTH = 0.8
 # Shown around the vehicles where a scenario has no roads at all [m].
 _EMPTY_MARGIN = 50.0
 
@@ -64,9 +59,11 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'id': game.scenario_sha256[:16], 'benchmark_id': loaded.benchmark_id,
         'title': game.title or loaded.benchmark_id,
         'bounds': _bounds(network, game),
-        'lanelets': _lanelets(network), 'gaps': _gaps(network),
-        'stop_lines': _stop_lines(network), 'lights': _lights(network),
-        'signs': _signs(network),
+        'country': str(loaded.scenario.scenario_id.country_id),
+        'environment': asdict(environment_of(loaded.scenario, game.environment)),
+        'lanelets': lanelet_entries(network, loaded.heights), 'gaps': gap_outlines(network),
+        'stop_lines': stop_line_entries(network), 'lights': light_entries(network),
+        'signs': sign_entries(network),
         'vehicles': [*(_vehicle(human, 'human', None) for human in game.humans),
                      *(_vehicle(av, 'autonomous', av.perception) for av in game.avs)],
         'objects': [
@@ -86,95 +83,13 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
     return finite
 
 
-def _lanelets(network: LaneletNetwork) -> list[Document]:
-    roads = RoadNetwork(network)
-    crossing = {
-        int(lanelet_id) for intersection in network.intersections
-        for incoming in intersection.incomings
-        for successors in (incoming.successors_left, incoming.successors_straight,
-                           incoming.successors_right)
-        for lanelet_id in successors or ()}
-    return [_lanelet(lanelet, roads, crossing) for lanelet in network.lanelets]
-
-
-def _lanelet(lanelet: Lanelet, roads: RoadNetwork, crossing: set[int]) -> Document:
-    lanelet_id = int(lanelet.lanelet_id)
-    types = sorted(kind.value for kind in lanelet.lanelet_type)
-    return {
-        'id': lanelet_id,
-        'left': _polyline(lanelet.left_vertices), 'right': _polyline(lanelet.right_vertices),
-        'center': _polyline(lanelet.center_vertices), 'types': types,
-        'left_line': _marking(lanelet.line_marking_left_vertices),
-        'right_line': _marking(lanelet.line_marking_right_vertices),
-        'one_way': not lanelet.user_bidirectional,
-        'speed_limit': roads.speed_limit(lanelet_id),
-        'intersection': lanelet_id in crossing or 'intersection' in types,
-        'adj_left': lanelet.adj_left, 'adj_left_same': bool(lanelet.adj_left_same_direction),
-        'adj_right': lanelet.adj_right, 'adj_right_same': bool(lanelet.adj_right_same_direction),
-        'successors': [int(number) for number in lanelet.successor]}
-
-
-def _gaps(network: LaneletNetwork) -> list[list[float]]:
-    """
-    Give the slits between lanelets that are no ground to the eye, only cracks in the map.
-
-    They are for display alone: whether a vehicle is on the road is not decided with them.
-    """
-    road = shapely.union_all(lanelet_areas(network.lanelets))
-    holes = [shapely.Polygon(ring) for part in getattr(road, 'geoms', [road])
-             if part.geom_type == 'Polygon' for ring in part.interiors]
-    return [_flat(np.asarray(hole.exterior.coords)[:-1, :2]) for hole in holes
-            if hole.buffer(-0.5 * _GAP_WIDTH).is_empty]
-
-
-def _stop_lines(network: LaneletNetwork) -> list[Document]:
-    lines = []
-    for lanelet in network.lanelets:
-        if lanelet.stop_line is not None:
-            lines.append({'points': _flat(stop_line_ends(lanelet)),
-                          'lanelet': int(lanelet.lanelet_id)})
-    return lines
-
-
-def _lights(network: LaneletNetwork) -> list[Document]:
-    lanelets: dict[int, list[Lanelet]] = {}
-    for lanelet in network.lanelets:
-        for light_id in lanelet.traffic_lights or ():
-            lanelets.setdefault(light_id, []).append(lanelet)
-    return [entry for light in network.traffic_lights
-            if (entry := _light(light, lanelets.get(light.traffic_light_id, []))) is not None]
-
-
-def _light(light: TrafficLight, lanelets: list[Lanelet]) -> Document | None:
-    """Place a light; one that neither has a position nor a lanelet cannot be shown."""
-    position, yaw = light.position, 0.0
-    if lanelets:
-        along = lanelets[0].center_vertices[-1, :2] - lanelets[0].center_vertices[-2, :2]
-        yaw = math.atan2(along[1], along[0])
-        if position is None:
-            position = lanelets[0].center_vertices[-1]
-    if position is None:
-        return None
-    return {'id': int(light.traffic_light_id), 'x': _rounded(position[0]),
-            'y': _rounded(position[1]), 'yaw': yaw,
-            'lanelets': [int(lanelet.lanelet_id) for lanelet in lanelets]}
-
-
-def _signs(network: LaneletNetwork) -> list[Document]:
-    return [
-        {'x': _rounded(sign.position[0]), 'y': _rounded(sign.position[1]),
-         'kind': str(element.traffic_sign_element_id.name),
-         'value': str(next(iter(element.additional_values or ()), ''))}
-        for sign in network.traffic_signs if sign.position is not None
-        for element in sign.traffic_sign_elements]
-
-
 def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) -> Document:
     vehicle = item.vehicle
     return {'id': item.id, 'role': role, 'shape': _shape(vehicle.shape),
             'rear_to_center': vehicle.rear_to_center, 'wheelbase': vehicle.wheelbase,
             'max_steering_angle': vehicle.max_steering_angle,
             'powertrain': vehicle.powertrain,
+            'driver_place': asdict(driver_place(vehicle)),
             'perception': None if perception is None else _perception(perception)}
 
 
@@ -187,7 +102,7 @@ def _perception(spec: PerceptionSpec) -> Document:
 
 def _shape(shape: Shape) -> Document:
     return {'kind': shape.kind, 'length': shape.length, 'width': shape.width,
-            'vertices': [_rounded(value) for vertex in shape.vertices for value in vertex]}
+            'vertices': [rounded(value) for vertex in shape.vertices for value in vertex]}
 
 
 def _goals(loaded: LoadedScenario, game: GameDocument) -> list[Document]:
@@ -206,7 +121,7 @@ def _goal_polygons(problem: PlanningProblem) -> list[list[float]]:
     for state in problem.goal.state_list:
         position = getattr(state, 'position', None)
         if isinstance(position, CommonRoadShape):
-            polygons += [_flat(np.asarray(part.exterior.coords)[:-1, :2])
+            polygons += [flat(np.asarray(part.exterior.coords)[:-1, :2])
                          for part in _parts(_outline(position))]
     return polygons
 
@@ -220,7 +135,7 @@ def _outline(shape: CommonRoadShape) -> shapely.Geometry:
 
 
 def _parts(outline: shapely.Geometry) -> list[shapely.Polygon]:
-    simple = shapely.simplify(outline, _TOLERANCE)
+    simple = shapely.simplify(outline, TOLERANCE)
     return [part for part in getattr(simple, 'geoms', [simple])
             if part.geom_type == 'Polygon' and not part.is_empty]
 
@@ -232,24 +147,7 @@ def _bounds(network: LaneletNetwork, game: GameDocument) -> list[float]:
     if not points:
         points = [vehicles.reshape(-1, 2) - _EMPTY_MARGIN, vehicles.reshape(-1, 2) + _EMPTY_MARGIN]
     together = np.concatenate(points)
-    return _flat(np.array([together.min(axis=0), together.max(axis=0)]))
-
-
-def _polyline(vertices: Points) -> list[float]:
-    line = shapely.LineString(np.asarray(vertices, dtype=np.float64)[:, :2])
-    return _flat(shapely.get_coordinates(shapely.simplify(line, _TOLERANCE)))
-
-
-def _flat(points: Points) -> list[float]:
-    return [_rounded(value) for value in np.asarray(points, dtype=np.float64).ravel()]
-
-
-def _rounded(value: float) -> float:
-    return round(float(value), _DECIMALS)
-
-
-def _marking(marking: LineMarking | None) -> str:
-    return 'no_marking' if marking is None else str(marking.value)
+    return flat(np.array([together.min(axis=0), together.max(axis=0)]))
 
 
 def _finite(value: Any) -> Any:

@@ -19,6 +19,7 @@ from pathlib import Path
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
+from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons
 from crgame_ros.errors import InputError
@@ -245,6 +246,7 @@ class DeviceFile:
     :param pedals: one axis for both pedals, throttle on its positive side.
     :param buttons: for the gear, the indicators and the horn.
     :param keys: of a keyboard.
+    :param force_feedback: motor of a wheel; without it the wheel is not moved.
     """
 
     FORM: ClassVar[Form] = Form(REMEDY, by='kind', one_of={
@@ -259,6 +261,7 @@ class DeviceFile:
     pedals: Annotated[AxisPair | None, OnlyWith(('pedals',))] = None
     buttons: Annotated[ButtonEntry | None, _AXES] = None
     keys: Annotated[KeyEntry | None, OnlyWith(('keys',))] = None
+    force_feedback: Annotated[ForceLimits | None, OnlyWith(_PEDALS)] = None
 
     def check(self) -> None:
         """Refuse what is no regular expression."""

@@ -22,6 +22,7 @@ import re
 from typing import Any
 
 from crgame_ros.driver.device_file import DeviceFile, REMEDY
+from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import ControlBindings
@@ -91,6 +92,7 @@ class DeviceMap:
     :param evdev: controls when read through evdev; None for a keyboard.
     :param joy: controls when read from a `joy` node; None for a keyboard.
     :param keys: key bindings of a keyboard; None otherwise.
+    :param force: the motor of a wheel; None where there is none, or it is to rest.
     """
 
     name: str
@@ -100,6 +102,7 @@ class DeviceMap:
     evdev: ControlBindings | None = None
     joy: ControlBindings | None = None
     keys: KeyBindings | None = None
+    force: ForceLimits | None = None
 
     def fits(self, name: str, axes: frozenset[int], buttons: frozenset[int]) -> bool:
         """
@@ -163,4 +166,4 @@ def _device_map(values: Any, where: str) -> DeviceMap:
     keys = None if file.keys is None else KeyBindings(
         **{name: frozenset(codes) for name, codes in vars(file.keys).items()})
     return DeviceMap(Path(where).stem, file.title, DeviceKind[file.kind.upper()], file.match,
-                     evdev, joy, keys)
+                     evdev, joy, keys, file.force_feedback)

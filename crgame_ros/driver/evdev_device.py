@@ -22,6 +22,7 @@ import re
 from typing import Any
 
 from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
+from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons, NO_LIGHTS
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import (
@@ -124,6 +125,7 @@ class EvdevDevice:
         self._next_scan_s = -math.inf
         self._limits: dict[int, tuple[float, float]] = {}
         self._buttons: tuple[int, ...] = ()
+        self._can_push = False
         self.problem: InputError | None = None
         self.device_map: DeviceMap | None = None
         self.layout: ControlLayout | None = None
@@ -165,6 +167,16 @@ class EvdevDevice:
     def fileno(self) -> int | None:
         """Give the descriptor to wait on until something can be read; None if disconnected."""
         return self._device.fd if self._device is not None else None
+
+    @property
+    def force_limits(self) -> ForceLimits | None:
+        """What may be asked of its motor; None without one, or where the map has none."""
+        return self.device_map.force if self._can_push and self.device_map else None
+
+    @property
+    def force_device(self) -> Any:
+        """What its motor is driven through (`ForceDevice`); None without one."""
+        return self._device if self._can_push else None
 
     def poll(self, now_s: float) -> bool:
         """
@@ -230,6 +242,7 @@ class EvdevDevice:
             self._limits = {code: (float(info.min), float(info.max))
                             for code, info in _abs_infos(device).items() if info.min < info.max}
             self._buttons = tuple(device.capabilities().get(ecodes.EV_KEY, ()))
+            self._can_push = ecodes.FF_CONSTANT in device.capabilities().get(ecodes.EV_FF, ())
             if device_map.keys is not None:
                 gear, self.layout = GearButtons(toggle=device_map.keys.reverse), None
                 lights = device_map.keys.lights

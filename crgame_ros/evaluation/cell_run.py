@@ -15,7 +15,6 @@
 """Computing one cell: an offline run, and its measures."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 import re
 import resource
@@ -29,7 +28,6 @@ from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
-from crgame_ros.evaluation.evaluation_plan import OWN
 from crgame_ros.evaluation.results.cell_rows import outcome_of, vehicle_rows
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import parse_game
@@ -40,7 +38,7 @@ from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.cast import cast_avs
+from crgame_ros.simulation.adapted_game import adapt_game, OWN
 from crgame_ros.simulation.offline import OfflineResult, PlannerRecord, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
@@ -76,20 +74,16 @@ def cell_setup(cell: Cell, contents: Path) -> Setup:
 
 def _adapted(game: Game, loaded: LoadedScenario, cell: Cell, contents: Path) -> Game:
     """Let a game's AVs and traffic be those of the cell."""
-    specs = [spec for spec, _ in cast_avs(game, loaded)[0]]
-    if cell.planner_choice is not None:
-        choice = _resolved(cell.planner_choice, contents)
-        specs = [replace(spec, planner=choice['planner'], options=choice['options'])
-                 for spec in specs]
-    if cell.perception_values != OWN:
-        perception = None if cell.perception_values is None else read(
-            PerceptionSpec, _resolved(cell.perception_values, contents), 'perception', contents)
-        specs = [replace(spec, perception=perception) for spec in specs]
-    if cell.traffic_values != OWN:
-        traffic = None if cell.traffic_values is None else read(
-            TrafficSpec, _resolved(cell.traffic_values, contents), 'traffic', contents)
-        game = replace(game, traffic=traffic)
-    return replace(game, avs=tuple(specs), seed=cell.seed)
+    choice: dict[str, Any] = {'planner': OWN, 'options': None} \
+        if cell.planner_choice is None else _resolved(cell.planner_choice, contents)
+
+    def spec(kind: type[Any], values: Any, name: str) -> Any:
+        return values if values is None or values == OWN else read(
+            kind, _resolved(values, contents), name, contents)
+    return adapt_game(
+        game, loaded, seed=cell.seed, planner=choice['planner'], options=choice['options'],
+        perception=spec(PerceptionSpec, cell.perception_values, 'perception'),
+        traffic=spec(TrafficSpec, cell.traffic_values, 'traffic'))
 
 
 def _resolved(value: Any, contents: Path) -> Any:

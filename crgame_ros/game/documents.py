@@ -34,6 +34,7 @@ from crgame_ros.game.driven_vehicle import (
     read_human,
     VEHICLE_ID,
 )
+from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.event_file import parse_document_entries
 from crgame_ros.game.events import EventSpec, FiredEvent
 from crgame_ros.game.game import DrivabilitySpec, MAX_VEHICLES, TimingSpec
@@ -73,6 +74,7 @@ class GameDocument:
     :param timing: of the time controller.
     :param traffic: vehicles that react; None for none.
     :param occupancy: file of the map of permanent obstacles; None for none.
+    :param environment: light and air; None in recordings that know nothing of them.
     :param events: the game's events.
     :param event_entries: the same, as pages are told.
     :param file: text of the game file; empty where there is none.
@@ -93,6 +95,7 @@ class GameDocument:
     timing: TimingSpec
     traffic: TrafficSpec | None
     occupancy: Path | None
+    environment: EnvironmentSpec | None
     events: tuple[EventSpec, ...]
     event_entries: tuple[Any, ...]
     file: str
@@ -130,6 +133,7 @@ def parse_game_document(text: str) -> GameDocument:
                 raise ValueError(f'{name} is {str(content[name])[:40]}')
         duration_s, traffic = content.get('duration'), content.get('traffic')
         occupancy, events = content.get('occupancy'), content.get('events') or []
+        environment = content.get('environment')
         game = GameDocument(
             epoch=int(content['epoch']), benchmark_id=str(content.get('benchmark_id', '')),
             title=str(content.get('title') or ''),
@@ -147,6 +151,8 @@ def parse_game_document(text: str) -> GameDocument:
             traffic=None if traffic is None else read(
                 TrafficSpec, traffic, f'{GAME_TOPIC}: traffic'),
             occupancy=None if occupancy is None else Path(occupancy),
+            environment=None if environment is None else read(
+                EnvironmentSpec, environment, f'{GAME_TOPIC}: environment'),
             events=parse_document_entries(events, GAME_TOPIC), event_entries=tuple(events),
             file=str(content.get('file') or ''), sound=str(content.get('sound') or 'on'))
     except MALFORMED as error:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.events import EventList
 from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -285,6 +286,7 @@ class Game:
     :param traffic: vehicles that react (FS III); None for none.
     :param occupancy: map of permanent obstacles (FS II-A2).
     :param sound: whether pages may sound and gamepads rumble; `none` for a study without.
+    :param environment: light and air, as people see the world.
     """
 
     FORM: ClassVar[Form] = Form(
@@ -307,6 +309,7 @@ class Game:
     occupancy: Annotated[Path, Advice('name the YAML file of a map')] | None = None
     # YAML reads a bare on as a truth value.
     sound: Annotated[Literal['on', 'none'], Meaning(True, 'on'), LeftOut()] = 'on'
+    environment: EnvironmentSpec | None = None
 
     def _repr_html_(self) -> str:
         """Show it in a notebook as its file says it."""

@@ -20,11 +20,18 @@ import time
 from typing import TYPE_CHECKING
 
 from crgame_ros.driver.device_map import load_device_map
-from crgame_ros.driver.source import DriverSource, is_replay, JoyDriver, parse_source
+from crgame_ros.driver.source import (
+    DriverSource,
+    EvdevDriver,
+    is_replay,
+    JoyDriver,
+    parse_source,
+)
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GameDocument, parse_game_document, parse_seats_document
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
+from crgame_ros.ros.live_force import LiveForce
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
 from crgame_ros.ros.seat import GAME
@@ -72,6 +79,8 @@ class DriverNode(Node):
         self._commands = endpoints.publisher('/<v>/driver_command', self._vehicle_id)
         self._raw = endpoints.publisher('/<hv>/joy', self._vehicle_id)
         self._diagnostics = endpoints.diagnostics
+        self._force = LiveForce(endpoints, self._vehicle_id, lambda: not self._silent,
+                                self.get_logger().warning)
         self._lock = threading.Lock()
         self._world: PolicyWorld | None = None
         self._driver: DriverSource | None = None
@@ -96,6 +105,7 @@ class DriverNode(Node):
         finally:
             self._running = False
             watcher.join()
+            self._force.end()
             if self._driver is not None:
                 self._driver.close()
 
@@ -119,11 +129,15 @@ class DriverNode(Node):
         except CrgameError as error:
             self.get_logger().error(str(error))
             return
+        # Before the device is closed, so that it can be told to let go.
+        self._force.end()
         with self._lock:
             if self._driver is not None:
                 self._driver.close()
             self._driver, self._game, self._cycle = driver, game, -1
             self._diagnostics.now_ns = game.scheduler.clock_offset_ns
+        if isinstance(driver, EvdevDriver) and human is not None:
+            self._force.begin(driver.device, human.vehicle)
         if isinstance(driver, JoyDriver) and self._joy_subscription is None:
             self._joy_subscription = self._endpoints.subscription(
                 '/<hv>/joy', self._on_joy, self._vehicle_id)

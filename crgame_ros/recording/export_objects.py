@@ -32,11 +32,16 @@ from crgame_ros.scenario.export_elements import (
     STATIC_TYPES,
 )
 from crgame_ros.scenario.export_ids import IdPool
+from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
+from crgame_ros.vehicle.lights import HAZARD, Light
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+_BRAKE, _LIGHTS = (COMMAND_COLUMNS.index(name) for name in ('brake', 'lights'))
+# From this pedal on brake lights shine, as on the cockpit's map.
+BRAKE_LIGHTS = 0.02
 # In the order that the schema asks for.
 _GROUPS = ('static', 'dynamic', 'phantom', 'environment')
 
@@ -91,11 +96,24 @@ class ObjectWriter:
             self.ids[item.id] = self._pool.fresh()
             self._parts['dynamic'].append(named(item.id) + dynamic_obstacle(
                 self.ids[item.id], self._type(item, DYNAMIC_TYPES), item.shape,
-                self.vehicle_rows[:, column].tolist(), True))
+                self.vehicle_rows[:, column].tolist(), True, self._signals(column)))
 
     def text(self) -> str:
         """Give what was written."""
         return ''.join(part for group in _GROUPS for part in self._parts[group])
+
+    def _signals(self, column: int) -> list[tuple[bool, ...]]:
+        """Give the signals of a vehicle at each step, as far as somebody drove it."""
+        commands = self._log.commands
+        if commands is None or np.isnan(commands[1:, column, _BRAKE]).all():
+            return []
+        rows = np.nan_to_num(commands[:, column])
+        lights = rows[:, _LIGHTS].astype(int)
+        hazard = lights & HAZARD == HAZARD
+        return list(zip(*(each.tolist() for each in (
+            lights & Light.HORN > 0, ~hazard & (lights & Light.LEFT > 0),
+            ~hazard & (lights & Light.RIGHT > 0), rows[:, _BRAKE] > BRAKE_LIGHTS, hazard)),
+            strict=True))
 
     def _type(self, item: ObjectDescription, known: frozenset[str]) -> str:
         if item.type in known:

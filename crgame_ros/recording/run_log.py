@@ -75,6 +75,8 @@ class RunLog:
     :param object_velocities: (K, M, 3) their derivatives; NaN where absent.
     :param notices: what of the run is not in here, one line each.
     :param cycles: its recorded cycles, where they are known.
+    :param commands: (K, V, 5) that the steps which led to these states consumed, columns as in
+        `COMMAND_COLUMNS`; NaN where none is known, None where none at all is.
     """
 
     xml_text: str
@@ -87,6 +89,7 @@ class RunLog:
     object_velocities: FloatArray
     notices: tuple[str, ...] = ()
     cycles: CycleTable | None = None
+    commands: FloatArray | None = None
 
     @property
     def vehicles(self) -> tuple[ObjectDescription, ...]:
@@ -143,7 +146,17 @@ def read_run_log(path: Path, epoch: int | None = None,
     others = others.reshape(len(ticks), 2, len(objects), 3)
     published = _published(recorded[VEHICLES_TOPIC], ticks, vehicle_states)
     return RunLog(run.xml_text, run.game, run.descriptions, _ks(scheduler, ticks), vehicle_states,
-                  published, others[:, 0], others[:, 1], tuple(map(one_line, notices)), table)
+                  published, others[:, 0], others[:, 1], tuple(map(one_line, notices)), table,
+                  None if table is None else _commands(table, vehicles, ticks))
+
+
+def _commands(table: CycleTable, vehicles: Sequence[str], ticks: IntArray) -> FloatArray:
+    """Give the commands (K, V, 5) of the steps that led to the ticks n; NaN where unknown."""
+    ns = table.column('n').astype(np.int64)
+    places = np.minimum(np.searchsorted(ns, ticks), len(ns) - 1)
+    found = table.commands_of(vehicles)[places]
+    found[ns[places] != ticks] = np.nan
+    return found
 
 
 def _wanted(reader: BagReader, vehicles: list[str], objects: list[str]) -> dict[str, list[str]]:
@@ -301,4 +314,5 @@ def run_log_of(result: OfflineResult) -> RunLog:
     return RunLog(
         setup.loaded.xml_text, game, setup.descriptions, ks, states, result.vehicle_states[ticks],
         result.object_poses[:len(ks)].reshape(len(ks), -1, 3),
-        result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(map(one_line, notices)))
+        result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(map(one_line, notices)),
+        commands=np.concatenate((result.commands, result.av_commands), axis=1)[ticks])

@@ -34,6 +34,8 @@ STATIC_TYPES = frozenset({'unknown', 'parkedVehicle', 'constructionZone', 'roadB
 DYNAMIC_TYPES = frozenset({'unknown', 'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'pedestrian',
                            'priorityVehicle', 'train', 'taxi'})
 ENVIRONMENT_TYPES = frozenset({'building', 'pillar', 'median_strip'})
+# What a vehicle shows and sounds.
+SIGNALS = ('horn', 'indicatorLeft', 'indicatorRight', 'brakingLights', 'hazardWarningLights')
 
 _POSE = ('<position><point><x>{:.4f}</x><y>{:.4f}</y></point></position>'
          '<orientation><exact>{:.4f}</exact></orientation>')
@@ -73,7 +75,7 @@ def environment_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[fl
 
 
 def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequence[float]],
-                     driven: bool) -> str:
+                     driven: bool, signals: Sequence[Sequence[bool]] = ()) -> str:
     """
     Write an obstacle with its trajectory.
 
@@ -81,13 +83,27 @@ def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequ
     :param states: two or more rows from time step 0 on: x, y, yaw of the centre, speed; of a
         driven vehicle also acceleration, yaw rate, steering angle
     :param driven: whether the rows have the values of a driven vehicle
+    :param signals: at each of these steps, in the order of `SIGNALS`; empty where nothing is known
     """
     template = _VEHICLE_STATE if driven else _OBJECT_STATE
     lines = [template.format(*row[:3], step, *row[3:]) for step, row in enumerate(states)]
     trajectory = '</state>\n<state>'.join(lines[1:])
+    initial, series = _signal_series(signals)
     return (f'<dynamicObstacle id="{number}"><type>{kind}</type><shape>{_shape(shape)}</shape>\n'
-            f'<initialState>{lines[0]}</initialState>\n'
-            f'<trajectory>\n<state>{trajectory}</state>\n</trajectory></dynamicObstacle>\n')
+            f'<initialState>{lines[0]}</initialState>\n{initial}'
+            f'<trajectory>\n<state>{trajectory}</state>\n</trajectory>{series}</dynamicObstacle>\n')
+
+
+def _signal_series(signals: Sequence[Sequence[bool]]) -> tuple[str, str]:
+    """Write the first signal state and those that follow."""
+    if not signals:
+        return '', ''
+    first, *rest = [_TIME.format(step) + ''.join(
+        f'<{name}>{str(on).lower()}</{name}>' for name, on in zip(SIGNALS, row, strict=True))
+        for step, row in enumerate(signals)]
+    states = '</signalState>\n<signalState>'.join(rest)
+    return (f'<initialSignalState>{first}</initialSignalState>\n',
+            f'\n<signalSeries>\n<signalState>{states}</signalState>\n</signalSeries>\n')
 
 
 def phantom_obstacle(number: int, shape: Shape, first: int,

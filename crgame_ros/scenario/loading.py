@@ -17,7 +17,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 import hashlib
 import logging
@@ -37,6 +37,7 @@ from crgame_ros.errors import InputError, one_line
 from crgame_ros.roads.road_surface import lanelet_ring
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.format_2017a import upgrade
+from crgame_ros.scenario.heights import LaneletHeights, read_heights
 from crgame_ros.scenario.mending import mend
 from crgame_ros.scenario.recorded_humans import read_human_note
 from lxml import etree
@@ -65,6 +66,7 @@ class LoadedScenario:
     :param time_step_s: Delta t_c [s].
     :param notices: remarks for the user, one line each.
     :param source: file name for messages.
+    :param heights: of lanelets by id, where the file has them; the scenario itself is flat.
     """
 
     scenario: Scenario
@@ -75,6 +77,7 @@ class LoadedScenario:
     time_step_s: float
     notices: tuple[str, ...]
     source: str
+    heights: dict[int, LaneletHeights] = field(default_factory=dict)
 
     @cached_property
     def human_problems(self) -> dict[int, int]:
@@ -117,6 +120,7 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
     root = guard.parse_hardened(xml_text, source)
     notices = upgrade(root)
     guard.refuse_malformed(root, source)
+    heights = read_heights(root)
     notices += mend(root)
     scenario, problems, remarks = _read(etree.tostring(root), source)
     notices += remarks
@@ -134,7 +138,7 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
     digest = scenario_digest(xml_text)
     return LoadedScenario(scenario, exact, xml_text, digest, str(scenario.scenario_id),
                           float(scenario.dt), tuple(one_line(f'{source}: {n}') for n in notices),
-                          source)
+                          source, heights)
 
 
 def _is_tangled(lanelet: Lanelet) -> bool:

@@ -49,7 +49,7 @@ def mend(root: etree._Element) -> list[str]:
     for point in heights:
         point.remove(point.find('z'))
     if heights:
-        notices.append(f'the heights of {len(heights)} points are ignored')
+        notices.append(f'the heights of {len(heights)} points are for the eye alone')
     for light in root.iterchildren('trafficLight'):
         if light.find('cycle') is None:
             etree.SubElement(light, 'cycle')

@@ -21,6 +21,7 @@ from typing import Any
 
 from crgame_ros.game.event_file import document_entry
 from crgame_ros.game.game_file import dump_game
+from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.parameters import VehicleParameters
@@ -68,6 +69,7 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
         'traffic': write(game.traffic),
         'occupancy': write(game.occupancy),
         'sound': game.sound,
+        'environment': write(environment_of(setup.loaded.scenario, game.environment)),
         'file': dump_game(game)}
     return json.dumps(document, allow_nan=False)
 

@@ -33,6 +33,8 @@ LARGEST, SMALLEST = 1e9, 1e-6
 Positive = Annotated[float, Within(SMALLEST, LARGEST)]
 Share = Annotated[float, Within(SMALLEST, LARGEST, or_zero=True)]
 Length = Annotated[float, Within(SMALLEST, 100.0)]
+# A place in the vehicle; 0 for what its size says.
+Place = Annotated[float, Within(SMALLEST, 100.0, or_zero=True)]
 
 
 class _Beside(Named):
@@ -74,6 +76,14 @@ class VehicleParameters:
     :param gravity: [m/s^2]
     :param longitudinal_lag: tau_long of CRG 25: drivetrain and brakes [s]
     :param powertrain: what it sounds like in the cockpit; it drives alike.
+    :param height: of the roof; 0 for a usual one of its length [m]
+    :param eye_ahead: the driver's eyes ahead of the rear axle; 0 for a usual place [m]
+    :param eye_left: the driver's eyes to the left of the middle, negative to the right [m]
+    :param eye_height: the driver's eyes above the road; 0 for a usual place [m]
+    :param mirror_ahead: the outer mirrors ahead of the rear axle; 0 for a usual place [m]
+    :param mirror_left: the left one to the left of the middle; 0 for just outside [m]
+    :param mirror_height: the outer mirrors above the road; 0 for a usual place [m]
+    :param bonnet_height: its highest line above the road; 0 for a usual one [m]
     """
 
     FORM: ClassVar[Form] = Form('see config/vehicles/bmw_320i.yaml')
@@ -105,6 +115,14 @@ class VehicleParameters:
     gravity: Positive
     longitudinal_lag: Positive
     powertrain: Literal['combustion', 'electric'] = 'combustion'
+    height: Place = 0.0
+    eye_ahead: Place = 0.0
+    eye_left: Annotated[float, Within(-10.0, 10.0)] = 0.36
+    eye_height: Place = 0.0
+    mirror_ahead: Place = 0.0
+    mirror_left: Place = 0.0
+    mirror_height: Place = 0.0
+    bonnet_height: Place = 0.0
 
     @property
     def shape(self) -> Shape:

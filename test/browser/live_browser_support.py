@@ -221,9 +221,9 @@ class LivePage:
                   ' && crgame.world.shown?.epoch === crgame.store.status.epoch', 'a new run')
 
     def vehicle(self, index: int) -> NDArray[np.float64]:
-        """Give the 12 numbers of a vehicle as it was drawn last."""
-        row = self.run('const at = 12 * arguments[0];'
-                       'return [...crgame.world.shown.vehicles.subarray(at, at + 12)];', index)
+        """Give the 13 numbers of a vehicle as it was drawn last."""
+        row = self.run('const at = 13 * arguments[0];'
+                       'return [...crgame.world.shown.vehicles.subarray(at, at + 13)];', index)
         return np.array([np.nan if value is None else value for value in row], dtype=float)
 
     def follow(self, vehicle_id: str) -> None:

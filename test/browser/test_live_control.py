@@ -102,13 +102,13 @@ def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
 def test_an_av_is_taken_over_and_given_back(new_run: LivePage) -> None:
     """It brakes by the key, and its planner drives it on from where it was left."""
     page, graph = new_run, new_run.graph
-    page.wait('crgame.world.shown.vehicles[12 + 3] > 5', 'the AV to drive')
+    page.wait('crgame.world.shown.vehicles[13 + 3] > 5', 'the AV to drive')
     page.claim('av0')
     page.wait_for_text('.hud-who', 'You drive av0')
     page.hold('s')
     graph.wait_for_command('av0', BRAKE, 1.0, 1.0)
     speed = page.vehicle(1)[3]
-    page.wait('crgame.world.shown.vehicles[12 + 3] < arguments[0] - 3', 'the braking', speed)
+    page.wait('crgame.world.shown.vehicles[13 + 3] < arguments[0] - 3', 'the braking', speed)
     page.release('s')
     page.give_back('av0')
     graph.peer.forget()
@@ -117,7 +117,7 @@ def test_an_av_is_taken_over_and_given_back(new_run: LivePage) -> None:
     page.wait_for_text('li[data-seat="av0"]', 'Driven by the planner idm')
     left = page.vehicle(1)[3]
     # The road before it is free for 30 m: the IDM speeds up again.
-    page.wait('crgame.world.shown.vehicles[12 + 3] > arguments[0] + 1', 'the planner', left)
+    page.wait('crgame.world.shown.vehicles[13 + 3] > arguments[0] + 1', 'the planner', left)
 
 
 def test_pause_and_step(page: LivePage) -> None:

@@ -196,7 +196,7 @@ def test_the_instruments_count_who_is_seen(page: LivePage) -> None:
     count = page.run('return crgame.perception.count')
     near = page.run("""
         const { vehicles, objects } = crgame.world.shown;
-        const [x, y] = vehicles.subarray(12, 14);
+        const [x, y] = vehicles.subarray(13, 15);
         const others = [[...vehicles.subarray(0, 2)]];
         for (let at = 0; at < objects.length; at += 6) {
           others.push([...objects.subarray(at, at + 2)]);

@@ -18,6 +18,7 @@ from dataclasses import replace
 import json
 import math
 from pathlib import Path
+import re
 from typing import Any
 
 from crgame_ros.cockpit.scene import scene_document
@@ -106,7 +107,12 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
         'powertrain': 'combustion',
         'rear_to_center': pytest.approx(1.4227, abs=5e-5),
         'wheelbase': pytest.approx(2.5789, abs=5e-5),
-        'shape': {'kind': 'rectangle', 'length': 4.508, 'width': 1.61, 'vertices': []}}
+        'shape': {'kind': 'rectangle', 'length': 4.508, 'width': 1.61, 'vertices': []},
+        # config/vehicles/bmw_320i.yaml; the inner mirror hangs below the roof.
+        'driver_place': {
+            'height': 1.42, 'bonnet_height': 0.95, 'eye': [1.25, 0.36, 1.17],
+            'left_mirror': [1.78, 0.92, 0.98], 'right_mirror': [1.78, -0.92, 0.98],
+            'inner_mirror': [1.75, 0.0, pytest.approx(1.26)]}}
     assert document['time'] == {
         'epoch': 3, 'dt_s': 0.01, 'dt_c_s': 0.1, 'k0': 0, 'clock_offset_s': 2.5,
         'duration_s': setup.game.duration}
@@ -187,6 +193,79 @@ def test_lights_and_stop_lines_lie_at_their_lanes(shared_scenarios: Path) -> Non
         surface = shapely.Polygon([*np.reshape(entry['left'], (-1, 2)),
                                    *np.reshape(entry['right'], (-1, 2))[::-1]])
         assert line(stop['points']).distance(surface) < 1.0
+
+
+def test_lights_say_for_which_movement_they_are(shared_scenarios: Path) -> None:
+    setup = published(shared_scenarios, 'USA_Lanker-1_3_T-1')
+    told = {light['id']: light['direction'] for light in document_of(setup)['lights']}
+    # As the file has it.
+    assert told[11522] == 'left' and set(told.values()) == {
+        'left', 'right', 'all', 'straightRight'}
+
+
+def test_signs_say_where_to_whom_and_what(shared_scenarios: Path) -> None:
+    """A sign's readers drive its way."""
+    setup = published(shared_scenarios / 'more', 'OSC_Overtake-1_1_T-1')
+    document = document_of(setup)
+    lanelets = {entry['id']: entry for entry in document['lanelets']}
+    signs = {sign['id']: sign for sign in document['signs']}
+    assert signs[1]['kind'] == 'HIGHWAY_EXIT' and signs[1]['value'] == ''
+    assert signs[2]['kind'] == 'MAX_SPEED' and float(signs[2]['value']) * 3.6 == pytest.approx(60)
+    assert (signs[2]['x'], signs[2]['y'], signs[2]['virtual']) == (138.168, 6173.77, False)
+    # OSC is none of commonroad-io's countries.
+    assert document['country'] == 'ZAM'
+    for sign in document['signs']:
+        headings = [
+            math.atan2(y, x) for number in sign['lanelets'] for x, y in np.diff(np.reshape(
+                lanelets[number]['center'], (-1, 2)), axis=0)]
+        # Vertices that were dropped turned the line by little.
+        assert any(math.cos(sign['yaw'] - heading) > 0.99 for heading in headings) \
+            or not sign['lanelets']
+
+
+def test_a_sign_says_no_more_than_fits_on_a_plate() -> None:
+    setup = build_setup(load_game(scenarios_directory() / 'intersection.yaml'))
+    sign = setup.loaded.scenario.lanelet_network.traffic_signs[0]
+    sign.traffic_sign_elements[0].additional_values[:] = ['<b>' + 'x' * 500]
+    told = [entry['value'] for entry in document_of(setup)['signs']
+            if entry['id'] == sign.traffic_sign_id]
+    assert told[0] == '<b>' + 'x' * 37
+
+
+def test_light_and_air_are_the_games_else_the_scenarios() -> None:
+    setup = build_setup(load_game(scenarios_directory() / 'fog.yaml'))
+    assert document_of(setup)['environment'] == {'light': 'day', 'visibility': 80.0}
+    # What was recorded before games knew of it says nothing.
+    assert document_of(setup, environment=None)['environment'] == {
+        'light': 'day', 'visibility': 30_000.0}
+
+
+def test_heights_keep_as_true_as_the_ground_plan(tmp_path: Path) -> None:
+    """A bridge of 6 m over 100 m, on a road that is straight on the map."""
+    def height(x: float) -> float:
+        return 6.0 * math.exp(-((x - 100.0) / 30.0) ** 2)
+
+    text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
+    head, lanelets, rest = re.split(r'(?s)(<lanelet .*</lanelet>)', text, maxsplit=1)
+    raised = re.sub(r'<x>([^<]+)</x>\s*<y>[^<]+</y>',
+                    lambda found: f'{found[0]}<z>{height(float(found[1]))}</z>', lanelets)
+    path = tmp_path / 'bridge.xml'
+    path.write_text(head + raised + rest)
+    setup = build_setup(effective_game(RunRequest(scenario=path, driver='idle')))
+    for entry in document_of(setup)['lanelets']:
+        for side in ('left', 'right'):
+            xs = np.reshape(entry[side], (-1, 2))[:, 0]
+            heights = np.array(entry[f'{side}_z'])
+            assert heights == pytest.approx([height(x) for x in xs], abs=1e-3)
+            lanelet = setup.loaded.scenario.lanelet_network.find_lanelet_by_id(entry['id'])
+            # What drives knows of no height.
+            true = getattr(lanelet, f'{side}_vertices')
+            assert true.shape[1] == 2 and len(xs) < len(true)
+            order = np.argsort(xs)
+            assert np.interp(true[:, 0], xs[order], heights[order]) == pytest.approx(
+                [height(x) for x in true[:, 0]], abs=TOLERANCE_M)
+    flat = document_of(build_setup(load_game(scenarios_directory() / 'cut_in.yaml')))
+    assert {entry['left_z'] for entry in flat['lanelets']} == {None}
 
 
 def test_circular_goal_has_its_radius(tmp_path: Path) -> None:

@@ -17,8 +17,8 @@
 import json
 from pathlib import Path
 
-from crgame_ros.cockpit.page_messages import parse_message
 from crgame_ros.cockpit.held_seat import HeldSeat
+from crgame_ros.cockpit.page_messages import parse_message
 from crgame_ros.driver.device_map import DeviceKind, load_device_maps
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
 from crgame_ros.driver.replay_driver import ReplayDriver

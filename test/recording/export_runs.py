@@ -62,9 +62,12 @@ class ExportRuns:
         specs = tuple(replace(av.spec, planner='constant-velocity') for av in setup.avs)
         setup = build_setup(replace(game, avs=specs))
         steps = setup.scheduler.steps_for(duration_s)
-        commands = np.zeros((steps, 4))
+        commands = np.zeros((steps, 5))
         commands[:, 0] = 0.3
         commands[:, 2] = 0.1 * np.sin(np.arange(steps) / 40.0)
+        # Second by second: left, right with the horn, hazard, nothing but the brake.
+        commands[:, 4] = np.resize((1, 6, 3, 0), steps // 50 + 1).repeat(50)[:steps]
+        commands[150:, 1] = 0.05
         return run_log_of(run_offline(setup, duration_s=duration_s, check_drivability=False,
                                       drivers={'hv0': ReplayDriver(commands)}))
 

@@ -58,6 +58,29 @@ def test_round_trip_of_our_own_scenarios(runs: Any, tmp_path: Path, name: str) -
         assert before == after
 
 
+def test_what_a_driver_shows_and_sounds_reads_back(runs: Any, tmp_path: Path) -> None:
+    """Of hv0 half a second each left, right and horn, hazard; then the brake. Not of an AV."""
+    log = runs.drive(runs.own(CUT_IN), tmp_path)
+    exported = export_scenario(log)
+    scenario, _ = runs.read_back(exported)
+    human, av = (scenario.obstacle_by_id(exported.obstacle_ids[name]) for name in ('hv0', 'av0'))
+
+    def shown(step: int) -> tuple[bool, ...]:
+        state = human.signal_state_at_time_step(step)
+        assert state.time_step == step
+        return (state.horn, state.indicator_left, state.indicator_right,
+                state.hazard_warning_lights, state.braking_lights)
+
+    assert shown(0) == (False,) * 5, 'no step led to it'
+    for steps, expected in ((range(1, 6), (False, True, False, False, False)),
+                            (range(6, 11), (True, False, True, False, False)),
+                            (range(11, 16), (False, False, False, True, False)),
+                            (range(16, 20), (False, False, False, False, True))):
+        assert {shown(step) for step in steps} == {expected}
+    assert len(human.signal_series) == len(log.ks) - 1
+    assert av.initial_signal_state is None and not av.signal_series
+
+
 def test_round_trip_of_published_scenarios(
         runs: Any, tmp_path: Path, shared_scenarios: Path) -> None:
     """Real roads with up to 36 recorded vehicles, a 2018b file and duplicate ids among them."""

@@ -46,6 +46,8 @@ SERVICES_OF_EVERY_NODE = {
 # Subscriptions that exist only while a game needs them: (topic, node).
 ONLY_WITH_A_JOY_NODE = ('/<hv>/joy', 'driver_node')
 ONLY_WITH_DRIVABILITY_STOP = ('/<v>/drivability', 'sim_node')
+# No test has a wheel; test_live_force.py looks at what one brings.
+ONLY_WITH_A_MOTOR = frozenset({('/<v>/odom', 'driver_node'), ('/<v>/drivability', 'driver_node')})
 OPTIONAL = frozenset({ONLY_WITH_A_JOY_NODE, ONLY_WITH_DRIVABILITY_STOP})
 ONLY_WITH_PERCEPTION = (('/<av>/plan_request', 'sim_node'), ('/<av>/localization', 'cockpit_node'),
                         ('/<av>/scan', 'cockpit_node'))
@@ -96,7 +98,8 @@ class Case:
         idle = {(name, node, av) for name, node in ONLY_WITH_PERCEPTION for av in perfect}
         if not self.engines:
             idle.add(('/traffic/agents', 'sim_node', ''))
-        return self._endpoints(topic, executables, OPTIONAL - self.used, frozenset(idle))
+        return self._endpoints(topic, executables, ONLY_WITH_A_MOTOR | OPTIONAL - self.used,
+                               frozenset(idle))
 
     def _endpoints(self, topic: Topic, executables: tuple[str, ...],
                    unused: frozenset[tuple[str, str]],

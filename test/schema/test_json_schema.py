@@ -160,7 +160,7 @@ def test_every_key_is_described() -> None:
         for name, part in {'': schema, **schema['$defs']}.items():
             part = part['anyOf'][1] if 'anyOf' in part and 'type' not in part else part
             for key, entry in part.get('properties', {}).items():
-                keyed = name in ('EventSpec', 'TimelineFile')
+                keyed = name in ('EventSpec', 'TimelineFile', 'StepEntry', 'Question')
                 assert 'description' in entry or keyed, f'{name}.{key}'
 
 

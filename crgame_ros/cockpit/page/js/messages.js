@@ -3,7 +3,8 @@
 /**
  * What the page and its server say to each other in JSON, as types: nothing here runs.
  *
- * The other ends are crgame_ros/cockpit/scene.py, run_status.py, seat_table.py, run_files.py,
+ * The other ends are crgame_ros/cockpit/scene.py (with map_lanelets.py and
+ * road_furniture.py), run_status.py, seat_table.py, run_files.py,
  * library.py, replay_backend.py and, of what the page sends, page_messages.py. The binary frames
  * are in frames.js. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
  *
@@ -27,6 +28,8 @@ export {};
  * @property {number[]} left bound
  * @property {number[]} right bound
  * @property {number[]} center line
+ * @property {number[]|null} [left_z] heights of the left bound's points [m], null where flat
+ * @property {number[]|null} [right_z]
  * @property {string[]} types CommonRoad's
  * @property {string} left_line marking of the bound, as CommonRoad calls it
  * @property {string} right_line
@@ -40,7 +43,29 @@ export {};
  * @property {number[]} successors
  */
 
-/** @typedef {{id: number, x: number, y: number, yaw: number, lanelets: number[]}} Light */
+/**
+ * A traffic light, and the way [rad] of those for whom it is.
+ *
+ * @typedef {{id: number, x: number, y: number, yaw: number, direction: string,
+ *   lanelets: number[]}} Light
+ */
+
+/**
+ * What a plate says (as TrafficSignIDGermany and the like name it), and the way of its readers.
+ *
+ * @typedef {{id: number, x: number, y: number, yaw: number, lanelets: number[], kind: string,
+ *   value: string, virtual: boolean}} Sign
+ */
+
+/** @typedef {{light: 'day'|'dusk', visibility: number}} Environment visibility [m] */
+
+/**
+ * Points of a vehicle: ahead of the rear axle, to the left, above the road.
+ *
+ * @typedef {[x: number, y: number, z: number]} Mount [m]
+ * @typedef {{height: number, bonnet_height: number, eye: Mount, left_mirror: Mount,
+ *   right_mirror: Mount, inner_mirror: Mount}} DriverPlace [m]
+ */
 
 /**
  * @typedef {object} SceneVehicle
@@ -51,6 +76,7 @@ export {};
  * @property {number} wheelbase [m]
  * @property {number} max_steering_angle [rad]
  * @property {'combustion'|'electric'} powertrain
+ * @property {DriverPlace} driver_place
  * @property {{localisation: boolean, sensors: string[], range: number|null}|null} perception
  *   range [m], null for no limit
  */
@@ -110,11 +136,13 @@ export {};
  * @property {string} benchmark_id
  * @property {string} title
  * @property {Box} bounds
+ * @property {string} country three letters, ZAM where unknown
+ * @property {Environment} environment
  * @property {Lanelet[]} lanelets
  * @property {number[][]} gaps slits between lanelets, for display alone
- * @property {{points: number[], lanelet: number}[]} stop_lines
+ * @property {{points: number[], lanelet: number, line: string}[]} stop_lines
  * @property {Light[]} lights
- * @property {{x: number, y: number, kind: string, value: string}[]} signs
+ * @property {Sign[]} signs
  * @property {SceneVehicle[]} vehicles
  * @property {SceneObject[]} objects
  * @property {{av: string, polygons: number[][]}[]} goals

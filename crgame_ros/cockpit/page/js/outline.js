@@ -1,6 +1,6 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Outlines of lanelets and boxes around points, as flat lists x0, y0, x1, y1, … [m]. */
+/** Outlines of lanelets, what they hold, and boxes around points: flat lists x0, y0, … [m]. */
 
 /**
  * Give the outline of a lanelet: its left bound and back along its right one.
@@ -30,4 +30,22 @@ export function boxOf(points) {
     box[3] = Math.max(box[3], points[i + 1]);
   }
   return box;
+}
+
+/**
+ * Tell whether a point is within a polygon.
+ *
+ * @param {number[]} ring flat polygon
+ * @param {number} x [m]
+ * @param {number} y [m]
+ */
+export function contains(ring, x, y) {
+  let inside = false;
+  for (let i = 0, j = ring.length - 2; i < ring.length; j = i, i += 2) {
+    if ((ring[i + 1] > y) !== (ring[j + 1] > y)
+        && x < ring[i] + (ring[j] - ring[i]) * (y - ring[i + 1]) / (ring[j + 1] - ring[i + 1])) {
+      inside = !inside;
+    }
+  }
+  return inside;
 }

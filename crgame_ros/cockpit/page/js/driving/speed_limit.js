@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The speed limit where a vehicle is, from the lanelets of the scene. */
 
-import { boxOf, outlineOf } from '../outline.js';
+import { boxOf, contains, outlineOf } from '../outline.js';
 
 /** @import { Box, Scene } from '../messages.js' */
 
@@ -50,22 +50,6 @@ export class SpeedLimits {
     }
     return best?.limit ?? null;
   }
-}
-
-/**
- * @param {number[]} ring
- * @param {number} x
- * @param {number} y
- */
-function contains(ring, x, y) {
-  let inside = false;
-  for (let i = 0, j = ring.length - 2; i < ring.length; j = i, i += 2) {
-    if ((ring[i + 1] > y) !== (ring[j + 1] > y)
-        && x < ring[i] + (ring[j] - ring[i]) * (y - ring[i + 1]) / (ring[j + 1] - ring[i + 1])) {
-      inside = !inside;
-    }
-  }
-  return inside;
 }
 
 /**

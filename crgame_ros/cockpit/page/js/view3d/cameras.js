@@ -3,10 +3,11 @@
 /** From where the 3D view looks: the poses of its cameras, in the map's coordinates. */
 
 const DEGREE = Math.PI / 180;
-const CHASE_BEHIND_M = 9;
-const CHASE_ABOVE_M = 3.6;
-const CHASE_PITCH = -11 * DEGREE;
-const BIRD_ABOVE_M = 60;
+const CHASE_BEHIND_M = 6.5;
+const CHASE_ABOVE_M = 3.4;
+const CHASE_PITCH = -12 * DEGREE;
+const BIRD_ABOVE_M = 55;
+const BIRD_AHEAD_M = 12;
 
 /** What one can look from. */
 export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
@@ -14,54 +15,63 @@ export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
 /**
  * @typedef {typeof VIEWPOINTS[number]} Viewpoint
  * @typedef {{x: number, y: number, z: number}} Point [m]
- * @typedef {{x: number, y: number, yaw: number}} RearAxle where a vehicle is [m, rad]
  */
 
 /**
- * Where a camera is and looks: yaw from east to the left, pitch above the horizon, no roll.
+ * Where a vehicle stands: its rear axle on the road, its heading, and the way's slope upwards.
  *
- * @typedef {Point & {yaw: number, pitch: number}} CameraPose [m, rad]
+ * @typedef {Point & {yaw: number, slope: number}} Stand [m, rad]
+ */
+
+/**
+ * Where a camera is and looks. It is turned with the vehicle, by yaw and slope, then within it to
+ * the left and upwards; never rolled.
+ *
+ * @typedef {Point & {yaw: number, slope: number, aside: number, pitch: number}} CameraPose [m, rad]
  */
 
 /**
  * Put a camera at a point of a vehicle.
  *
- * @param {RearAxle} pose of its rear axle
- * @param {number} ground height of the road there [m]
+ * @param {Stand} stand
  * @param {Point} point ahead of the rear axle, to the left, above the road [m]
  * @param {number} [aside] how far it looks to the left of straight ahead [rad]
- * @param {number} [pitch] [rad]
+ * @param {number} [pitch] how far it looks upwards [rad]
  * @returns {CameraPose}
  */
-export function mountedAt({ x, y, yaw }, ground, point, aside = 0, pitch = 0) {
-  const cos = Math.cos(yaw);
-  const sin = Math.sin(yaw);
+export function mountedAt(stand, point, aside = 0, pitch = 0) {
+  const { yaw, slope } = stand;
+  // How far on in the plane: what is higher on a vehicle that climbs is farther back.
+  const ahead = point.x * Math.cos(slope) - point.z * Math.sin(slope);
   return {
-    x: x + cos * point.x - sin * point.y, y: y + sin * point.x + cos * point.y,
-    z: ground + point.z, yaw: yaw + aside, pitch,
+    x: stand.x + Math.cos(yaw) * ahead - Math.sin(yaw) * point.y,
+    y: stand.y + Math.sin(yaw) * ahead + Math.cos(yaw) * point.y,
+    z: stand.z + point.x * Math.sin(slope) + point.z * Math.cos(slope),
+    yaw, slope, aside, pitch,
   };
 }
 
 /**
  * Follow a vehicle from behind and above.
  *
- * @param {RearAxle} pose of its rear axle
- * @param {number} ground height of the road there [m]
- * @param {number} size length of the vehicle [m]
+ * @param {Stand} stand
+ * @param {{front: number, rear: number}} ends of the vehicle ahead of its rear axle [m]
+ * @param {number} [aside] how far it looks to the left of straight ahead [rad]
  * @returns {CameraPose}
  */
-export function chasing(pose, ground, size) {
-  return mountedAt(pose, ground, { x: -CHASE_BEHIND_M - size / 2, y: 0,
-    z: CHASE_ABOVE_M }, 0, CHASE_PITCH);
+export function chasing(stand, { rear }, aside = 0) {
+  const level = { ...stand, slope: 0.5 * stand.slope };
+  return mountedAt(level, { x: rear - CHASE_BEHIND_M, y: 0, z: CHASE_ABOVE_M }, aside,
+    CHASE_PITCH);
 }
 
 /**
  * Look down on a vehicle, which drives upwards in the picture.
  *
- * @param {RearAxle} pose of its rear axle
- * @param {number} ground height of the road there [m]
+ * @param {Stand} stand
  * @returns {CameraPose}
  */
-export function above(pose, ground) {
-  return { x: pose.x, y: pose.y, z: ground + BIRD_ABOVE_M, yaw: pose.yaw, pitch: -Math.PI / 2 };
+export function above(stand) {
+  return mountedAt({ ...stand, slope: 0 }, { x: BIRD_AHEAD_M, y: 0, z: BIRD_ABOVE_M }, 0,
+    -90 * DEGREE);
 }

@@ -1,30 +1,66 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** One canvas on which three.js draws: the renderer, its scene and the camera. */
+/** One canvas on which three.js draws: the renderer, the world, the bodies and the cameras. */
 
+import { above, chasing, mountedAt } from './cameras.js';
+import { createCabin } from './cabin.js';
+import { FrameCost } from './frame_cost.js';
 import { localOrigin } from './local_origin.js';
+import { Mirrors } from './mirrors.js';
+import { PlanRibbons } from './plan_ribbons.js';
+import { isSoftware, Quality } from './quality.js';
 import { createRoadWorld } from './road/road_world.js';
+import { roleColor } from './role_color.js';
+import { Traffic } from './traffic.js';
+import { standOf } from './vehicle_stand.js';
 
-/** @import { Scene } from '../messages.js' */
-/** @import { Store } from '../store.js' */
-/** @import { CameraPose } from './cameras.js' */
+/** @import { Mesh, PerspectiveCamera } from 'three' */
+/** @import { Scene, SceneVehicle } from '../messages.js' */
+/** @import { Shown, Store } from '../store.js' */
+/** @import { CameraPose, Stand, Viewpoint } from './cameras.js' */
 /** @import { RoadWorld, Three } from './road/road_world.js' */
 
-const NEAR_M = 0.1;
+const NEAR_M = 0.2;
 const FAR_M = 3000;
-const SKY = 0xbcd3e6;
+// In a mirror nobody can tell what is farther away [m].
+const FAR_IN_MIRROR_M = 300;
+
+/**
+ * What is to be drawn.
+ *
+ * @typedef {object} Looks
+ * @property {Viewpoint} viewpoint
+ * @property {number} index of the vehicle
+ * @property {number} aside to the left of straight ahead [rad]
+ * @property {number} height angle of the picture in height [rad]
+ * @property {boolean} mirrors whether the driver has them
+ * @property {boolean} plans whether the AVs' plans are shown
+ */
 
 /** Draws what a store shows. */
 export class Picture {
-  stats = { frames: 0, draw_calls: 0, triangles: 0, frame_ms: 0 };
+  /** Of the last picture; `t` is the simulation time that it shows [s]. */
+  stats = { frames: 0, t: NaN, draw_calls: 0, triangles: 0, frame_ms: 0, cost_ms: NaN, width: 0,
+    height: 0, ratio: 1, renderer: '', software: false };
+  mirrors;
   #three;
-  #store;
   #renderer;
   #scene;
   #camera;
+  #traffic;
+  #plans;
+  #quality;
+  #cost;
+  #size = { width: 1, height: 1 };
   /** @type {RoadWorld|null} */
   #road = null;
+  /** @type {Scene|null} */
+  #document = null;
+  /** @type {{mesh: Mesh, vehicle: SceneVehicle}|null} */
+  #cabin = null;
   #origin = { x: 0, y: 0 };
+  /** @type {(() => void)[]} */
+  #ends;
 
   /**
    * @param {Three} three the library
@@ -34,20 +70,54 @@ export class Picture {
    */
   constructor(three, canvas, store) {
     this.#three = three;
-    this.#store = store;
-    this.#renderer = new three.WebGLRenderer({ canvas, antialias: true });
+    const name = rendererName();
+    const software = isSoftware(name);
+    Object.assign(this.stats, { renderer: name, software });
+    this.#renderer = new three.WebGLRenderer({ canvas, antialias: !software });
+    this.#renderer.info.autoReset = false;
+    this.#quality = new Quality(software, window.devicePixelRatio);
+    this.#cost = new FrameCost(this.#renderer.getContext());
     this.#scene = new three.Scene();
-    this.#scene.background = new three.Color(SKY);
     this.#camera = new three.PerspectiveCamera(60, 1, NEAR_M, FAR_M);
-    this.#camera.up.set(0, 0, 1);
     this.#camera.rotation.order = 'ZXY';
-    const sun = new three.DirectionalLight(0xffffff, 2);
-    sun.position.set(-0.4, -0.6, 1);
-    this.#scene.add(sun, new three.HemisphereLight(0xdfeaf5, 0x6f8a5a, 1.4));
-    store.on('scene', (scene) => this.#load(scene));
+    const bodies = new three.Group();
+    this.#scene.add(bodies);
+    this.#traffic = new Traffic(three, bodies, store);
+    this.#plans = new PlanRibbons(three, bodies, store);
+    this.mirrors = new Mirrors(three, software);
+    this.#ends = [store.on('scene', (scene) => this.#load(scene))];
     if (store.scene !== null) {
       this.#load(store.scene);
     }
+    this.store = store;
+  }
+
+  /** Least time from picture to picture [ms]. */
+  get period_ms() {
+    return this.#quality.period_ms;
+  }
+
+  /** @param {boolean} sharp whether all pixels of the screen are drawn, whatever that takes */
+  set sharp(sharp) {
+    if (sharp !== this.#quality.sharp) {
+      this.#quality.sharp = sharp;
+      this.resize(this.#size.width, this.#size.height);
+    }
+  }
+
+  /** Whether the graphics card took back what it had given. */
+  get lost() {
+    return this.#renderer.getContext().isContextLost();
+  }
+
+  /** The main camera, as it was when it drew last. */
+  get camera() {
+    return this.#camera;
+  }
+
+  /** Where the cameras' coordinates begin in the map. */
+  get origin() {
+    return this.#origin;
   }
 
   /**
@@ -55,39 +125,149 @@ export class Picture {
    * @param {number} height [CSS px]
    */
   resize(width, height) {
-    this.#renderer.setPixelRatio(window.devicePixelRatio);
+    this.#size = { width, height };
+    const { ratio } = this.#quality;
+    this.#renderer.setPixelRatio(ratio);
     this.#renderer.setSize(width, height, false);
-    this.#camera.aspect = width / height;
-    this.#camera.updateProjectionMatrix();
+    this.mirrors.resize(width, height, ratio);
+    Object.assign(this.stats, { width, height, ratio });
   }
 
   /**
    * Draw one picture.
    *
+   * @param {Shown} shown what is to be seen
    * @param {number} now_ms the animation frame's time
-   * @param {CameraPose} pose of the camera, in the map's coordinates
+   * @param {Looks} looks
+   * @returns {boolean} false while nothing can be seen
    */
-  draw(now_ms, { x, y, z, yaw, pitch }) {
+  draw(shown, now_ms, looks) {
+    const vehicle = this.#document?.vehicles[looks.index];
+    const road = this.#road;
+    if (vehicle === undefined || road === null || this.lost) {
+      return false;
+    }
+    const stand = standOf(shown, looks.index, vehicle, road.heightAt);
+    if (stand === null) {
+      return false;
+    }
     const begin_ms = performance.now();
-    const eye = { x: x - this.#origin.x, y: y - this.#origin.y, z };
-    this.#camera.position.set(eye.x, eye.y, eye.z);
-    // In 'ZXY' a camera, which looks down at rest, is first pitched and then turned.
-    this.#camera.rotation.set(Math.PI / 2 + pitch, 0, yaw - Math.PI / 2);
-    this.#road?.update(this.#store, now_ms, eye);
-    this.#renderer.render(this.#scene, this.#camera);
-    const { calls, triangles } = this.#renderer.info.render;
-    Object.assign(this.stats, { frames: this.stats.frames + 1, draw_calls: calls, triangles,
-      frame_ms: performance.now() - begin_ms });
+    const inside = looks.viewpoint === 'driver';
+    this.#renderer.info.reset();
+    this.#aimMain(stand, vehicle, looks);
+    const eye = this.#camera.position;
+    road.update(this.store, now_ms, { x: eye.x, y: eye.y, z: eye.z });
+    this.#traffic.byRole = !inside;
+    this.#traffic.update(shown, vehicle.id, road.heightAt, eye);
+    this.#plans.update(looks.plans, shown, this.#origin, road.heightAt);
+    const measures = this.#cost.begin();
+    // A processor that draws has a mirror for every other picture only.
+    if (inside && looks.mirrors && !(this.stats.software && this.stats.frames % 2 === 1)) {
+      this.#drawMirror(stand, vehicle);
+    }
+    this.#drawMain(stand, vehicle, inside);
+    if (inside && looks.mirrors) {
+      this.mirrors.drawOver(this.#renderer);
+    }
+    this.#note(shown.t, begin_ms, now_ms, measures);
+    return true;
+  }
+
+  /** Free everything; the canvas stays as it was drawn last. */
+  dispose() {
+    this.#ends.forEach((end) => end());
+    this.#traffic.dispose();
+    this.#plans.dispose();
+    this.#road?.dispose();
+    this.#renderer.dispose();
   }
 
   /**
-   * The height of the road at a point of the map.
-   *
-   * @param {number} x
-   * @param {number} y
+   * @param {Stand} stand
+   * @param {SceneVehicle} vehicle
+   * @param {Looks} looks
    */
-  heightAt(x, y) {
-    return this.#road?.heightAt(x, y) ?? 0;
+  #aimMain(stand, vehicle, { viewpoint, aside, height }) {
+    const [x, y, z] = vehicle.driver_place.eye;
+    const rear = vehicle.rear_to_center - 0.5 * vehicle.shape.length;
+    const pose = viewpoint === 'driver' ? mountedAt(stand, { x, y, z }, aside)
+      : viewpoint === 'chase' ? chasing(stand, { rear, front: rear + vehicle.shape.length }, aside)
+        : above(stand);
+    this.#camera.fov = height * 180 / Math.PI;
+    this.#camera.aspect = this.#size.width / this.#size.height;
+    this.#camera.updateProjectionMatrix();
+    this.#aim(this.#camera, pose);
+  }
+
+  /**
+   * @param {PerspectiveCamera} camera
+   * @param {CameraPose} pose
+   */
+  #aim(camera, { x, y, z, yaw, slope, aside, pitch }) {
+    camera.position.set(x - this.#origin.x, y - this.#origin.y, z);
+    const { Euler, Quaternion } = this.#three;
+    // A camera looks down at rest, with its upper edge to the north: pitched, then turned in the
+    // vehicle, which is turned itself.
+    camera.quaternion.setFromEuler(new Euler(0, -slope, yaw, 'ZYX')).multiply(
+      new Quaternion().setFromEuler(
+        new Euler(Math.PI / 2 + pitch, 0, aside - Math.PI / 2, 'ZXY')));
+    camera.updateMatrixWorld();
+  }
+
+  /**
+   * @param {Stand} stand
+   * @param {SceneVehicle} vehicle
+   */
+  #drawMirror(stand, vehicle) {
+    if (this.#cabin !== null) {
+      this.#cabin.mesh.visible = false;
+    }
+    this.#traffic.showOwn(true);
+    this.mirrors.fit(vehicle.driver_place, FAR_IN_MIRROR_M);
+    this.mirrors.drawNext(this.#renderer, this.#scene, (camera, { point, aside, pitch }) => {
+      this.#aim(camera, mountedAt(stand, point, aside, pitch));
+    });
+  }
+
+  /**
+   * @param {Stand} stand
+   * @param {SceneVehicle} vehicle
+   * @param {boolean} inside
+   */
+  #drawMain(stand, vehicle, inside) {
+    if (inside && this.#cabin?.vehicle !== vehicle) {
+      this.#cabin?.mesh.removeFromParent();
+      this.#cabin?.mesh.geometry.dispose();
+      const mesh = createCabin(this.#three, vehicle, this.#traffic.paintOf(vehicle.id));
+      this.#scene.add(mesh);
+      this.#cabin = { mesh, vehicle };
+    }
+    if (this.#cabin !== null) {
+      const { mesh } = this.#cabin;
+      mesh.visible = inside;
+      mesh.position.set(stand.x - this.#origin.x, stand.y - this.#origin.y, stand.z);
+      mesh.rotation.set(0, -stand.slope, stand.yaw, 'ZYX');
+    }
+    this.#traffic.showOwn(!inside);
+    this.#renderer.render(this.#scene, this.#camera);
+  }
+
+  /**
+   * @param {number} t
+   * @param {number} begin_ms
+   * @param {number} now_ms
+   * @param {boolean} measures
+   */
+  #note(t, begin_ms, now_ms, measures) {
+    const { calls, triangles } = this.#renderer.info.render;
+    Object.assign(this.stats, { frames: this.stats.frames + 1, t, draw_calls: calls, triangles,
+      frame_ms: performance.now() - begin_ms });
+    if (measures) {
+      this.stats.cost_ms = this.#cost.end();
+      if (this.#quality.take(this.stats.cost_ms, now_ms)) {
+        this.resize(this.#size.width, this.#size.height);
+      }
+    }
   }
 
   /** @param {Scene} scene */
@@ -96,8 +276,23 @@ export class Picture {
       this.#scene.remove(this.#road.group);
       this.#road.dispose();
     }
+    this.#document = scene;
     this.#origin = localOrigin(scene);
     this.#road = createRoadWorld(this.#three, scene);
     this.#scene.add(this.#road.group);
+    this.#scene.fog = this.#road.fog;
+    this.#traffic.load(scene, this.#origin, roleColor(this.#three));
   }
+}
+
+/** The name of what draws, as far as the browser tells. */
+function rendererName() {
+  const context = document.createElement('canvas').getContext('webgl2');
+  if (context === null) {
+    throw new Error('this browser has no WebGL 2');
+  }
+  const details = context.getExtension('WEBGL_debug_renderer_info');
+  const name = context.getParameter(details?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER);
+  context.getExtension('WEBGL_lose_context')?.loseContext();
+  return String(name);
 }

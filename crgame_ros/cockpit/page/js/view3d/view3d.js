@@ -1,36 +1,46 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The 3D view beside the map: its buttons and keys, and which of the two is drawn. */
+/** The 3D view beside the map: which of the two is drawn, from where, and when. */
 
 import { element } from '../dom.js';
-import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { isTyping } from '../driving/focus.js';
-import { press, toolButton } from '../world/toolbar.js';
-import { above, chasing, mountedAt, VIEWPOINTS } from './cameras.js';
+import { VIEWPOINTS } from './cameras.js';
+import { acrossAngle, heightAngle } from './field_of_view.js';
+import { SeatClock } from './seat_clock.js';
+import { createViewButtons } from './view_buttons.js';
+import { ViewSettings } from './view_settings.js';
+import { readViewWindow } from './view_window.js';
 
 /** @import { Store } from '../store.js' */
-/** @import { CameraPose, Viewpoint } from './cameras.js' */
-/** @import { Picture } from './picture.js' */
+/** @import { Looks, Picture } from './picture.js' */
 
-const ICONS = {
-  cube: 'M12 3l8 4.5v9L12 21l-8-4.5v-9zM12 12l8-4.5M12 12v9M12 12L4 7.5',
-  eye: 'M2 12s4-6 10-6s10 6 10 6s-4 6-10 6s-10-6-10-6M12 9.5a2.5 2.5 0 1 0 0 5a2.5 2.5 0 1 0 0-5',
-};
-const EYE = { x: 1.1, y: 0.35, z: 1.2 };
 const MISSING = 'The 3D view needs three.js, which the server does not have: '
   + '`crgame cockpit-3d` fetches it.';
+const LOST = 'The graphics card took the 3D view back: it returns when the card is free.';
+// While nothing moves, the mirrors are still drawn one after the other.
+const PICTURES_AFTER_CHANGE = 7;
+// Animation frames come as they come: one that is that early is in time [ms].
+const EARLY_MS = 4;
 
 /** The 3D view of a page. */
 export class View3d {
   /** @type {Picture|null} */
   picture = null;
-  /** @type {Viewpoint} */
-  viewpoint = 'driver';
+  settings;
+  /** What this window shows alone; null in a page with map and panels. */
+  window = readViewWindow(window.location.search);
+  #viewpoint = this.window?.viewpoint ?? VIEWPOINTS[0];
   #stage;
   #store;
-  #canvas = element('canvas', { id: 'view3d', 'aria-label': '3D view', hidden: true });
+  #clock;
+  #canvas = element('canvas', { id: 'view3d', role: 'img', 'aria-label': '3D view',
+    hidden: true });
   #buttons;
   #on = false;
+  #due = 0;
+  #drawn_ms = -Infinity;
+  #shown_t = NaN;
+  #wasLost = false;
 
   /**
    * @param {HTMLElement} stage
@@ -39,10 +49,22 @@ export class View3d {
   constructor(stage, store) {
     this.#stage = stage;
     this.#store = store;
+    this.#clock = new SeatClock(store, this.window !== null);
     stage.prepend(this.#canvas);
-    this.#buttons = this.#addButtons();
+    this.settings = new ViewSettings(() => this.redraw());
+    this.#buttons = createViewButtons(stage, this.settings, {
+      toggle: () => this.show(!this.#on),
+      choose: (viewpoint) => { this.viewpoint = viewpoint; },
+    });
     window.addEventListener('keydown', (event) => this.#pressed(event));
     new ResizeObserver(() => this.#resize()).observe(stage);
+    for (const name of /** @type {const} */ (['scene', 'epoch', 'plan', 'state', 'signals'])) {
+      store.on(name, () => this.redraw());
+    }
+    if (this.window !== null) {
+      document.documentElement.classList.add('view-window');
+      this.show(true);
+    }
   }
 
   /** Whether it is shown in place of the map. */
@@ -50,9 +72,28 @@ export class View3d {
     return this.#on;
   }
 
+  /** From where it looks. */
+  get viewpoint() {
+    return this.#viewpoint;
+  }
+
+  set viewpoint(viewpoint) {
+    this.#viewpoint = viewpoint;
+    this.redraw();
+  }
+
   /** What the last picture took; null before the view was first opened. */
   get stats() {
     return this.picture?.stats ?? null;
+  }
+
+  /** Id of the vehicle from which it looks, null for none. */
+  get vehicle() {
+    const { driving, world } = window.crgame;
+    const wanted = [this.window?.vehicle, this.#clock.vehicle, driving?.seat, world?.followed];
+    const vehicles = this.#store.scene?.vehicles ?? [];
+    return wanted.find((id) => vehicles.some((vehicle) => vehicle.id === id))
+      ?? vehicles[0]?.id ?? null;
   }
 
   /**
@@ -64,9 +105,7 @@ export class View3d {
   async show(on) {
     this.#on = on && await this.#load();
     this.#canvas.hidden = !this.#on;
-    this.#stage.classList.toggle('in-3d', this.#on);
-    press(this.#buttons.cube, this.#on);
-    this.#buttons.eye.hidden = !this.#on;
+    this.redraw();
     this.#resize();
     if (this.#on) {
       requestAnimationFrame((now_ms) => this.#animate(now_ms));
@@ -76,36 +115,46 @@ export class View3d {
 
   /** Look from the next viewpoint. */
   next() {
-    this.viewpoint = VIEWPOINTS[(VIEWPOINTS.indexOf(this.viewpoint) + 1) % VIEWPOINTS.length];
+    this.viewpoint = VIEWPOINTS[(VIEWPOINTS.indexOf(this.#viewpoint) + 1) % VIEWPOINTS.length];
+  }
+
+  /** Draw again though nothing has moved. */
+  redraw() {
+    this.#due = PICTURES_AFTER_CHANGE;
+    const { classList } = this.#stage;
+    const seen = { 'in-3d': this.#on, 'as-driver': this.#on && this.#viewpoint === 'driver',
+      'with-inset': this.#on && this.settings?.switches.inset };
+    for (const [name, on] of Object.entries(seen)) {
+      classList.toggle(name, Boolean(on));
+    }
+    this.#buttons?.update(this.#on, this.#viewpoint);
   }
 
   async #load() {
-    if (this.picture === null) {
-      try {
-        const three = await import('./three.js');
-        const { Picture } = await import('./picture.js');
-        this.picture = new Picture(three, this.#canvas, this.#store);
-      } catch (error) {
-        const missing = error instanceof TypeError;
-        this.#store.receive({ type: 'notice', level: 'warn',
-          text: missing ? MISSING : `The 3D view cannot be drawn: ${error}` });
-        return false;
-      }
+    if (this.picture !== null) {
+      return true;
     }
-    return true;
+    /** @type {typeof import('./three.js')} */
+    let three;
+    try {
+      three = await import('./three.js');
+    } catch {
+      this.#say(MISSING);
+      return false;
+    }
+    try {
+      const module = await import('./picture.js');
+      this.picture ??= new module.Picture(three, this.#canvas, this.#store);
+      return true;
+    } catch (error) {
+      this.#say(`The 3D view cannot be drawn: ${error instanceof Error ? error.message : error}`);
+      return false;
+    }
   }
 
-  #addButtons() {
-    const group = element('div', { class: 'world-group' });
-    const buttons = {
-      cube: toolButton(group, ICONS.cube, '3D view or map (V)', () => this.show(!this.#on)),
-      eye: toolButton(group, ICONS.eye, 'Next viewpoint: driver, chase, bird (C)',
-        () => this.next()),
-    };
-    buttons.eye.hidden = true;
-    press(buttons.cube, false);
-    this.#stage.querySelector('.world-toolbar')?.append(group);
-    return buttons;
+  /** @param {string} text */
+  #say(text) {
+    this.#store.receive({ type: 'notice', level: 'warn', text });
   }
 
   /** @param {KeyboardEvent} event */
@@ -123,43 +172,60 @@ export class View3d {
   }
 
   #resize() {
-    if (this.#on) {
+    if (this.#on && this.#stage.clientWidth > 0 && this.#stage.clientHeight > 0) {
       this.picture?.resize(this.#stage.clientWidth, this.#stage.clientHeight);
+      this.redraw();
     }
   }
 
   /** @param {number} now_ms */
   #animate(now_ms) {
-    if (!this.#on) {
+    if (!this.#on || this.picture === null) {
       return;
     }
     requestAnimationFrame((next_ms) => this.#animate(next_ms));
-    const pose = this.#pose(now_ms);
-    if (pose !== null) {
-      this.picture?.draw(now_ms, pose);
+    this.#tellLoss(this.picture);
+    this.#clock.follow(now_ms);
+    const shown = this.#store.displayed(now_ms);
+    if (shown === null || now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS
+        || (shown.t === this.#shown_t && this.#due === 0)) {
+      return;
+    }
+    const { vehicle } = this;
+    this.#clock.tell(now_ms, shown.t, vehicle);
+    this.picture.sharp = this.settings.switches.sharp;
+    if (this.picture.draw(shown, now_ms, this.#looks(vehicle))) {
+      this.#due = shown.t === this.#shown_t ? this.#due - 1 : PICTURES_AFTER_CHANGE;
+      this.#shown_t = shown.t;
+      this.#drawn_ms = now_ms;
     }
   }
 
   /**
-   * @param {number} now_ms
-   * @returns {CameraPose|null}
+   * @param {string|null} vehicle
+   * @returns {Looks}
    */
-  #pose(now_ms) {
-    const rows = this.#store.displayed(now_ms)?.vehicles;
-    const index = Math.max(
-      this.#store.vehicleIndex(window.crgame.driving?.seat ?? window.crgame.world.followed ?? ''),
-      0);
-    const row = index * VEHICLE_WIDTH;
-    const vehicle = this.#store.scene?.vehicles[index];
-    if (rows === undefined || vehicle === undefined || !Number.isFinite(rows[row])) {
-      return null;
-    }
-    const pose = { x: rows[row], y: rows[row + 1], yaw: rows[row + VEHICLE.yaw] };
-    const ground = this.picture?.heightAt(pose.x, pose.y) ?? 0;
-    switch (this.viewpoint) {
-      case 'chase': return chasing(pose, ground, vehicle.shape.length);
-      case 'bird': return above(pose, ground);
-      default: return mountedAt(pose, ground, EYE);
+  #looks(vehicle) {
+    const { clientWidth: width, clientHeight: height } = this.#stage;
+    const { seat, fieldOfView_deg, switches } = this.settings;
+    const across = acrossAngle(this.window?.fieldOfView_deg ? null : seat,
+      this.window?.fieldOfView_deg ?? fieldOfView_deg, width, window.screen.width);
+    return {
+      viewpoint: this.#viewpoint, index: this.#store.vehicleIndex(vehicle ?? ''),
+      aside: this.window?.aside ?? 0, height: heightAngle(across, width / height),
+      mirrors: switches.mirrors && this.window === null, plans: switches.plans,
+    };
+  }
+
+  /** @param {Picture} picture */
+  #tellLoss(picture) {
+    if (picture.lost !== this.#wasLost) {
+      this.#wasLost = picture.lost;
+      if (picture.lost) {
+        this.#say(LOST);
+      } else {
+        this.redraw();
+      }
     }
   }
 }

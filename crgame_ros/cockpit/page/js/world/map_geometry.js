@@ -4,6 +4,7 @@
 
 import { boxOf, outlineOf } from '../outline.js';
 import { collectBoundaries } from './boundaries.js';
+import { strokesOf } from './marking_strokes.js';
 import { addDashes, addLine, addPolygon, lengthOf, poseAlong, shifted } from './polyline.js';
 
 /** @import { Box, Lanelet, Scene } from '../messages.js' */
@@ -12,12 +13,13 @@ import { addDashes, addLine, addPolygon, lengthOf, poseAlong, shifted } from './
 const CELL_M = 120;
 const ARROW_EVERY_M = 32;
 const SHORTEST_FOR_ARROW_M = 9;
-const DOUBLE_LINE_M = 0.13;
 const ZEBRA_M = 0.5;
 
 /** Surfaces from the lowest to the highest, by what they are called in the palette. */
 export const SURFACES = /** @type {const} */ (['walk', 'parking', 'cycle', 'road', 'junction']);
 
+const PATH_OF_STROKE = /** @type {const} */ (
+  { line: 'lines', broad: 'broad', curb: 'curbs', lowered: 'curbs', seam: 'seams' });
 /** @type {Record<string, Surface|undefined>} */
 const SURFACE_OF_TYPE = {
   sidewalk: 'walk', crosswalk: 'junction', bicycleLane: 'cycle', parking: 'parking',
@@ -81,41 +83,56 @@ function emptyChunk(x, y) {
 }
 
 /**
+ * Tell what a lanelet is paved for.
+ *
+ * @param {Pick<Lanelet, 'types'|'intersection'>} lanelet
+ * @returns {Surface}
+ */
+export function surfaceOf({ types, intersection }) {
+  const special = types.find((type) => type in SURFACE_OF_TYPE);
+  return SURFACE_OF_TYPE[special ?? ''] ?? (intersection ? 'junction' : 'road');
+}
+
+/**
  * @param {Chunk} chunk
  * @param {Lanelet} lanelet
  * @param {number[]} outline
  */
 function addSurface(chunk, lanelet, outline) {
   const special = lanelet.types.find((type) => type in SURFACE_OF_TYPE);
-  const surface = SURFACE_OF_TYPE[special ?? ''] ?? (lanelet.intersection ? 'junction' : 'road');
+  const surface = surfaceOf(lanelet);
   const path = chunk.surfaces.get(surface) ?? new Path2D();
   chunk.surfaces.set(surface, path);
   addPolygon(path, outline, chunk.x, chunk.y);
   addPolygon(chunk.casing, outline, chunk.x, chunk.y);
   if (special === 'crosswalk') {
-    addZebra(chunk, lanelet);
+    for (const stripe of zebraStripes(lanelet)) {
+      addPolygon(chunk.zebras, stripe, chunk.x, chunk.y);
+    }
   } else if (special === undefined && lanelet.one_way && !lanelet.intersection) {
     addArrows(chunk, lanelet.center);
   }
 }
 
 /**
- * Stripes along the traffic that crosses, which is across the way of those who walk.
+ * Give the stripes of a crossing, along the traffic, which is across the way of those who walk.
  *
- * @param {Chunk} chunk
- * @param {Lanelet} lanelet
+ * @param {Pick<Lanelet, 'left'|'right'>} lanelet
+ * @returns {number[][]} flat polygons
  */
-function addZebra(chunk, lanelet) {
+export function zebraStripes(lanelet) {
   const length = Math.min(lengthOf(lanelet.left), lengthOf(lanelet.right));
+  const stripes = [];
   for (let s = ZEBRA_M / 2; s + ZEBRA_M < length; s += 2 * ZEBRA_M) {
     /** @type {[line: number[], at: number][]} */
     const corners = [[lanelet.left, s], [lanelet.left, s + ZEBRA_M],
       [lanelet.right, s + ZEBRA_M], [lanelet.right, s]];
-    addPolygon(chunk.zebras, corners.flatMap(([line, at]) => {
+    stripes.push(corners.flatMap(([line, at]) => {
       const { x, y } = poseAlong(line, at);
       return [x, y];
-    }), chunk.x, chunk.y);
+    }));
   }
+  return stripes;
 }
 
 /**
@@ -155,40 +172,14 @@ function addArrow(chunk, { x, y, yaw }) {
  * @param {Boundary} boundary
  * @param {Lanelet} lanelet
  */
-function addBoundary(chunk, { line, marking, inner }, lanelet) {
-  const { x, y } = chunk;
-  const [left, right] = marking.split('_');
-  switch (marking) {
-    case 'solid': addLine(chunk.lines, line, x, y); break;
-    case 'dashed': addDashes(chunk.lines, line, x, y, 3, 6); break;
-    case 'broad_solid': addLine(chunk.broad, line, x, y); break;
-    case 'broad_dashed': addDashes(chunk.broad, line, x, y, 3, 3); break;
-    case 'curb':
-    case 'lowered_curb': addLine(chunk.curbs, line, x, y); break;
-    case 'solid_solid':
-    case 'dashed_dashed':
-    case 'solid_dashed':
-    case 'dashed_solid':
-      addSingle(chunk, shifted(line, DOUBLE_LINE_M), left);
-      addSingle(chunk, shifted(line, -DOUBLE_LINE_M), right);
-      break;
-    default:
-      // Without a line, lanes side by side must still be told apart.
-      if (inner && !lanelet.intersection) {
-        addLine(chunk.seams, line, x, y);
-      }
-  }
-}
-
-/**
- * @param {Chunk} chunk
- * @param {number[]} line
- * @param {string} style
- */
-function addSingle(chunk, line, style) {
-  if (style === 'solid') {
-    addLine(chunk.lines, line, chunk.x, chunk.y);
-  } else {
-    addDashes(chunk.lines, line, chunk.x, chunk.y, 3, 6);
+function addBoundary(chunk, boundary, lanelet) {
+  for (const { kind, offset, dash } of strokesOf(boundary, lanelet)) {
+    const path = chunk[PATH_OF_STROKE[kind]];
+    const line = offset === 0 ? boundary.line : shifted(boundary.line, offset);
+    if (dash === null) {
+      addLine(path, line, chunk.x, chunk.y);
+    } else {
+      addDashes(path, line, chunk.x, chunk.y, ...dash);
+    }
   }
 }

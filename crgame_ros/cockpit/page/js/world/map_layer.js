@@ -241,7 +241,7 @@ const NO_DASH = [];
  * A path around the middle of its points.
  *
  * @param {number[]} points
- * @param {typeof addLine} add
+ * @param {typeof addPolygon} add
  * @returns {Local}
  */
 function local(points, add) {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Polylines as flat lists x0, y0, x1, y1, … [m], added to paths. */
 
+/** @typedef {Pick<Path2D, 'moveTo'|'lineTo'>} Lines what takes them in */
+
 /**
  * @param {number[]} line flat polyline
  * @returns {number} its length [m]
@@ -61,7 +63,7 @@ export function shifted(line, offset) {
 /**
  * Add a whole polyline to a path.
  *
- * @param {Path2D} path receives it
+ * @param {Lines} path receives it
  * @param {number[]} line flat polyline
  * @param {number} ox subtracted from x [m]
  * @param {number} oy subtracted from y [m]
@@ -76,7 +78,7 @@ export function addLine(path, line, ox, oy) {
 /**
  * Add the dashes of a polyline to a path, each by itself: cheaper than dashing at every frame.
  *
- * @param {Path2D} path receives them
+ * @param {Lines} path receives them
  * @param {number[]} line flat polyline
  * @param {number} ox subtracted from x [m]
  * @param {number} oy subtracted from y [m]

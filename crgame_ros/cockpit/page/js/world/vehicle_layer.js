@@ -4,10 +4,10 @@
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { shining } from '../lights.js';
+import { BrakeLights } from './brake_lights.js';
 import { drawOutline } from './hollow.js';
 import { lookOf, TYRE } from './vehicle_shape.js';
 
-/** @import { ObjectsFrame } from '../frames.js' */
 /** @import { Pose, Scene, SceneObject, SceneVehicle } from '../messages.js' */
 /** @import { Shown } from '../store.js' */
 /** @import { LiveView, View } from './painter.js' */
@@ -20,10 +20,6 @@ import { lookOf, TYRE } from './vehicle_shape.js';
 const LEAST_PX = { driven: 15, vulnerable: 14, other: 6 };
 // Below this length on the screen a thing is its body only [px].
 const DETAIL_PX = 13;
-const BRAKE_PEDAL = 0.02;
-// Without a known pedal: the deceleration by which brake lights go on [m/s^2].
-const BRAKE_DECELERATION = 0.7;
-const STANDING = 0.1;
 const TYRE_INSET_M = 0.2;
 const SHADOW_PX = 2;
 
@@ -48,9 +44,7 @@ export class VehicleLayer {
    * @type {ChooseHollow}
    */
   hollow = () => null;
-  #braking = new Uint8Array(0);
-  /** @type {Pick<ObjectsFrame, 'k'|'t'|'objects'>|null} */
-  #lastStep = null;
+  brakeLights = new BrakeLights();
 
   /** @param {Scene} scene the scene document */
   load(scene) {
@@ -62,26 +56,7 @@ export class VehicleLayer {
       ...object, look: lookOf(object.type, object.shape, object.role !== 'static'),
       color: colorOf(object),
     }));
-    this.#braking = new Uint8Array(this.objects.length);
-    this.#lastStep = null;
-  }
-
-  /**
-   * Learn from a scenario step which objects slow down.
-   *
-   * @param {Pick<ObjectsFrame, 'k'|'t'|'objects'>} step as the store got it
-   */
-  takeStep(step) {
-    const last = this.#lastStep;
-    this.#lastStep = step;
-    if (last === null || step.k <= last.k || last.objects.length !== step.objects.length) {
-      return;
-    }
-    for (let i = 0; i < this.#braking.length; i += 1) {
-      const speed = speedOf(step.objects, i);
-      const slower = (speedOf(last.objects, i) - speed) / (step.t - last.t);
-      this.#braking[i] = slower > BRAKE_DECELERATION && speed > STANDING ? 1 : 0;
-    }
+    this.brakeLights.load(this.objects.length);
   }
 
   /**
@@ -147,8 +122,8 @@ export class VehicleLayer {
         if (hollow?.[this.vehicles.length + i]) {
           drawOutline(context, view, object, x, y, shown.objects[row + 2], leastPx);
         } else {
-          drawLook(context, view, object, x, y, shown.objects[row + 2], this.#braking[i] === 1,
-            leastPx);
+          drawLook(context, view, object, x, y, shown.objects[row + 2],
+            this.brakeLights.ofObject(i), leastPx);
         }
       }
     }
@@ -175,8 +150,8 @@ export class VehicleLayer {
     }
     const factor = hollow
       ? drawOutline(context, view, vehicle, x, y, yaw, LEAST_PX.driven)
-      : drawLook(context, view, vehicle, x, y, yaw, brakes(shown.vehicles, row),
-        LEAST_PX.driven);
+      : drawLook(context, view, vehicle, x, y, yaw,
+        this.brakeLights.ofVehicle(shown.vehicles, row), LEAST_PX.driven);
     if (!hollow && vehicle.look.extent * camera.scale > 2 * DETAIL_PX) {
       drawTyres(context, view, vehicle, x, y, yaw,
         shown.vehicles[row + VEHICLE.steering_angle]);
@@ -297,20 +272,6 @@ function drawLights(context, { shown, palette }, { look }, lights) {
 }
 
 /**
- * @param {Float64Array} rows
- * @param {number} row
- */
-function brakes(rows, row) {
-  const pedal = rows[row + VEHICLE.brake];
-  if (!Number.isNaN(pedal)) {
-    return pedal > BRAKE_PEDAL;
-  }
-  const speed = rows[row + VEHICLE.speed];
-  return rows[row + VEHICLE.acceleration] * Math.sign(speed) < -BRAKE_DECELERATION
-    && Math.abs(speed) > STANDING;
-}
-
-/**
  * @param {SceneVehicle} vehicle
  * @param {Float64Array} rows
  * @param {number} index
@@ -324,14 +285,6 @@ function centerOf({ rear_to_center: ahead }, rows, index) {
       x: rows[row] + ahead * Math.cos(yaw), y: rows[row + 1] + ahead * Math.sin(yaw), yaw,
       speed: Math.abs(rows[row + VEHICLE.speed]),
     } : null;
-}
-
-/**
- * @param {Float64Array} rows
- * @param {number} index
- */
-function speedOf(rows, index) {
-  return Math.hypot(rows[index * OBJECT_WIDTH + 3], rows[index * OBJECT_WIDTH + 4]);
 }
 
 /**

@@ -106,14 +106,14 @@ function lamps(l, w) {
  * @param {number} width
  */
 function corners(length, width) {
-  // A little beyond the body, so that they are seen from afar.
+  // Half beyond the body, so that they are seen from afar and on a vehicle of any colour.
   const l = length / 2;
-  const deep = 0.36 * width / 2;
-  const along = 0.13 * length;
-  const at = [l - 1.3 * along, -l - 0.06];
+  const deep = 0.3 * width;
+  const along = 0.16 * length;
+  const at = [l - along, -l];
   /** @type {(y: number) => Path2D} */
   const side = (y) => boxes(at.map((x) => [x, y, along, deep]), 0.08);
-  return { left: side(width / 2 - 0.8 * deep), right: side(-width / 2 - 0.2 * deep) };
+  return { left: side(width / 2 - 0.4 * deep), right: side(-width / 2 - 0.6 * deep) };
 }
 
 /**

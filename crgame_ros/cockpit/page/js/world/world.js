@@ -234,7 +234,7 @@ export class World {
     }
     this.#ends.push(
       store.on('scene', (scene) => this.#load(scene)),
-      store.on('objects', (step) => this.#painter.vehicles.takeStep(step)),
+      store.on('objects', (step) => this.#painter.vehicles.brakeLights.takeStep(step)),
       store.on('hello', () => this.#sendLayers()),
       store.on('events', () => this.#painter.plans.takeEvents(store.scene, store.fired)),
       ...REDRAWN_ON.map((name) => store.on(name, () => this.redraw())));

@@ -1,12 +1,22 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The world in which the vehicles of the 3D view are: road and ground. */
+/** The world in which the vehicles of the 3D view are: roads and what stands at them, land, sky. */
 
-import { outlineOf } from '../../outline.js';
 import { localOrigin } from '../local_origin.js';
+import { Atmosphere } from './atmosphere.js';
+import { buildLand } from './land.js';
+import { geometryOf, grainTexture, paintedMaterial } from './materials.js';
+import { buildRoads } from './road_chunks.js';
+import { Obstacles } from './obstacles.js';
+import { placeLights, placeSigns } from './poles.js';
+import { RoadIndex } from './road_index.js';
+import { placeRoadside } from './roadside.js';
+import { Scenery } from './scenery.js';
+import { Signs } from './signs.js';
+import { TrafficLights } from './traffic_lights.js';
 
-/** @import { BufferGeometry, Group } from 'three' */
-/** @import { Scene } from '../../messages.js' */
+/** @import { FogExp2, Group, Object3D } from 'three' */
+/** @import { Environment, Scene } from '../../messages.js' */
 /** @import { Store } from '../../store.js' */
 
 /** @typedef {typeof import('../three.js')} Three the library, as three.js exports it */
@@ -14,19 +24,19 @@ import { localOrigin } from '../local_origin.js';
 
 /**
  * @typedef {object} RoadWorld
- * @property {Group} group what the scene of three.js gets: z up, metres from `localOrigin(scene)`
+ * @property {Group} group what the scene of three.js gets: z up, metres from `localOrigin(scene)`;
+ *   the lights are in it
+ * @property {FogExp2} fog of the scene of three.js
+ * @property {(environment: Environment) => void} setEnvironment shows another time of day or
+ *   visibility than the scene document's
  * @property {(store: Store, now_ms: number, eye: Point) => void} update called before each
  *   picture, after `store.displayed(now_ms)`; eye is that of the main camera
  * @property {(x: number, y: number) => number} heightAt of the road at a point of the map [m]
- * @property {number} triangles in the whole group
+ * @property {number} triangles in the whole group, at most
  * @property {number} drawCalls at most, when all of it is seen
+ * @property {number} build_ms what making it took
  * @property {() => void} dispose frees what the graphics card holds
  */
-
-const GROUND = 0x6f8a5a;
-const ROAD = 0x4a4e55;
-const GROUND_BELOW_M = 0.03;
-const MARGIN_M = 500;
 
 /**
  * Make the world of a scene.
@@ -36,54 +46,70 @@ const MARGIN_M = 500;
  * @returns {RoadWorld}
  */
 export function createRoadWorld(three, scene) {
+  const begin_ms = performance.now();
+  const origin = localOrigin(scene);
+  const index = new RoadIndex(scene.lanelets);
+  /** @type {(x: number, y: number) => number} */
+  const heightAt = (x, y) => index.heightAt(x, y);
   const group = new three.Group();
-  const road = new three.Mesh(roadGeometry(three, scene),
-    new three.MeshLambertMaterial({ color: ROAD }));
-  const [xmin, ymin, xmax, ymax] = scene.bounds;
-  const ground = new three.Mesh(
-    new three.PlaneGeometry(xmax - xmin + MARGIN_M, ymax - ymin + MARGIN_M),
-    new three.MeshLambertMaterial({ color: GROUND }));
-  ground.position.z = -GROUND_BELOW_M;
-  group.add(ground, road);
+  const atmosphere = new Atmosphere(three);
+  atmosphere.set(scene.environment);
+  const grain = grainTexture(three);
+  const material = paintedMaterial(three, grain);
+  const roads = buildRoads(scene, origin, index, heightAt, triangulator(three));
+  const land = buildLand(scene, origin);
+  const meshes = [land.parts, ...roads].map((parts) => {
+    const mesh = new three.Mesh(geometryOf(three, parts), material);
+    mesh.matrixAutoUpdate = false;
+    return mesh;
+  });
+  const painted = paintedMaterial(three, null);
+  const scenery = new Scenery(three, placeRoadside(scene, index), origin, land.heightAt, painted);
+  const signs = new Signs(three, placeSigns(scene, index), scene.country, origin, heightAt,
+    painted);
+  const lights = new TrafficLights(three, placeLights(scene, index), origin, heightAt, painted);
+  const obstacles = new Obstacles(three, origin, heightAt, painted);
+  const standing = [scenery, signs, lights];
+  /** @type {Object3D[]} */
+  const all = [...meshes, ...scenery.meshes, ...signs.meshes, ...lights.meshes,
+    obstacles.mesh];
+  group.add(atmosphere.group, ...all);
   return {
-    group, update() {}, heightAt: () => 0,
-    triangles: 2 + (road.geometry.index?.count ?? 0) / 3, drawCalls: 2,
+    group, fog: atmosphere.fog, heightAt,
+    setEnvironment: (environment) => atmosphere.set(environment),
+    update(store, _now_ms, eye) {
+      scenery.update(eye);
+      signs.update(eye);
+      lights.update(store.signals.states, eye);
+      obstacles.update(store.perceived.occupancy);
+    },
+    triangles: meshes.reduce((sum, { geometry }) => sum + (geometry.index?.count ?? 0) / 3,
+      standing.reduce((sum, part) => sum + part.triangles, atmosphere.triangles)),
+    drawCalls: all.length + 1,
+    build_ms: performance.now() - begin_ms,
     dispose() {
-      for (const mesh of [road, ground]) {
-        mesh.geometry.dispose();
-        mesh.material.dispose();
-      }
+      atmosphere.dispose();
+      standing.forEach((part) => part.dispose());
+      obstacles.dispose();
+      painted.dispose();
+      meshes.forEach(({ geometry }) => geometry.dispose());
+      material.dispose();
+      grain.dispose();
     },
   };
 }
 
 /**
  * @param {Three} three
- * @param {Scene} scene
- * @returns {BufferGeometry}
+ * @returns {(ring: number[]) => number[]} gives three indices for each triangle of a polygon
  */
-function roadGeometry(three, scene) {
-  const origin = localOrigin(scene);
-  /** @type {number[]} */
-  const positions = [];
-  /** @type {number[]} */
-  const indices = [];
-  for (const lanelet of scene.lanelets) {
-    const outline = outlineOf(lanelet);
-    const first = positions.length / 3;
+function triangulator(three) {
+  return (ring) => {
     const corners = [];
-    for (let i = 0; i < outline.length; i += 2) {
-      const corner = new three.Vector2(outline[i] - origin.x, outline[i + 1] - origin.y);
-      corners.push(corner);
-      positions.push(corner.x, corner.y, 0);
+    for (let i = 0; i < ring.length; i += 2) {
+      // From its first point: float32 does not matter here, but far coordinates cancel badly.
+      corners.push(new three.Vector2(ring[i] - ring[0], ring[i + 1] - ring[1]));
     }
-    for (const face of three.ShapeUtils.triangulateShape(corners, [])) {
-      indices.push(...face.map((index) => first + index));
-    }
-  }
-  const geometry = new three.BufferGeometry();
-  geometry.setAttribute('position', new three.Float32BufferAttribute(positions, 3));
-  geometry.setIndex(indices);
-  geometry.computeVertexNormals();
-  return geometry;
+    return three.ShapeUtils.triangulateShape(corners, []).flat();
+  };
 }

@@ -1,0 +1,191 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Triangles of a body, with the colour of each and normals that keep its edges. */
+
+/** @typedef {[x: number, y: number, z: number]} Point [m] */
+/**
+ * Share of the light given back, and whether it is in the vehicle's own colour: then a shade of
+ * that.
+ *
+ * @typedef {[red: number, green: number, blue: number, isPaint?: boolean]} Tint
+ */
+
+// Faces that meet at less than this look like one that is curved.
+const SMOOTH_BELOW = Math.cos((38 * Math.PI) / 180);
+const ROUNDED = 1000;
+
+/** Collects triangles; counter-clockwise ones are seen from outside. */
+export class MeshBuilder {
+  /** @type {number[]} */
+  #positions = [];
+  /** @type {number[]} */
+  #colors = [];
+  /** @type {boolean[]} */
+  #painted = [];
+
+  /** How many triangles there are. */
+  get triangles() {
+    return this.#positions.length / 9;
+  }
+
+  /**
+   * Add a flat polygon, convex and counter-clockwise from outside.
+   *
+   * @param {Point[]} corners
+   * @param {Tint} tint
+   * @returns {this}
+   */
+  polygon(corners, tint) {
+    const [red, green, blue, isPaint = false] = tint;
+    for (let i = 2; i < corners.length; i += 1) {
+      this.#painted.push(isPaint);
+      for (const corner of [corners[0], corners[i - 1], corners[i]]) {
+        this.#positions.push(...corner);
+        this.#colors.push(red, green, blue);
+      }
+    }
+    return this;
+  }
+
+  /**
+   * Add a box, which may be narrower at its top.
+   *
+   * @param {Point} low
+   * @param {Point} high
+   * @param {Tint} tint
+   * @param {{x?: number, y?: number}} [taper] how much narrower the top is, on each side [m]
+   * @returns {this}
+   */
+  box([x0, y0, z0], [x1, y1, z1], tint, { x = 0, y = 0 } = {}) {
+    /** @type {Point[]} */
+    const low = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]];
+    /** @type {Point[]} */
+    const high = [[x0 + x, y0 + y, z1], [x1 - x, y0 + y, z1], [x1 - x, y1 - y, z1],
+      [x0 + x, y1 - y, z1]];
+    this.polygon([...low].reverse(), tint).polygon(high, tint);
+    for (let i = 0; i < 4; i += 1) {
+      const next = (i + 1) % 4;
+      this.polygon([low[i], low[next], high[next], high[i]], tint);
+    }
+    return this;
+  }
+
+  /**
+   * Add a round body along an axis, with its ends.
+   *
+   * @param {Point} middle
+   * @param {'x'|'y'|'z'} axis
+   * @param {number} length along the axis [m]
+   * @param {number} radius [m]
+   * @param {Tint} tint of its side
+   * @param {Tint} [ends] of its ends
+   * @param {number} [count] of sides
+   * @returns {this}
+   */
+  cylinder(middle, axis, length, radius, tint, ends = tint, count = 14) {
+    /** @type {(angle: number, side: number) => Point} */
+    const at = (angle, side) => {
+      const u = radius * Math.cos(angle);
+      const v = radius * Math.sin(angle);
+      const along = side * 0.5 * length;
+      const [x, y, z] = axis === 'x' ? [along, u, v] : axis === 'y' ? [v, along, u] : [u, v, along];
+      return [middle[0] + x, middle[1] + y, middle[2] + z];
+    };
+    const angles = Array.from({ length: count }, (_, i) => (2 * Math.PI * i) / count);
+    this.polygon(angles.map((angle) => at(angle, 1)), ends);
+    this.polygon(angles.map((angle) => at(-angle, -1)), ends);
+    angles.forEach((angle, i) => {
+      const next = angles[(i + 1) % count];
+      this.polygon([at(angle, -1), at(next, -1), at(next, 1), at(angle, 1)], tint);
+    });
+    return this;
+  }
+
+  /**
+   * Add a skin over cross-sections, all of the same number of points.
+   *
+   * @param {Point[][]} sections from the back to the front, each from the right to the left
+   *   over the top
+   * @param {(section: number, strip: number) => Tint} tint of the strip between a section and the
+   *   next, and between a point and the next
+   * @returns {this}
+   */
+  skin(sections, tint) {
+    for (let i = 0; i + 1 < sections.length; i += 1) {
+      for (let j = 0; j + 1 < sections[i].length; j += 1) {
+        this.polygon([sections[i][j], sections[i + 1][j], sections[i + 1][j + 1],
+          sections[i][j + 1]], tint(i, j));
+      }
+    }
+    return this;
+  }
+
+  /**
+   * Give the triangles that are painted, or all others.
+   *
+   * @param {boolean} painted
+   * @returns {{positions: Float32Array, normals: Float32Array, colors: Float32Array}} of all
+   *   corners, flat, three numbers each
+   */
+  arrays(painted) {
+    /** @type {(values: ArrayLike<number>) => Float32Array} */
+    const chosen = (values) => new Float32Array(Array.prototype.filter.call(
+      values, (_, i) => this.#painted[Math.floor(i / 9)] === painted));
+    return {
+      positions: chosen(this.#positions), normals: chosen(smoothNormals(this.#positions)),
+      colors: chosen(this.#colors),
+    };
+  }
+}
+
+/**
+ * @param {number[]} positions
+ * @returns {Float32Array}
+ */
+function smoothNormals(positions) {
+  const faces = faceNormals(positions);
+  /** @type {Map<string, number[]>} */
+  const around = new Map();
+  /** @type {(corner: number) => string} */
+  const keyOf = (corner) => [0, 1, 2].map(
+    (axis) => Math.round(positions[3 * corner + axis] * ROUNDED)).join();
+  for (let corner = 0; 3 * corner < positions.length; corner += 1) {
+    const key = keyOf(corner);
+    const there = around.get(key) ?? [];
+    there.push(Math.floor(corner / 3));
+    around.set(key, there);
+  }
+  const normals = new Float32Array(positions.length);
+  for (let corner = 0; 3 * corner < positions.length; corner += 1) {
+    const own = faces[Math.floor(corner / 3)];
+    const sum = [0, 0, 0];
+    for (const face of around.get(keyOf(corner)) ?? []) {
+      const other = faces[face];
+      if (own.unit[0] * other.unit[0] + own.unit[1] * other.unit[1]
+          + own.unit[2] * other.unit[2] >= SMOOTH_BELOW) {
+        other.area.forEach((value, axis) => { sum[axis] += value; });
+      }
+    }
+    const length = Math.hypot(...sum) || 1;
+    normals.set(sum.map((value) => value / length), 3 * corner);
+  }
+  return normals;
+}
+
+/**
+ * @param {number[]} positions
+ * @returns {{area: number[], unit: number[]}[]} of each triangle, as long as twice its area, and
+ *   of length 1
+ */
+function faceNormals(positions) {
+  const faces = [];
+  for (let i = 0; i < positions.length; i += 9) {
+    const [ax, ay, az, bx, by, bz, cx, cy, cz] = positions.slice(i, i + 9);
+    const u = [bx - ax, by - ay, bz - az];
+    const v = [cx - ax, cy - ay, cz - az];
+    const area = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    const length = Math.hypot(...area) || 1;
+    faces.push({ area, unit: area.map((value) => value / length) });
+  }
+  return faces;
+}

@@ -1,0 +1,162 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What two-wheelers, people and things look like: x ahead, y left, z up, around their middle. */
+
+import { MeshBuilder } from './mesh_builder.js';
+
+/** @import { Body } from './motor_vehicles.js' */
+/** @import { Point, Tint } from './mesh_builder.js' */
+
+/** @type {Tint} */
+const PAINT = [1, 1, 1, true];
+/** @type {Tint} */
+const DARK = [0.06, 0.06, 0.07];
+/** @type {Tint} */
+const METAL = [0.45, 0.46, 0.48];
+/** @type {Tint} */
+const SKIN = [0.75, 0.55, 0.42];
+/** @type {Tint} */
+const CLOTH = [0.1, 0.13, 0.2];
+const SIDES = 10;
+
+/**
+ * A bicycle with its rider.
+ *
+ * @returns {Body}
+ */
+export function bicycle() {
+  const mesh = new MeshBuilder()
+    .box([-0.5, -0.02, 0.5], [0.45, 0.02, 0.56], METAL)
+    .box([-0.22, -0.02, 0.3], [-0.16, 0.02, 0.95], METAL)
+    .box([0.42, -0.02, 0.34], [0.47, 0.02, 1.02], METAL)
+    .box([0.38, -0.28, 0.99], [0.42, 0.28, 1.03], DARK)
+    .box([-0.33, -0.09, 0.92], [-0.07, 0.09, 0.99], DARK);
+  rider(mesh, -0.18, 0.96, 0.35);
+  return { mesh, length: 1.8, width: 0.6, height: 1.8, lamps: null,
+    wheels: { front: 0.52, rear: -0.52, track: 0.03, radius: 0.34, width: 0.04 } };
+}
+
+/**
+ * A motorcycle with its rider.
+ *
+ * @returns {Body}
+ */
+export function motorcycle() {
+  const mesh = new MeshBuilder()
+    .box([-0.55, -0.17, 0.42], [0.35, 0.17, 0.72], DARK, { x: 0.05, y: 0.03 })
+    .box([-0.05, -0.17, 0.7], [0.45, 0.17, 0.95], PAINT, { x: 0.12, y: 0.06 })
+    .box([-0.85, -0.15, 0.72], [-0.05, 0.15, 0.86], DARK, { x: 0.06, y: 0.03 })
+    .box([0.45, -0.2, 0.8], [0.7, 0.2, 1.12], PAINT, { x: 0.1, y: 0.07 })
+    .box([0.36, -0.36, 1.02], [0.42, 0.36, 1.07], DARK);
+  rider(mesh, -0.3, 0.86, 0.42);
+  return { mesh, length: 2.1, width: 0.8, height: 1.65,
+    wheels: { front: 0.7, rear: -0.68, track: 0.16, radius: 0.31, width: 0.16 },
+    lamps: { front: [0.7, 0.04, 0.93], rear: [-0.86, 0.05, 0.8], size: [0.1, 0.1] } };
+}
+
+/**
+ * Somebody on foot.
+ *
+ * @returns {Body}
+ */
+export function pedestrian() {
+  const mesh = new MeshBuilder();
+  for (const side of [-1, 1]) {
+    mesh.cylinder([0.04 * side, 0.1 * side, 0.42], 'z', 0.84, 0.085, CLOTH, CLOTH, SIDES)
+      .cylinder([-0.03 * side, 0.25 * side, 1.1], 'z', 0.6, 0.055, PAINT, PAINT, SIDES)
+      .box([-0.06 + 0.04 * side, 0.1 * side - 0.05, 0], [0.18 + 0.04 * side, 0.1 * side + 0.05,
+        0.08], DARK);
+  }
+  mesh.box([-0.12, -0.2, 0.82], [0.12, 0.2, 1.45], PAINT, { x: 0.02, y: 0.03 })
+    .cylinder([0, 0, 1.5], 'z', 0.14, 0.06, SKIN, SKIN, SIDES);
+  ball(mesh, [0.01, 0, 1.65], 0.125, SKIN);
+  return { mesh, length: 0.5, width: 0.6, height: 1.78, wheels: null, lamps: null };
+}
+
+/**
+ * A thing of which nothing but its outline is known.
+ *
+ * @param {number[]} vertices of its outline, flat, either way around [m]
+ * @param {number} height [m]
+ * @returns {Body}
+ */
+export function prism(vertices, height) {
+  /** @type {Point[]} */
+  const low = [];
+  let twiceArea = 0;
+  for (let i = 0; i < vertices.length; i += 2) {
+    const next = (i + 2) % vertices.length;
+    twiceArea += vertices[i] * vertices[next + 1] - vertices[next] * vertices[i + 1];
+    low.push([vertices[i], vertices[i + 1], 0]);
+  }
+  if (twiceArea < 0) {
+    low.reverse();
+  }
+  /** @type {Point[]} */
+  const high = low.map(([x, y]) => [x, y, height]);
+  const mesh = new MeshBuilder().polygon(high, PAINT);
+  low.forEach((corner, i) => {
+    const next = (i + 1) % low.length;
+    mesh.polygon([corner, low[next], high[next], high[i]], PAINT);
+  });
+  // Stripes all around, as on what closes a road.
+  const middle = 0.62 * height;
+  low.forEach(([x, y], i) => {
+    const [x1, y1] = low[(i + 1) % low.length];
+    mesh.polygon([[1.004 * x, 1.004 * y, middle], [1.004 * x1, 1.004 * y1, middle],
+      [1.004 * x1, 1.004 * y1, middle + 0.18 * height], [1.004 * x, 1.004 * y,
+        middle + 0.18 * height]], [0.95, 0.95, 0.95]);
+  });
+  const xs = vertices.filter((_, i) => i % 2 === 0);
+  const ys = vertices.filter((_, i) => i % 2 === 1);
+  return { mesh, length: Math.max(...xs) - Math.min(...xs),
+    width: Math.max(...ys) - Math.min(...ys), height, wheels: null, lamps: null };
+}
+
+/**
+ * @param {MeshBuilder} mesh
+ * @param {number} x of the seat [m]
+ * @param {number} z of the seat [m]
+ * @param {number} lean how far the shoulders are ahead [m]
+ */
+function rider(mesh, x, z, lean) {
+  /** @type {(at: number, half: number, height: number) => Point[]} */
+  const section = (at, half, height) => [[at + 0.1, -half, height], [at + 0.1, half, height],
+    [at - 0.1, half, height], [at - 0.1, -half, height]];
+  const hip = section(x, 0.16, z);
+  const chest = section(x + lean, 0.21, z + 0.52);
+  hip.forEach((corner, i) => {
+    const next = (i + 1) % 4;
+    mesh.polygon([corner, hip[next], chest[next], chest[i]], PAINT);
+  });
+  mesh.polygon(chest, PAINT);
+  for (const side of [-1, 1]) {
+    mesh.box([x - 0.05, side * 0.13 - 0.06, 0.35], [x + 0.35, side * 0.13 + 0.06, z + 0.06], CLOTH,
+      { x: 0.1, y: 0 })
+      .box([x + lean, side * 0.22 - 0.045, z + 0.1], [x + lean + 0.4, side * 0.22 + 0.045,
+        z + 0.26], PAINT);
+  }
+  ball(mesh, [x + lean + 0.06, 0, z + 0.72], 0.14, DARK);
+}
+
+/**
+ * @param {MeshBuilder} mesh
+ * @param {Point} middle
+ * @param {number} radius [m]
+ * @param {Tint} tint
+ */
+function ball(mesh, [x, y, z], radius, tint) {
+  const rings = 5;
+  /** @type {(ring: number, i: number) => Point} */
+  const at = (ring, i) => {
+    const up = -Math.PI / 2 + (Math.PI * ring) / rings;
+    const around = (2 * Math.PI * i) / SIDES;
+    return [x + radius * Math.cos(up) * Math.cos(around),
+      y + radius * Math.cos(up) * Math.sin(around), z + radius * Math.sin(up)];
+  };
+  for (let ring = 0; ring < rings; ring += 1) {
+    for (let i = 0; i < SIDES; i += 1) {
+      mesh.polygon([at(ring, i), at(ring, i + 1), at(ring + 1, i + 1), at(ring + 1, i)], tint);
+    }
+  }
+}

@@ -1,0 +1,70 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What a driver sees in a mirror: as a camera at the place where the mirror shows the eye. */
+
+/** @import { DriverPlace } from '../messages.js' */
+/** @import { Point } from './cameras.js' */
+
+const DEGREE = Math.PI / 180;
+
+/**
+ * A mirror of a vehicle, bent outwards as those at cars' sides are.
+ *
+ * @typedef {object} Mirror
+ * @property {'left'|'right'|'inner'} name
+ * @property {'left_mirror'|'right_mirror'|'inner_mirror'} mount its place in the scene document
+ * @property {number} width of its glass [m]
+ * @property {number} height [m]
+ * @property {number} radius of the sphere that it is part of; infinite for a flat one [m]
+ * @property {number} aside where its middle shows: to the left of straight back [rad]
+ * @property {number} pitch above the horizon [rad]
+ */
+
+/** @type {readonly Mirror[]} UN R46: at least 1.2 m for the outer mirrors of cars. */
+export const MIRRORS = Object.freeze([
+  { name: 'left', mount: 'left_mirror', width: 0.19, height: 0.13, radius: 1.4,
+    aside: -11 * DEGREE, pitch: -3 * DEGREE },
+  { name: 'inner', mount: 'inner_mirror', width: 0.24, height: 0.065, radius: Infinity,
+    aside: 0, pitch: -2 * DEGREE },
+  { name: 'right', mount: 'right_mirror', width: 0.19, height: 0.13, radius: 1.4,
+    aside: 9 * DEGREE, pitch: -3 * DEGREE },
+]);
+
+/**
+ * The camera of a mirror. What it sees is turned over, left to right, in the mirror.
+ *
+ * @typedef {object} MirrorCamera
+ * @property {Point} point ahead of the rear axle, to the left, above the road [m]
+ * @property {number} aside to the left of straight ahead [rad]
+ * @property {number} pitch above the horizon [rad]
+ * @property {number} height angle of the picture in height [rad]
+ * @property {number} aspect width of the picture through its height
+ * @property {number} near nothing nearer than the glass is seen [m]
+ */
+
+/**
+ * Give the camera of a mirror.
+ *
+ * The glass stands across the line on which the driver sees its middle. The eye at distance d has
+ * its image behind the glass at 1/d' = 1/d + 2/R (the mirror equation for a far eye, f = -R/2).
+ *
+ * @param {Mirror} mirror
+ * @param {DriverPlace} place eyes and mirrors of the vehicle
+ * @returns {MirrorCamera}
+ */
+export function mirrorCamera(mirror, place) {
+  const glass = place[mirror.mount];
+  const distance = Math.hypot(...glass.map((value, axis) => value - place.eye[axis]));
+  const behind = 1 / (1 / distance + 2 / mirror.radius);
+  const aside = Math.PI + mirror.aside;
+  const along = Math.cos(mirror.pitch);
+  return {
+    point: {
+      x: glass[0] - behind * along * Math.cos(aside),
+      y: glass[1] - behind * along * Math.sin(aside),
+      z: glass[2] - behind * Math.sin(mirror.pitch),
+    },
+    aside, pitch: mirror.pitch, near: behind,
+    height: 2 * Math.atan((0.5 * mirror.height) / behind), aspect: mirror.width / mirror.height,
+  };
+}

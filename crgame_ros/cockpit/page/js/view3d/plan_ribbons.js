@@ -1,0 +1,96 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The AVs' newest plans as ribbons on the road, when somebody asks for them. */
+
+import { PLAN_WIDTH } from '../frames.js';
+import { themeColor } from '../world/palette.js';
+
+/** @import { Group } from 'three' */
+/** @import { PlanFrame } from '../frames.js' */
+/** @import { Shown, Store } from '../store.js' */
+/** @import { Origin } from './local_origin.js' */
+/** @import { Three } from './road/road_world.js' */
+/** @import { HeightAt } from './traffic.js' */
+
+const HALF_WIDTH_M = 0.35;
+const ABOVE_M = 0.08;
+const OPACITY = 0.65;
+
+/** One mesh for all plans. */
+export class PlanRibbons {
+  #three;
+  #store;
+  #mesh;
+
+  /**
+   * @param {Three} three
+   * @param {Group} group
+   * @param {Store} store
+   */
+  constructor(three, group, store) {
+    this.#three = three;
+    this.#store = store;
+    this.#mesh = new three.Mesh(new three.BufferGeometry(), new three.MeshBasicMaterial({
+      color: themeColor('av'), transparent: true, opacity: OPACITY, depthWrite: false,
+      side: three.DoubleSide }));
+    this.#mesh.frustumCulled = false;
+    this.#mesh.visible = false;
+    this.#mesh.renderOrder = 6;
+    group.add(this.#mesh);
+  }
+
+  /**
+   * @param {boolean} on whether plans are shown
+   * @param {Shown} shown
+   * @param {Origin} origin
+   * @param {HeightAt} heightAt
+   */
+  update(on, shown, origin, heightAt) {
+    this.#mesh.visible = on;
+    if (!on) {
+      return;
+    }
+    /** @type {number[]} */
+    const positions = [];
+    for (const plan of this.#store.plans.values()) {
+      addRibbon(positions, plan, shown.t, origin, heightAt);
+    }
+    this.#mesh.visible = positions.length > 0;
+    this.#mesh.geometry.dispose();
+    this.#mesh.geometry = new this.#three.BufferGeometry();
+    this.#mesh.geometry.setAttribute('position',
+      new this.#three.Float32BufferAttribute(positions, 3));
+  }
+
+  /** Free what the graphics card holds. */
+  dispose() {
+    this.#mesh.geometry.dispose();
+    this.#mesh.material.dispose();
+  }
+}
+
+/**
+ * @param {number[]} positions
+ * @param {PlanFrame} plan
+ * @param {number} t simulation time that is shown; what of the plan is over is left out [s]
+ * @param {Origin} origin
+ * @param {HeightAt} heightAt
+ */
+function addRibbon(positions, { points, t: start_t }, t, origin, heightAt) {
+  /** @type {number[][]|null} */
+  let before = null;
+  for (let row = 0; row < points.length; row += PLAN_WIDTH) {
+    const [x, y, yaw, , after] = points.subarray(row, row + PLAN_WIDTH);
+    if (start_t + after >= t) {
+      const z = heightAt(x, y) + ABOVE_M;
+      const edge = [1, -1].map((side) => [
+        x - side * HALF_WIDTH_M * Math.sin(yaw) - origin.x,
+        y + side * HALF_WIDTH_M * Math.cos(yaw) - origin.y, z]);
+      if (before !== null) {
+        positions.push(...before[0], ...before[1], ...edge[0], ...edge[0], ...before[1],
+          ...edge[1]);
+      }
+      before = edge;
+    }
+  }
+}

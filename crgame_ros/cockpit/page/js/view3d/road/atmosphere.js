@@ -1,0 +1,127 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Light and air: the sky, the sun, and the fog in which everything fades. */
+
+import { extinction, fogAsAirDoes } from './fog.js';
+
+/** @import { Group } from 'three' */
+/** @import { Environment } from '../../messages.js' */
+/** @typedef {typeof import('../three.js')} Three */
+
+// The sky is seen through a layer of haze of this height [m].
+const HAZE_M = 250;
+
+/**
+ * How a time of day looks; colours as on the screen.
+ *
+ * @typedef {object} Daylight
+ * @property {number} zenith
+ * @property {number} horizon on a clear day
+ * @property {number} fog
+ * @property {number} sun
+ * @property {number} sun_light
+ * @property {[number, number, number]} sun_from
+ * @property {number} ground what it throws back
+ * @property {number} sky_light
+ */
+
+/** @type {Record<Environment['light'], Daylight>} */
+const LIGHTS = {
+  day: { zenith: 0x4f86c6, horizon: 0xc9dbe8, fog: 0xc4c9cb, sun: 0xfff4e0, sun_light: 1.9,
+    sun_from: [-0.45, -0.6, 0.75], ground: 0x9a9c88, sky_light: 2.0 },
+  dusk: { zenith: 0x34466e, horizon: 0xc9ab97, fog: 0x565b66, sun: 0xffa66a, sun_light: 0.5,
+    sun_from: [-0.9, 0.35, 0.09], ground: 0x4c4a48, sky_light: 0.95 },
+};
+
+const SKY_VERTEX = `
+varying vec3 vToward;
+void main() {
+  vToward = position;
+  // As far as can be, whatever the camera's place and range.
+  gl_Position = (projectionMatrix * mat4(mat3(viewMatrix)) * vec4(position, 1.0)).xyww;
+}`;
+const SKY_FRAGMENT = `
+uniform vec3 zenith, horizon, fogTone, sunTone, sunFrom;
+uniform float haze;
+varying vec3 vToward;
+void main() {
+  vec3 toward = normalize(vToward);
+  float up = max(toward.z, 0.0);
+  vec3 tone = mix(horizon, zenith, pow(up, 0.55));
+  float near = max(dot(toward, sunFrom), 0.0);
+  tone += sunTone * (0.16 * pow(near, 12.0) + 4.0 * smoothstep(0.99955, 0.9998, near));
+  tone = mix(fogTone, tone, exp(-haze / max(up, 0.004)));
+  gl_FragColor = vec4(tone, 1.0);
+  #include <tonemapping_fragment>
+  #include <colorspace_fragment>
+}`;
+
+/** The sky of a scene, its lights, and the fog for the scene of three.js. */
+export class Atmosphere {
+  /** @type {Group} */
+  group;
+  #three;
+  #sky;
+  #sun;
+  #ambient;
+
+  /** @param {Three} three the library */
+  constructor(three) {
+    fogAsAirDoes(three);
+    this.#three = three;
+    /** Every material that is drawn fades into it. */
+    this.fog = new three.FogExp2(0xffffff, 0);
+    this.group = new three.Group();
+    const color = () => ({ value: new three.Color() });
+    this.#sky = new three.Mesh(new three.IcosahedronGeometry(1, 3), new three.ShaderMaterial({
+      vertexShader: SKY_VERTEX, fragmentShader: SKY_FRAGMENT, side: three.BackSide,
+      depthWrite: false, uniforms: { zenith: color(), horizon: color(), fogTone: color(),
+        sunTone: color(), sunFrom: { value: new three.Vector3() }, haze: { value: 0 } } }));
+    this.#sky.frustumCulled = false;
+    // Behind all else: nothing that is hidden by roads is computed.
+    this.#sky.renderOrder = 1000;
+    this.#sun = new three.DirectionalLight();
+    this.#ambient = new three.HemisphereLight();
+    this.group.add(this.#sky, this.#sun, this.#sun.target, this.#ambient);
+  }
+
+  get triangles() {
+    return this.#sky.geometry.attributes.position.count / 3;
+  }
+
+  /**
+   * Show a time of day and a visibility.
+   *
+   * @param {Environment} environment
+   */
+  set({ light, visibility }) {
+    const { Color } = this.#three;
+    const look = LIGHTS[light];
+    const haze = extinction(visibility) * HAZE_M;
+    const clear = Math.exp(-4 * haze);
+    const fog = new Color(look.fog).lerp(new Color(look.horizon), clear);
+    const { uniforms } = this.#sky.material;
+    uniforms.zenith.value.set(look.zenith);
+    uniforms.horizon.value.set(look.horizon);
+    uniforms.sunTone.value.set(look.sun);
+    uniforms.sunFrom.value.set(...look.sun_from).normalize();
+    uniforms.fogTone.value.copy(fog);
+    uniforms.haze.value = haze;
+    this.fog.color.copy(fog);
+    this.fog.density = extinction(visibility);
+    this.#sun.color.set(look.sun);
+    this.#sun.position.set(...look.sun_from);
+    // What fog takes from the sun comes from everywhere.
+    this.#sun.intensity = look.sun_light * clear;
+    this.#ambient.color.set(0xffffff).lerp(new Color(look.zenith), 0.18);
+    this.#ambient.groundColor.set(look.ground);
+    this.#ambient.intensity = look.sky_light + 0.4 * look.sun_light * (1 - clear);
+  }
+
+  /** Free what the graphics card holds. */
+  dispose() {
+    this.#sky.geometry.dispose();
+    this.#sky.material.dispose();
+    this.#sun.dispose();
+  }
+}

@@ -1,0 +1,137 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The land in which the roads lie: flat, or below every road of a map with heights. */
+
+import { MeshParts } from './mesh_parts.js';
+import { randomFrom } from './random.js';
+
+/** @import { Scene } from '../../messages.js' */
+/** @import { Origin } from '../local_origin.js' */
+/** @import { Heights, Rgb } from './mesh_parts.js' */
+
+// Beyond the map the land goes on for so long [m].
+const MARGIN_M = 1200;
+const MOST_CELLS = 72;
+const LEAST_CELL_M = 15;
+const BELOW_M = 0.04;
+// Below roads on hills, which the land's triangles follow by halves only [m].
+const UNDER_HILLS_M = 0.4;
+/** @type {Rgb} */
+const MEADOW = [104, 124, 78];
+/** @type {Rgb} */
+const FIELD = [140, 138, 94];
+// Under everything else that is flat.
+const RANK = -2;
+
+/**
+ * Build the land of a scene.
+ *
+ * @param {Scene} scene the scene document
+ * @param {Origin} origin
+ * @returns {{parts: MeshParts, heightAt: Heights}} the latter of points within it, [m]
+ */
+export function buildLand(scene, origin) {
+  const [xmin, ymin, xmax, ymax] = scene.bounds;
+  const size = Math.max(xmax - xmin, ymax - ymin) + 2 * MARGIN_M;
+  const cell = Math.max(size / MOST_CELLS, LEAST_CELL_M);
+  const count = Math.ceil(size / cell);
+  const x0 = (xmin + xmax - count * cell) / 2;
+  const y0 = (ymin + ymax - count * cell) / 2;
+  const heights = landHeights(scene, x0, y0, cell, count);
+  const random = randomFrom(scene.id);
+  const parts = new MeshParts(origin);
+  for (let row = 0; row <= count; row += 1) {
+    for (let column = 0; column <= count; column += 1) {
+      const share = random();
+      const color = /** @type {Rgb} */ (MEADOW.map(
+        (value, i) => value + 0.55 * share * (FIELD[i] - value)));
+      parts.vertex(x0 + column * cell, y0 + row * cell,
+        heights === null ? -BELOW_M : heights[row * (count + 1) + column], color, RANK);
+      if (row > 0 && column > 0) {
+        const last = row * (count + 1) + column;
+        const below = last - count - 1;
+        parts.indices.push(below - 1, below, last, below - 1, last, last - 1);
+      }
+    }
+  }
+  return { parts, heightAt: (x, y) => {
+    const column = Math.min(Math.max(Math.round((x - x0) / cell), 0), count);
+    const row = Math.min(Math.max(Math.round((y - y0) / cell), 0), count);
+    return heights === null ? 0 : heights[row * (count + 1) + column];
+  } };
+}
+
+/**
+ * Let the land lie under the roads: each corner under the lowest one of the cells around it, and
+ * where there is none as high as the corners around it.
+ *
+ * @param {Scene} scene
+ * @param {number} x0
+ * @param {number} y0
+ * @param {number} cell [m]
+ * @param {number} count of cells along an edge
+ * @returns {Float64Array|null} by row and column [m]; null for a flat map
+ */
+function landHeights(scene, x0, y0, cell, count) {
+  const width = count + 1;
+  const lowest = new Float64Array(width * width).fill(Infinity);
+  for (const { left, right, left_z, right_z } of scene.lanelets) {
+    for (const [line, heights] of /** @type {const} */ ([[left, left_z], [right, right_z]])) {
+      if (!heights) {
+        continue;
+      }
+      for (let i = 0; i + 3 < line.length; i += 2) {
+        const steps = Math.ceil(Math.hypot(line[i + 2] - line[i], line[i + 3] - line[i + 1])
+          / cell) + 1;
+        for (let k = 0; k <= steps; k += 1) {
+          const share = k / steps;
+          const column = Math.floor((line[i] + share * (line[i + 2] - line[i]) - x0) / cell);
+          const row = Math.floor((line[i + 1] + share * (line[i + 3] - line[i + 1]) - y0) / cell);
+          lower(lowest, width, row, column,
+            heights[i / 2] + share * (heights[i / 2 + 1] - heights[i / 2]) - UNDER_HILLS_M);
+        }
+      }
+    }
+  }
+  return lowest.every((height) => height === Infinity) ? null : spread(lowest, width);
+}
+
+/**
+ * @param {Float64Array} lowest
+ * @param {number} width
+ * @param {number} row
+ * @param {number} column
+ * @param {number} height
+ */
+function lower(lowest, width, row, column, height) {
+  for (let r = Math.max(row - 1, 0); r <= Math.min(row + 2, width - 1); r += 1) {
+    for (let c = Math.max(column - 1, 0); c <= Math.min(column + 2, width - 1); c += 1) {
+      lowest[r * width + c] = Math.min(lowest[r * width + c], height);
+    }
+  }
+}
+
+/**
+ * Fill what is unknown from its neighbours, ring by ring.
+ *
+ * @param {Float64Array} heights Infinity where unknown
+ * @param {number} width
+ * @returns {Float64Array}
+ */
+function spread(heights, width) {
+  let unknown = [...heights.keys()].filter((i) => heights[i] === Infinity);
+  while (unknown.length > 0) {
+    const known = heights.slice();
+    unknown = unknown.filter((i) => {
+      const column = i % width;
+      const around = [i - width, i + width, column > 0 ? i - 1 : -1,
+        column < width - 1 ? i + 1 : -1].filter((j) => known[j] !== undefined
+          && known[j] !== Infinity);
+      if (around.length > 0) {
+        heights[i] = around.reduce((sum, j) => sum + known[j], 0) / around.length;
+      }
+      return around.length === 0;
+    });
+  }
+  return heights;
+}

@@ -1,0 +1,115 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Triangles gathered to be drawn at once: positions, normals, colours and ranks. */
+
+/** @typedef {[red: number, green: number, blue: number]} Rgb 0 to 255, as in sRGB */
+/** @typedef {(x: number, y: number) => number} Heights the height at a point of the map [m] */
+
+/** @type {readonly [number, number, number]} */
+const UP = [0, 0, 1];
+
+/** Gathers triangles; points are given in the map's coordinates, kept from the origin. */
+export class MeshParts {
+  /** @type {number[]} x, y, z from the origin [m] */
+  positions = [];
+  /** @type {number[]} */
+  normals = [];
+  /** @type {number[]} 0 to 255 */
+  colors = [];
+  /** @type {number[]} by vertex: of flat things at one height the highest rank is on top */
+  ranks = [];
+  /** @type {number[]} */
+  indices = [];
+
+  /** @param {{x: number, y: number}} origin */
+  constructor(origin) {
+    this.origin = origin;
+  }
+
+  get triangles() {
+    return this.indices.length / 3;
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   * @param {number} z
+   * @param {Rgb} color
+   * @param {number} rank
+   * @param {readonly [number, number, number]} [normal]
+   * @returns {number} index of the vertex
+   */
+  vertex(x, y, z, color, rank, normal = UP) {
+    this.positions.push(x - this.origin.x, y - this.origin.y, z);
+    this.normals.push(...normal);
+    this.colors.push(...color);
+    this.ranks.push(rank);
+    return this.ranks.length - 1;
+  }
+
+  /**
+   * Add the strip between two lines with as many points each.
+   *
+   * @param {number[]} left flat polyline
+   * @param {number[]} right flat polyline
+   * @param {Heights} heights
+   * @param {Rgb} color
+   * @param {number} rank
+   */
+  addStrip(left, right, heights, color, rank) {
+    for (let i = 0; i < left.length; i += 2) {
+      this.vertex(left[i], left[i + 1], heights(left[i], left[i + 1]), color, rank);
+      const last = this.vertex(right[i], right[i + 1], heights(right[i], right[i + 1]), color,
+        rank);
+      if (i > 0) {
+        this.indices.push(last - 3, last - 2, last - 1, last - 1, last - 2, last);
+      }
+    }
+  }
+
+  /**
+   * Add a polygon, to be seen from above.
+   *
+   * @param {number[]} ring flat polygon
+   * @param {ArrayLike<number>} faces three indices of its points for each triangle
+   * @param {Heights} heights
+   * @param {Rgb} color
+   * @param {number} rank
+   */
+  addFaces(ring, faces, heights, color, rank) {
+    const first = this.ranks.length;
+    for (let i = 0; i < ring.length; i += 2) {
+      this.vertex(ring[i], ring[i + 1], heights(ring[i], ring[i + 1]), color, rank);
+    }
+    for (let i = 0; i + 2 < faces.length; i += 3) {
+      const [a, b, c] = [2 * faces[i], 2 * faces[i + 1], 2 * faces[i + 2]];
+      const turn = (ring[b] - ring[a]) * (ring[c + 1] - ring[a + 1])
+        - (ring[b + 1] - ring[a + 1]) * (ring[c] - ring[a]);
+      // Faces are seen from where they go round counterclockwise: from above.
+      const [second, third] = turn > 0 ? [b, c] : [c, b];
+      this.indices.push(first + a / 2, first + second / 2, first + third / 2);
+    }
+  }
+
+  /**
+   * Add an upright band along a line: the side of a kerb, or of an embankment.
+   *
+   * @param {number[]} line flat polyline; it is seen from its right
+   * @param {Heights} bottom
+   * @param {Heights} top
+   * @param {Rgb} color
+   */
+  addWall(line, bottom, top, color) {
+    for (let i = 0; i + 3 < line.length; i += 2) {
+      const [x0, y0, x1, y1] = line.slice(i, i + 4);
+      const length = Math.hypot(x1 - x0, y1 - y0) || 1;
+      /** @type {[number, number, number]} */
+      const normal = [(y1 - y0) / length, (x0 - x1) / length, 0];
+      const first = this.vertex(x0, y0, bottom(x0, y0), color, 0, normal);
+      this.vertex(x1, y1, bottom(x1, y1), color, 0, normal);
+      this.vertex(x1, y1, top(x1, y1), color, 0, normal);
+      this.vertex(x0, y0, top(x0, y0), color, 0, normal);
+      this.indices.push(first, first + 1, first + 2, first, first + 2, first + 3);
+    }
+  }
+}

@@ -1,0 +1,119 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Things that there are hundreds of, drawn at once: always those that are nearest to the eye. */
+
+/** @import { BufferGeometry, InstancedMesh, Material } from 'three' */
+/** @typedef {typeof import('../three.js')} Three */
+
+const CELL_M = 100;
+// The eye may go so far until those around it are looked for again [m].
+const MOVED_M = 40;
+
+/**
+ * @typedef {object} Instance from the local origin
+ * @property {number} x
+ * @property {number} y
+ * @property {number} z of its foot [m]
+ * @property {number} yaw [rad]
+ * @property {[number, number, number]} size what its unit shape is stretched by
+ * @property {number} color as on the screen; multiplies the shape's own
+ */
+
+/** Draws instances of one shape in one call. */
+export class NearInstances {
+  /** @type {InstancedMesh} */
+  mesh;
+  /** @type {Map<string, Instance[]>} */
+  #cells = new Map();
+  #three;
+  #reach;
+  #most;
+  #at = { x: Infinity, y: Infinity };
+
+  /**
+   * @param {Three} three
+   * @param {BufferGeometry} shape of which every instance is one
+   * @param {Material} material
+   * @param {Instance[]} instances
+   * @param {number} most are drawn at a time
+   * @param {number} reach within which they are drawn [m]
+   */
+  constructor(three, shape, material, instances, most, reach) {
+    this.#three = three;
+    this.#reach = reach;
+    this.#most = Math.min(most, instances.length);
+    this.mesh = new three.InstancedMesh(shape, material, Math.max(this.#most, 1));
+    this.mesh.count = 0;
+    // Its bounds would be those of instances that come and go.
+    this.mesh.frustumCulled = false;
+    for (const instance of instances) {
+      const key = `${Math.floor(instance.x / CELL_M)} ${Math.floor(instance.y / CELL_M)}`;
+      const cell = this.#cells.get(key) ?? [];
+      this.#cells.set(key, cell);
+      cell.push(instance);
+    }
+  }
+
+  /** Triangles when as many as can be are drawn. */
+  get triangles() {
+    const { index, attributes } = this.mesh.geometry;
+    return this.#most * (index?.count ?? attributes.position.count) / 3;
+  }
+
+  /**
+   * Draw those around the eye.
+   *
+   * @param {{x: number, y: number}} eye
+   */
+  update({ x, y }) {
+    if (Math.hypot(x - this.#at.x, y - this.#at.y) < MOVED_M) {
+      return;
+    }
+    this.#at = { x, y };
+    const near = this.#near(x, y);
+    const { Color, Matrix4, Quaternion, Vector3 } = this.#three;
+    const [matrix, turn, up, color] = [new Matrix4(), new Quaternion(), new Vector3(0, 0, 1),
+      new Color()];
+    near.forEach((instance, i) => {
+      turn.setFromAxisAngle(up, instance.yaw);
+      matrix.compose(new Vector3(instance.x, instance.y, instance.z), turn,
+        new Vector3(...instance.size));
+      this.mesh.setMatrixAt(i, matrix);
+      this.mesh.setColorAt(i, color.set(instance.color));
+    });
+    this.mesh.count = near.length;
+    this.mesh.instanceMatrix.needsUpdate = true;
+    if (this.mesh.instanceColor !== null) {
+      this.mesh.instanceColor.needsUpdate = true;
+    }
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   * @returns {Instance[]} the nearest ones
+   */
+  #near(x, y) {
+    const found = [];
+    const cells = Math.ceil(this.#reach / CELL_M);
+    const [column, row] = [Math.floor(x / CELL_M), Math.floor(y / CELL_M)];
+    for (let c = column - cells; c <= column + cells; c += 1) {
+      for (let r = row - cells; r <= row + cells; r += 1) {
+        for (const instance of this.#cells.get(`${c} ${r}`) ?? []) {
+          const distance = Math.hypot(instance.x - x, instance.y - y);
+          if (distance < this.#reach) {
+            found.push({ instance, distance });
+          }
+        }
+      }
+    }
+    return found.sort((a, b) => a.distance - b.distance).slice(0, this.#most)
+      .map(({ instance }) => instance);
+  }
+
+  /** Free what the graphics card holds, but for the material. */
+  dispose() {
+    this.mesh.geometry.dispose();
+    this.mesh.dispose();
+  }
+}

@@ -1,0 +1,122 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Permanent obstacles as low walls: the occupied cells of the map around the vehicles. */
+
+import { MeshParts } from './mesh_parts.js';
+import { geometryOf } from './materials.js';
+import { addBox } from './scenery_shapes.js';
+
+/** @import { Material } from 'three' */
+/** @import { OccupancyFrame } from '../../frames.js' */
+/** @import { Origin } from '../local_origin.js' */
+/** @import { Heights, Rgb } from './mesh_parts.js' */
+/** @typedef {typeof import('../three.js')} Three */
+
+/** @typedef {{row: number, rows: number, column: number, columns: number}} Block of cells */
+
+// Nobody says how high they are: as kerbs and fences that one looks over [m].
+const HEIGHT_M = 0.35;
+/** @type {Rgb} */
+const COLOR = [150, 146, 140];
+// More blocks than this are not drawn: noise, which no map of walls is.
+const MOST_BLOCKS = 6000;
+
+/** Draws the newest map of obstacles. */
+export class Obstacles {
+  #three;
+  #origin;
+  #heights;
+  /** @type {OccupancyFrame|null} */
+  #map = null;
+
+  /**
+   * @param {Three} three the library
+   * @param {Origin} origin
+   * @param {Heights} heights
+   * @param {Material} painted
+   */
+  constructor(three, origin, heights, painted) {
+    this.#three = three;
+    this.#origin = origin;
+    this.#heights = heights;
+    this.mesh = new three.Mesh(new three.BufferGeometry(), painted);
+    this.mesh.visible = false;
+  }
+
+  /** @param {OccupancyFrame|null} map as the store has it */
+  update(map) {
+    if (map === this.#map) {
+      return;
+    }
+    this.#map = map;
+    this.mesh.geometry.dispose();
+    const blocks = map === null ? [] : blocksOf(map);
+    this.mesh.visible = blocks.length > 0;
+    if (map !== null && this.mesh.visible) {
+      this.mesh.geometry = this.#geometry(map, blocks);
+    }
+  }
+
+  /**
+   * @param {OccupancyFrame} map
+   * @param {Block[]} blocks
+   */
+  #geometry({ x, y, resolution }, blocks) {
+    const parts = new MeshParts(this.#origin);
+    for (const { row, rows, column, columns } of blocks) {
+      const [x0, y0] = [x + column * resolution, y + row * resolution];
+      const [x1, y1] = [x0 + columns * resolution, y0 + rows * resolution];
+      const ground = this.#heights((x0 + x1) / 2, (y0 + y1) / 2);
+      addBox(parts, [x0, y0, ground - 0.1], [x1, y1, ground + HEIGHT_M], COLOR);
+    }
+    return geometryOf(this.#three, parts);
+  }
+
+  /** Free what the graphics card holds, but for the material. */
+  dispose() {
+    this.mesh.geometry.dispose();
+  }
+}
+
+/**
+ * Join the occupied cells to blocks: along rows, and rows that are alike.
+ *
+ * @param {Pick<OccupancyFrame, 'rows'|'columns'|'bits'>} map
+ * @returns {Block[]} that hold each occupied cell once, MOST_BLOCKS at most
+ */
+export function blocksOf({ rows, columns, bits }) {
+  /** @type {Block[]} */
+  const blocks = [];
+  /** @type {Map<number, Block>} those that may go on, by their columns */
+  let open = new Map();
+  for (let row = 0; row < rows && blocks.length < MOST_BLOCKS; row += 1) {
+    /** @type {Map<number, Block>} */
+    const next = new Map();
+    for (let column = 0; column < columns; column += 1) {
+      const start = column;
+      while (column < columns && isOccupied(bits, row * columns + column)) {
+        column += 1;
+      }
+      if (column > start) {
+        const key = start * (columns + 1) + column;
+        const above = open.get(key);
+        const block = above ?? { row, rows: 0, column: start, columns: column - start };
+        block.rows += 1;
+        next.set(key, block);
+        if (above === undefined) {
+          blocks.push(block);
+        }
+      }
+    }
+    open = next;
+  }
+  return blocks.slice(0, MOST_BLOCKS);
+}
+
+/**
+ * @param {Uint8Array} bits
+ * @param {number} cell
+ */
+function isOccupied(bits, cell) {
+  return (bits[cell >> 3] >> (cell & 7) & 1) === 1;
+}

@@ -1,0 +1,158 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Where signs and traffic lights stand: at their places, but never on a lane. */
+
+/** @import { Lanelet, Light, Scene, Sign } from '../../messages.js' */
+/** @import { RoadIndex } from './road_index.js' */
+
+/**
+ * A pole with what is on it, for who drives the way `yaw`.
+ *
+ * @typedef {object} Pole
+ * @property {number} x
+ * @property {number} y
+ * @property {number} yaw [rad]
+ * @property {boolean} hangs above the road, where there is no room beside it
+ */
+
+/** @typedef {Pole & {plates: {kind: string, value: string}[]}} SignPole */
+/** @typedef {Pole & {light: Light}} LightPole */
+
+// Room around a pole, and how far from its place it may be put [m].
+const ROOM_M = 0.45;
+const FARTHEST_M = 14;
+const STEP_M = 0.25;
+// Nearer than this the same sign is not put up twice, for the same way [m].
+const SAME_SIGN_M = 15;
+const LIGHTS_APART_M = 0.7;
+
+/**
+ * Find a place for a pole: where the map has it, or else to the right of its readers, or the left.
+ *
+ * @param {{x: number, y: number, yaw: number}} wanted
+ * @param {RoadIndex} index
+ * @returns {Pole}
+ */
+export function poleAt({ x, y, yaw }, index) {
+  const right = { x: Math.sin(yaw), y: -Math.cos(yaw) };
+  for (const side of [1, -1]) {
+    for (let aside = 0; aside <= FARTHEST_M; aside += STEP_M) {
+      const place = { x: x + side * aside * right.x, y: y + side * aside * right.y };
+      if (index.isClear(place.x, place.y, ROOM_M)) {
+        return { ...place, yaw, hangs: false };
+      }
+    }
+  }
+  return { x, y, yaw, hangs: true };
+}
+
+/**
+ * Place the signs of a scene.
+ *
+ * What the map says of each lanelet alone, as of most limits, one plate says to all lanes, where
+ * it begins to hold.
+ *
+ * @param {Pick<Scene, 'signs'|'lanelets'>} scene the scene document
+ * @param {RoadIndex} index of its lanelets
+ * @returns {SignPole[]}
+ */
+export function placeSigns({ signs, lanelets }, index) {
+  const told = new ToldBefore(signs, lanelets);
+  /** @type {Map<number, SignPole>} */
+  const poles = new Map();
+  /** @type {SignPole[]} */
+  const placed = [];
+  for (const sign of signs) {
+    const plate = { kind: sign.kind, value: sign.value };
+    const pole = poles.get(sign.id);
+    if (pole !== undefined) {
+      pole.plates.push(plate);
+    } else if (!sign.virtual || !told.has(sign)) {
+      const found = { ...poleAt(sign, index), plates: [plate] };
+      if (!placed.some((other) => isSame(other, found))) {
+        placed.push(found);
+        poles.set(sign.id, found);
+      }
+    }
+  }
+  return placed;
+}
+
+/**
+ * Place the traffic lights of a scene; those at one place beside each other.
+ *
+ * @param {Pick<Scene, 'lights'>} scene the scene document
+ * @param {RoadIndex} index of its lanelets
+ * @returns {LightPole[]}
+ */
+export function placeLights({ lights }, index) {
+  /** @type {LightPole[]} */
+  const placed = [];
+  for (const light of lights) {
+    const pole = { ...poleAt(light, index), light };
+    while (placed.some(({ x, y }) => Math.hypot(x - pole.x, y - pole.y) < LIGHTS_APART_M - 0.01)) {
+      pole.x += LIGHTS_APART_M * Math.sin(pole.yaw);
+      pole.y -= LIGHTS_APART_M * Math.cos(pole.yaw);
+    }
+    placed.push(pole);
+  }
+  return placed;
+}
+
+/** Knows which signs say what a sign before, or beside, has said. */
+class ToldBefore {
+  /** @type {Map<number, Set<string>>} what the signs of a lanelet say */
+  #said = new Map();
+  /** @type {Map<number, Lanelet>} */
+  #lanelets;
+  /** @type {Map<number, number[]>} */
+  #predecessors = new Map();
+
+  /**
+   * @param {Sign[]} signs
+   * @param {Lanelet[]} lanelets
+   */
+  constructor(signs, lanelets) {
+    this.#lanelets = new Map(lanelets.map((lanelet) => [lanelet.id, lanelet]));
+    for (const sign of signs) {
+      for (const id of sign.lanelets) {
+        this.#said.set(id, (this.#said.get(id) ?? new Set()).add(wordsOf(sign)));
+      }
+    }
+    for (const { id, successors } of lanelets) {
+      for (const successor of successors) {
+        this.#predecessors.set(successor, [...this.#predecessors.get(successor) ?? [], id]);
+      }
+    }
+  }
+
+  /**
+   * @param {Sign} sign
+   * @returns {boolean} whether all of its readers know it already
+   */
+  has(sign) {
+    const says = (/** @type {number} */ id) => this.#said.get(id)?.has(wordsOf(sign)) ?? false;
+    return sign.lanelets.length > 0 && sign.lanelets.every((id) => {
+      const before = this.#predecessors.get(id) ?? [];
+      const lanelet = this.#lanelets.get(id);
+      const beside = lanelet?.adj_right_same ? lanelet.adj_right : null;
+      return (before.length > 0 && before.every(says)) || (beside !== null && beside !== undefined
+        && says(beside));
+    });
+  }
+}
+
+/** @param {{kind: string, value: string}} sign */
+function wordsOf({ kind, value }) {
+  return `${kind} ${value}`;
+}
+
+/**
+ * @param {SignPole} one
+ * @param {SignPole} other
+ */
+function isSame(one, other) {
+  return Math.hypot(one.x - other.x, one.y - other.y) < SAME_SIGN_M
+    && Math.cos(one.yaw - other.yaw) > 0.8
+    && wordsOf(one.plates[0]) === wordsOf(other.plates[0]);
+}

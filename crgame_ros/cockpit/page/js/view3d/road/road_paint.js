@@ -1,0 +1,249 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What roads are paved with, by the types of their lanelets, and what is painted on them. */
+
+import { surfaceOf, zebraStripes } from '../../world/map_geometry.js';
+import { strokesOf } from '../../world/marking_strokes.js';
+import { shifted } from '../../world/polyline.js';
+import { paintedPieces, stripOf } from './strips.js';
+
+/** @import { Lanelet, Scene } from '../../messages.js' */
+/** @import { Boundary } from '../../world/boundaries.js' */
+/** @import { Stroke } from '../../world/marking_strokes.js' */
+/** @import { Heights, MeshParts, Rgb } from './mesh_parts.js' */
+/** @import { RoadIndex } from './road_index.js' */
+
+/** Of flat things the higher rank is on top. */
+export const RANK = { road: 1, special: 2, seam: 3, line: 4, across: 5 };
+
+/**
+ * @type {Record<'road'|'walk'|'cycle'|'parking'|'bus'|'kerb'|'seam'|'white'|'yellow'|'worn'
+ *   |'bank', Rgb>}
+ */
+export const COLOR = {
+  road: [98, 100, 103], walk: [172, 167, 157], cycle: [139, 84, 72], parking: [112, 111, 110],
+  bus: [108, 93, 82], kerb: [178, 176, 170], seam: [66, 67, 70], white: [240, 240, 236],
+  yellow: [232, 186, 60], worn: [158, 159, 158], bank: [96, 104, 70],
+};
+const KERB_M = { curb: 0.12, lowered: 0.03 };
+const STOP_LINE_M = 0.5;
+const WAIT_LINE_M = 0.3;
+/** @type {[number, number]} */
+const WAIT_DASH = [0.5, 0.25];
+// Where the centre line is yellow.
+const YELLOW_CENTRES = ['USA', 'PRI', 'CAN', 'MEX', 'BRA', 'ARG', 'CHN'];
+// A kerb, or an edge of which nothing is known, ends where another lanelet begins.
+const STEP_M = 1.5;
+const WITHIN_M = 0.3;
+
+/**
+ * Tell the pavement of a lanelet, and its rank.
+ *
+ * @param {Pick<Lanelet, 'types'|'intersection'>} lanelet
+ * @returns {[color: Rgb, rank: number]}
+ */
+export function pavementOf(lanelet) {
+  if (lanelet.types.includes('busLane')) {
+    return [COLOR.bus, RANK.special];
+  }
+  const surface = surfaceOf(lanelet);
+  if (surface === 'walk' || surface === 'cycle'
+      || (surface === 'parking' && !lanelet.types.includes('shoulder'))) {
+    return [COLOR[surface], RANK.special];
+  }
+  return [COLOR.road, RANK.road];
+}
+
+/** Paints the boundaries of a scene, and what lies across its lanes. */
+export class RoadPaint {
+  #index;
+  #heights;
+  #yellow;
+
+  /**
+   * @param {Pick<Scene, 'country'>} scene
+   * @param {RoadIndex} index of its lanelets
+   * @param {Heights} heights
+   */
+  constructor({ country }, index, heights) {
+    this.#index = index;
+    this.#heights = heights;
+    this.#yellow = YELLOW_CENTRES.includes(country);
+  }
+
+  /**
+   * Paint, or build, what is along a boundary.
+   *
+   * @param {MeshParts} parts
+   * @param {Boundary} boundary
+   * @param {Lanelet} lanelet whose boundary it is
+   */
+  addBoundary(parts, boundary, lanelet) {
+    for (const stroke of strokesOf(boundary, lanelet)) {
+      const line = shifted(boundary.line, stroke.offset);
+      if (stroke.kind === 'curb' || stroke.kind === 'lowered') {
+        this.#addKerb(parts, line, stroke, KERB_M[stroke.kind], lanelet);
+      } else if (stroke.kind !== 'seam') {
+        const color = this.#yellow && isCentre(boundary, lanelet) ? COLOR.yellow : COLOR.white;
+        this.#addStrips(parts, paintedPieces(line, stroke.dash), stroke.width, color, RANK.line);
+      } else if (boundary.marking !== 'unknown') {
+        this.#addStrips(parts, [line], stroke.width, COLOR.seam, RANK.seam);
+      }
+    }
+    // Of what nothing is known there is a worn line: without any, nobody could keep a lane.
+    if (boundary.marking === 'unknown' && !lanelet.intersection) {
+      this.#addWorn(parts, boundary, lanelet);
+    }
+  }
+
+  /**
+   * @param {MeshParts} parts
+   * @param {Lanelet} lanelet a crossing
+   */
+  addZebra(parts, lanelet) {
+    for (const stripe of zebraStripes(lanelet)) {
+      parts.addFaces(stripe, [0, 2, 1, 0, 3, 2], this.#heights, COLOR.white, RANK.across);
+    }
+  }
+
+  /**
+   * @param {MeshParts} parts
+   * @param {{points: number[], line: string}} stop
+   */
+  addStopLine(parts, { points, line }) {
+    const dashed = line.includes('dashed');
+    this.#addStrips(parts, paintedPieces(points, dashed ? WAIT_DASH : null),
+      dashed ? WAIT_LINE_M : STOP_LINE_M, COLOR.white, RANK.across);
+  }
+
+  /**
+   * @param {MeshParts} parts
+   * @param {Boundary} boundary
+   * @param {Lanelet} lanelet
+   */
+  #addWorn(parts, boundary, lanelet) {
+    const known = { ...boundary, marking: boundary.inner ? 'dashed' : 'solid' };
+    for (const { width, dash } of strokesOf(known, lanelet)) {
+      for (const piece of this.#freePieces(boundary.line, lanelet)) {
+        this.#addStrips(parts, paintedPieces(piece, dash), width, COLOR.worn, RANK.seam);
+      }
+    }
+  }
+
+  /**
+   * @param {MeshParts} parts
+   * @param {number[]} line
+   * @param {Stroke} stroke
+   * @param {number} height
+   * @param {Lanelet} lanelet
+   */
+  #addKerb(parts, line, { width }, height, lanelet) {
+    /** @type {Heights} */
+    const top = (x, y) => this.#heights(x, y) + height;
+    for (const piece of this.#freePieces(line, lanelet)) {
+      const [left, right] = stripOf(piece, width);
+      parts.addStrip(left, right, top, COLOR.kerb, 0);
+      parts.addWall(right, this.#heights, top, COLOR.kerb);
+      parts.addWall(reversed(left), this.#heights, top, COLOR.kerb);
+    }
+  }
+
+  /**
+   * @param {MeshParts} parts
+   * @param {number[][]} pieces
+   * @param {number} width
+   * @param {Rgb} color
+   * @param {number} rank
+   */
+  #addStrips(parts, pieces, width, color, rank) {
+    for (const piece of pieces) {
+      const [left, right] = stripOf(piece, width);
+      parts.addStrip(left, right, this.#heights, color, rank);
+    }
+  }
+
+  /**
+   * Give a line without what leads through lanelets other than those beside it.
+   *
+   * @param {number[]} line
+   * @param {Lanelet} lanelet
+   * @returns {number[][]}
+   */
+  #freePieces(line, lanelet) {
+    /** @type {number[][]} */
+    const pieces = [];
+    /** @type {number[]} */
+    let piece = [];
+    const dense = densified(line, STEP_M);
+    for (let i = 0; i < dense.length; i += 2) {
+      if (this.#index.isWithinAnother(dense[i], dense[i + 1], lanelet, WITHIN_M)) {
+        pieces.push(piece);
+        piece = [];
+      } else {
+        piece.push(dense[i], dense[i + 1]);
+      }
+    }
+    return [...pieces, piece].filter(({ length }) => length > 2).map(straightened);
+  }
+}
+
+/**
+ * Tell whether a boundary parts two directions.
+ *
+ * @param {Boundary} boundary
+ * @param {Lanelet} lanelet
+ */
+function isCentre({ line }, lanelet) {
+  return line === lanelet.left ? lanelet.adj_left !== null && !lanelet.adj_left_same
+    : lanelet.adj_right !== null && !lanelet.adj_right_same;
+}
+
+/**
+ * @param {number[]} line flat polyline
+ * @param {number} step longest part of the result [m]
+ * @returns {number[]} the same line, with points between its own
+ */
+export function densified(line, step) {
+  const dense = line.slice(0, 2);
+  for (let i = 2; i < line.length; i += 2) {
+    const [x, y] = [line[i - 2], line[i - 1]];
+    const count = Math.max(Math.ceil(Math.hypot(line[i] - x, line[i + 1] - y) / step), 1);
+    for (let k = 1; k <= count; k += 1) {
+      dense.push(x + (k / count) * (line[i] - x), y + (k / count) * (line[i + 1] - y));
+    }
+  }
+  return dense;
+}
+
+/**
+ * Leave out the points of a line that lie between their neighbours.
+ *
+ * @param {number[]} line flat polyline
+ * @returns {number[]}
+ */
+function straightened(line) {
+  const kept = line.slice(0, 2);
+  for (let i = 2; i + 3 < line.length; i += 2) {
+    const ax = line[i] - kept[kept.length - 2];
+    const ay = line[i + 1] - kept[kept.length - 1];
+    const bx = line[i + 2] - line[i];
+    const by = line[i + 3] - line[i + 1];
+    if (Math.abs(ax * by - ay * bx) > 1e-6 * Math.hypot(ax, ay) * Math.hypot(bx, by)) {
+      kept.push(line[i], line[i + 1]);
+    }
+  }
+  kept.push(...line.slice(-2));
+  return kept;
+}
+
+/**
+ * @param {number[]} line flat polyline
+ * @returns {number[]} from its end
+ */
+export function reversed(line) {
+  const back = [];
+  for (let i = line.length - 2; i >= 0; i -= 2) {
+    back.push(line[i], line[i + 1]);
+  }
+  return back;
+}

@@ -1,0 +1,66 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What stands beside roads: posts, lamps, trees and houses, of each kind those that are near. */
+
+import { geometryOf } from './materials.js';
+import { NearInstances } from './near_instances.js';
+import { fir, house, lamp, post, tree } from './scenery_shapes.js';
+
+/** @import { Origin } from '../local_origin.js' */
+/** @import { Heights } from './mesh_parts.js' */
+/** @import { Material } from 'three' */
+/** @import { Roadside } from './roadside.js' */
+/** @typedef {typeof import('../three.js')} Three */
+
+const LEAVES = [0x5f7f3c, 0x6f8f48, 0x4f7236, 0x7c9150];
+const NEEDLES = [0x3d5f3c, 0x48693f, 0x365438];
+const WALLS = [0xe6ddc9, 0xd9d3c6, 0xe9e4dc, 0xd8c3a2, 0xc9b49a, 0xdfe3e2];
+const NEAREST = { posts: [240, 700], lamps: [200, 500], trees: [420, 650], firs: [320, 650],
+  houses: [220, 800] };
+
+/** Draws all of it. */
+export class Scenery {
+  /** @type {NearInstances[]} */
+  #kinds = [];
+
+  /**
+   * @param {Three} three the library
+   * @param {Roadside} roadside
+   * @param {Origin} origin
+   * @param {Heights} heights
+   * @param {Material} painted
+   */
+  constructor(three, roadside, origin, heights, painted) {
+    const shapes = { posts: post(), lamps: lamp(), trees: tree(), firs: fir(), houses: house() };
+    const tones = { posts: [0xffffff], lamps: [0xffffff], trees: LEAVES, firs: NEEDLES,
+      houses: WALLS };
+    for (const kind of /** @type {(keyof Roadside)[]} */ (Object.keys(shapes))) {
+      const instances = roadside[kind].map(({ x, y, yaw, size, shade }) => ({
+        x: x - origin.x, y: y - origin.y, z: heights(x, y), yaw, size,
+        color: tones[kind][Math.floor(shade * tones[kind].length)] }));
+      if (instances.length > 0) {
+        const [most, reach] = NEAREST[kind];
+        this.#kinds.push(new NearInstances(three, geometryOf(three, shapes[kind]),
+          painted, instances, most, reach));
+      }
+    }
+  }
+
+  get meshes() {
+    return this.#kinds.map(({ mesh }) => mesh);
+  }
+
+  get triangles() {
+    return this.#kinds.reduce((sum, { triangles }) => sum + triangles, 0);
+  }
+
+  /** @param {{x: number, y: number}} eye */
+  update(eye) {
+    this.#kinds.forEach((kind) => kind.update(eye));
+  }
+
+  /** Free what the graphics card holds. */
+  dispose() {
+    this.#kinds.forEach((kind) => kind.dispose());
+  }
+}

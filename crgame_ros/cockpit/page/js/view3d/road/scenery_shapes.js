@@ -1,0 +1,126 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The shapes of what stands beside roads; trees and houses are one unit large. */
+
+import { MeshParts } from './mesh_parts.js';
+
+/** @import { Rgb } from './mesh_parts.js' */
+
+/** @type {Record<string, Rgb>} */
+const COLOR = {
+  white: [238, 238, 234], black: [36, 36, 38], reflector: [236, 236, 255], steel: [128, 132, 136],
+  lamp: [226, 224, 210], bark: [92, 74, 58], leaves: [255, 255, 255], wall: [255, 255, 255],
+  roof: [120, 66, 54], window: [70, 84, 98],
+};
+// Corners of what is round.
+const ROUND = 7;
+
+const shapeParts = () => new MeshParts({ x: 0, y: 0 });
+
+/**
+ * Add a part that goes around the vertical: a trunk, a cone, a ball of a few rings.
+ *
+ * @param {MeshParts} parts
+ * @param {[radius: number, height: number][]} profile from below
+ * @param {Rgb} color
+ * @param {number} [x] of its axis
+ */
+export function addRound(parts, profile, color, x = 0) {
+  const first = parts.ranks.length;
+  profile.forEach(([radius, z], level) => {
+    const [r0, z0] = profile[Math.max(level - 1, 0)];
+    const [r1, z1] = profile[Math.min(level + 1, profile.length - 1)];
+    const slope = Math.hypot(z1 - z0, r0 - r1) || 1;
+    for (let k = 0; k < ROUND; k += 1) {
+      const angle = 2 * Math.PI * k / ROUND;
+      const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+      const shade = /** @type {Rgb} */ (color.map(
+        (value) => value * (0.72 + 0.28 * (level / Math.max(profile.length - 1, 1)))));
+      parts.vertex(x + radius * cos, radius * sin, z, shade, 0,
+        [cos * (z1 - z0) / slope, sin * (z1 - z0) / slope, (r0 - r1) / slope]);
+      if (level > 0) {
+        const here = first + level * ROUND + k;
+        const next = first + level * ROUND + (k + 1) % ROUND;
+        parts.indices.push(here - ROUND, next - ROUND, next, here - ROUND, next, here);
+      }
+    }
+  });
+}
+
+/**
+ * Add a box's sides and top.
+ *
+ * @param {MeshParts} parts
+ * @param {[x: number, y: number, z: number]} from
+ * @param {[x: number, y: number, z: number]} to
+ * @param {Rgb} color
+ */
+export function addBox(parts, [x0, y0, z0], [x1, y1, z1], color) {
+  parts.addWall([x0, y0, x1, y0, x1, y1, x0, y1, x0, y0], () => z0, () => z1, color);
+  parts.addFaces([x0, y0, x1, y0, x1, y1, x0, y1], [0, 1, 2, 0, 2, 3], () => z1, color, 0);
+}
+
+/** A delineator (sign 620), 1 m above the road. */
+export function post() {
+  const parts = shapeParts();
+  addBox(parts, [-0.06, -0.05, -0.3], [0.06, 0.05, 0.68], COLOR.white);
+  addBox(parts, [-0.061, -0.051, 0.68], [0.061, 0.051, 0.92], COLOR.black);
+  addBox(parts, [-0.025, -0.054, 0.71], [0.025, 0.054, 0.89], COLOR.reflector);
+  addBox(parts, [-0.06, -0.05, 0.92], [0.06, 0.05, 1.0], COLOR.white);
+  return parts;
+}
+
+/** A street lamp, whose arm reaches back over the road. */
+export function lamp() {
+  const parts = shapeParts();
+  addRound(parts, [[0.09, -0.3], [0.06, 6.4]], COLOR.steel);
+  addBox(parts, [-1.5, -0.04, 6.3], [0, 0.04, 6.4], COLOR.steel);
+  addBox(parts, [-1.7, -0.13, 6.24], [-1.0, 0.13, 6.34], COLOR.lamp);
+  return parts;
+}
+
+/** A tree: its crown begins above the eyes of who drives a car. */
+export function tree() {
+  const parts = shapeParts();
+  addRound(parts, [[0.05, -0.05], [0.035, 0.45]], COLOR.bark);
+  addRound(parts, [[0.16, 0.36], [0.42, 0.45], [0.5, 0.62], [0.4, 0.84], [0.2, 0.96], [0.02, 1]],
+    COLOR.leaves);
+  return parts;
+}
+
+/** A fir. */
+export function fir() {
+  const parts = shapeParts();
+  addRound(parts, [[0.05, -0.05], [0.04, 0.25]], COLOR.bark);
+  addRound(parts, [[0.42, 0.2], [0.24, 0.5], [0.28, 0.5], [0.14, 0.76], [0.17, 0.76], [0.01, 1]],
+    COLOR.leaves);
+  return parts;
+}
+
+/** A house with a ridge along the road, and windows towards it. */
+export function house() {
+  const parts = shapeParts();
+  const [eaves, ridge] = [0.68, 1];
+  addBox(parts, [-0.5, -0.5, -0.1], [0.5, 0.5, eaves], COLOR.wall);
+  for (const z of [0.12, 0.42]) {
+    for (const y of [-0.34, -0.02, 0.3]) {
+      parts.addWall([-0.505, y + 0.1, -0.505, y - 0.04], () => z, () => z + 0.16, COLOR.window);
+    }
+  }
+  const slope = 1 / Math.hypot(0.55, ridge - eaves);
+  for (const side of [-1, 1]) {
+    /** @type {[number, number, number]} */
+    const normal = [side * slope * (ridge - eaves), 0, slope * 0.55];
+    const first = parts.vertex(side * 0.55, -0.53, eaves - 0.02, COLOR.roof, 0, normal);
+    parts.vertex(side * 0.55, 0.53, eaves - 0.02, COLOR.roof, 0, normal);
+    parts.vertex(0, 0.53, ridge, COLOR.roof, 0, normal);
+    parts.vertex(0, -0.53, ridge, COLOR.roof, 0, normal);
+    parts.indices.push(...(side > 0 ? [0, 1, 2, 0, 2, 3] : [0, 2, 1, 0, 3, 2]).map(
+      (corner) => first + corner));
+    const gable = parts.vertex(-0.5, side * 0.5, eaves, COLOR.wall, 0, [0, side, 0]);
+    parts.vertex(0.5, side * 0.5, eaves, COLOR.wall, 0, [0, side, 0]);
+    parts.vertex(0, side * 0.5, ridge - 0.02, COLOR.wall, 0, [0, side, 0]);
+    parts.indices.push(...(side > 0 ? [0, 2, 1] : [0, 1, 2]).map((corner) => gable + corner));
+  }
+  return parts;
+}

@@ -1,0 +1,176 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The signs of a scene: all plates as one mesh, and their poles. */
+
+import { geometryOf } from './materials.js';
+import { MeshParts } from './mesh_parts.js';
+import { addRound } from './scenery_shapes.js';
+import { NearInstances } from './near_instances.js';
+import { SignAtlas } from './sign_atlas.js';
+import { faceOf } from './sign_faces.js';
+
+/** @import { CanvasTexture, Material } from 'three' */
+/** @import { Origin } from '../local_origin.js' */
+/** @import { Heights } from './mesh_parts.js' */
+/** @import { PlateShape } from './sign_faces.js' */
+/** @import { SignPole } from './poles.js' */
+/** @import { Cell } from './sign_atlas.js' */
+/** @typedef {typeof import('../three.js')} Three */
+
+// Lower edges of the lowest plate, and of one above a road [m].
+const LOWEST_M = 2.0;
+const HANGING_M = 5.2;
+const GAP_M = 0.06;
+const PLATE_OFF_POLE_M = 0.045;
+/** @type {Record<PlateShape, number>} edge of the square that a plate is drawn in [m] */
+const SIZE_M = {
+  circle: 0.75, triangle: 0.95, yield: 0.95, octagon: 0.95, diamond: 0.85, square: 0.8, wide: 1.7,
+  tall: 1.0,
+};
+const STEEL = 0x8f9499;
+const MOST_POLES = 400;
+const REACH_M = 600;
+
+/** Draws all signs of a scene. */
+export class Signs {
+  #texture;
+  #plates;
+  #poles;
+
+  /**
+   * @param {Three} three the library
+   * @param {SignPole[]} signs
+   * @param {string} country three letters
+   * @param {Origin} origin
+   * @param {Heights} heights
+   * @param {Material} painted of the poles
+   */
+  constructor(three, signs, country, origin, heights, painted) {
+    const atlas = new SignAtlas();
+    const quads = new PlateQuads(origin);
+    const poles = signs.map((sign) => {
+      const ground = heights(sign.x, sign.y);
+      const top = quads.addPole(sign, ground, atlas, country);
+      return { x: sign.x - origin.x, y: sign.y - origin.y, z: ground, yaw: 0,
+        size: /** @type {[number, number, number]} */ ([1, 1, sign.hangs ? 0 : top - ground]),
+        color: STEEL };
+    });
+    this.#texture = plateTexture(three, atlas.canvas);
+    this.#plates = new three.Mesh(quads.geometry(three), new three.MeshLambertMaterial({
+      map: this.#texture, alphaTest: 0.5,
+      // Signs throw light back, and are read at dusk.
+      emissive: 0xffffff, emissiveMap: this.#texture, emissiveIntensity: 0.22 }));
+    const shape = new MeshParts({ x: 0, y: 0 });
+    addRound(shape, [[0.038, -0.3], [0.038, 1]], [255, 255, 255]);
+    this.#poles = new NearInstances(three, geometryOf(three, shape), painted, poles, MOST_POLES,
+      REACH_M);
+  }
+
+  get meshes() {
+    return [this.#plates, this.#poles.mesh];
+  }
+
+  get triangles() {
+    return (this.#plates.geometry.index?.count ?? 0) / 3 + this.#poles.triangles;
+  }
+
+  /** @param {{x: number, y: number}} eye */
+  update(eye) {
+    this.#poles.update(eye);
+  }
+
+  /** Free what the graphics card holds. */
+  dispose() {
+    this.#texture.dispose();
+    this.#plates.geometry.dispose();
+    this.#plates.material.dispose();
+    this.#poles.dispose();
+  }
+}
+
+/**
+ * @param {Three} three
+ * @param {HTMLCanvasElement} canvas
+ * @returns {CanvasTexture}
+ */
+export function plateTexture(three, canvas) {
+  const texture = new three.CanvasTexture(canvas);
+  texture.colorSpace = three.SRGBColorSpace;
+  texture.anisotropy = 8;
+  return texture;
+}
+
+/** Upright squares with pictures. */
+export class PlateQuads {
+  /** @type {number[]} */
+  positions = [];
+  /** @type {number[]} */
+  normals = [];
+  /** @type {number[]} */
+  uvs = [];
+  /** @type {number[]} */
+  indices = [];
+  #origin;
+
+  /** @param {Origin} origin */
+  constructor(origin) {
+    this.#origin = origin;
+  }
+
+  /**
+   * Add the plates of a pole, the first on top, and their backs.
+   *
+   * @param {SignPole} pole
+   * @param {number} ground its height [m]
+   * @param {SignAtlas} atlas
+   * @param {string} country
+   * @returns {number} the height of the topmost edge [m]
+   */
+  addPole({ x, y, yaw, hangs, plates }, ground, atlas, country) {
+    let bottom = ground + (hangs ? HANGING_M : LOWEST_M);
+    for (const { kind, value } of plates.toReversed()) {
+      const face = faceOf(kind, value, country);
+      const size = SIZE_M[face.shape];
+      const height = face.shape === 'wide' ? size / 2 : size;
+      const z = bottom + height / 2;
+      const off = (/** @type {number} */ meters) => /** @type {const} */ (
+        [x - meters * Math.cos(yaw), y - meters * Math.sin(yaw)]);
+      this.add(...off(PLATE_OFF_POLE_M), z, yaw, size, atlas.cellOf(face));
+      this.add(...off(PLATE_OFF_POLE_M - 0.01), z, yaw + Math.PI, size, atlas.backOf(face.shape));
+      bottom += height + GAP_M;
+    }
+    return bottom - GAP_M;
+  }
+
+  /**
+   * Add a square.
+   *
+   * @param {number} x of its middle
+   * @param {number} y
+   * @param {number} z [m]
+   * @param {number} yaw the way that those look who see it [rad]
+   * @param {number} size [m]
+   * @param {Cell} cell what is on it
+   */
+  add(x, y, z, yaw, size, [u0, v0, u1, v1]) {
+    const left = { x: -Math.sin(yaw) * size / 2, y: Math.cos(yaw) * size / 2 };
+    const first = this.positions.length / 3;
+    for (const [side, up] of [[1, -1], [-1, -1], [-1, 1], [1, 1]]) {
+      this.positions.push(x - this.#origin.x + side * left.x, y - this.#origin.y + side * left.y,
+        z + up * size / 2);
+      this.normals.push(-Math.cos(yaw), -Math.sin(yaw), 0);
+      this.uvs.push(side > 0 ? u0 : u1, 1 - (up > 0 ? v0 : v1));
+    }
+    this.indices.push(first, first + 1, first + 2, first, first + 2, first + 3);
+  }
+
+  /** @param {Three} three */
+  geometry(three) {
+    const geometry = new three.BufferGeometry();
+    geometry.setAttribute('position', new three.Float32BufferAttribute(this.positions, 3));
+    geometry.setAttribute('normal', new three.Float32BufferAttribute(this.normals, 3));
+    geometry.setAttribute('uv', new three.Float32BufferAttribute(this.uvs, 2));
+    geometry.setIndex(this.indices);
+    return geometry;
+  }
+}

@@ -1,0 +1,178 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Traffic lights: poles, housings, and lamps that show the signals of the run. */
+
+import { geometryOf } from './materials.js';
+import { MeshParts } from './mesh_parts.js';
+import { NearInstances } from './near_instances.js';
+import { addBox, addRound } from './scenery_shapes.js';
+import { PlateQuads, plateTexture } from './signs.js';
+import { SYMBOLS } from './sign_symbols.js';
+
+/** @import { BufferAttribute, Material } from 'three' */
+/** @import { Origin } from '../local_origin.js' */
+/** @import { Heights } from './mesh_parts.js' */
+/** @import { LightPole } from './poles.js' */
+/** @import { Cell } from './sign_atlas.js' */
+/** @typedef {typeof import('../three.js')} Three */
+
+/** Lamps from above, and which of them each state lights. */
+export const LAMPS = /** @type {const} */ (['red', 'yellow', 'green']);
+/** @type {Record<string, readonly string[]|undefined>} */
+export const LIT = { red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'],
+  green: ['green'] };
+const COLORS = { red: 0xff3b2c, yellow: 0xffc21f, green: 0x1fe08a };
+const OFF = 0x24272b;
+/** Middle of the lowest lamp above the road [m]. */
+const LOWEST_M = 2.45;
+const HANGING_M = 5;
+const APART_M = 0.33;
+const LAMP_M = 0.28;
+const HOUSING_M = 0.14;
+const MOST = 200;
+const REACH_M = 700;
+const MASK_PX = 128;
+/** @type {Record<string, string[]>} */
+const ARROWS = { left: ['across-left'], right: ['across-right'], straight: ['up'],
+  leftStraight: ['across-left', 'up'], straightRight: ['up', 'across-right'],
+  leftRight: ['across-left', 'across-right'], all: [] };
+
+/** Draws all traffic lights of a scene. */
+export class TrafficLights {
+  #three;
+  #lights;
+  #texture;
+  #lamps;
+  #poles;
+  #housings;
+  /** @type {(string|undefined)[]} */
+  #shown;
+
+  /**
+   * @param {Three} three the library
+   * @param {LightPole[]} lights
+   * @param {Origin} origin
+   * @param {Heights} heights
+   * @param {Material} painted of poles and housings
+   */
+  constructor(three, lights, origin, heights, painted) {
+    this.#three = three;
+    this.#lights = lights;
+    this.#shown = lights.map(() => undefined);
+    const masks = lampMasks();
+    const quads = new PlateQuads(origin);
+    /** @type {(pole: LightPole, z: number) => import('./near_instances.js').Instance} */
+    const instance = (pole, z) => ({ x: pole.x - origin.x, y: pole.y - origin.y, z,
+      yaw: pole.yaw, size: [1, 1, 1], color: 0xffffff });
+    const feet = lights.map(({ x, y }) => heights(x, y));
+    const bases = lights.map(({ hangs }, i) => feet[i] + (hangs ? HANGING_M : LOWEST_M));
+    lights.forEach((pole, i) => {
+      LAMPS.forEach((_, lamp) => quads.add(
+        pole.x - (HOUSING_M + 0.02) * Math.cos(pole.yaw),
+        pole.y - (HOUSING_M + 0.02) * Math.sin(pole.yaw), bases[i] + (2 - lamp) * APART_M,
+        pole.yaw, LAMP_M, masks.cells[pole.light.direction] ?? masks.cells.all));
+    });
+    const geometry = quads.geometry(three);
+    geometry.setAttribute('color', new three.BufferAttribute(
+      new Float32Array(quads.positions.length), 3));
+    this.#texture = plateTexture(three, masks.canvas);
+    this.#lamps = new three.Mesh(geometry, new three.MeshBasicMaterial({
+      vertexColors: true, map: this.#texture, alphaTest: 0.5, toneMapped: false }));
+    this.#poles = new NearInstances(three, geometryOf(three, poleShape()), painted,
+      lights.map((pole, i) => instance(pole, feet[i])).filter((_, i) => !lights[i].hangs), MOST,
+      REACH_M);
+    this.#housings = new NearInstances(three, geometryOf(three, housingShape()), painted,
+      lights.map((pole, i) => instance(pole, bases[i])), MOST, REACH_M);
+    this.update({}, { x: 0, y: 0 });
+  }
+
+  get meshes() {
+    return [this.#lamps, this.#poles.mesh, this.#housings.mesh];
+  }
+
+  get triangles() {
+    return 6 * this.#lights.length + this.#poles.triangles + this.#housings.triangles;
+  }
+
+  /**
+   * Show the signals.
+   *
+   * @param {Record<string, string>} states by the lights' ids
+   * @param {{x: number, y: number}} eye
+   */
+  update(states, eye) {
+    this.#poles.update(eye);
+    this.#housings.update(eye);
+    const colors = /** @type {BufferAttribute} */ (this.#lamps.geometry.attributes.color);
+    const color = new this.#three.Color();
+    this.#lights.forEach(({ light }, i) => {
+      const state = states[light.id] ?? 'inactive';
+      if (state === this.#shown[i]) {
+        return;
+      }
+      this.#shown[i] = state;
+      LAMPS.forEach((lamp, k) => {
+        color.set(LIT[state]?.includes(lamp) ? COLORS[lamp] : OFF);
+        for (let corner = 0; corner < 4; corner += 1) {
+          colors.setXYZ(12 * i + 4 * k + corner, color.r, color.g, color.b);
+        }
+      });
+      colors.needsUpdate = true;
+    });
+  }
+
+  /** Free what the graphics card holds. */
+  dispose() {
+    this.#texture.dispose();
+    this.#lamps.geometry.dispose();
+    this.#lamps.material.dispose();
+    this.#poles.dispose();
+    this.#housings.dispose();
+  }
+}
+
+/**
+ * Draw what a lamp shines through, by direction.
+ *
+ * @returns {{canvas: HTMLCanvasElement, cells: Record<string, Cell>}}
+ */
+function lampMasks() {
+  const canvas = document.createElement('canvas');
+  const names = Object.keys(ARROWS);
+  canvas.width = MASK_PX * 8;
+  canvas.height = MASK_PX;
+  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+  /** @type {Record<string, Cell>} */
+  const cells = {};
+  names.forEach((name, i) => {
+    context.save();
+    context.translate((i + 0.5) * MASK_PX, MASK_PX / 2);
+    context.scale(0.48 * MASK_PX, 0.48 * MASK_PX);
+    context.fillStyle = '#ffffff';
+    const arrows = ARROWS[name];
+    if (arrows.length === 0) {
+      context.arc(0, 0, 1, 0, 2 * Math.PI);
+      context.fill();
+    }
+    context.scale(1.15, 1.15);
+    arrows.forEach((arrow) => SYMBOLS[arrow](context));
+    context.restore();
+    cells[name] = [i / 8, 0, (i + 1) / 8, 1];
+  });
+  return { canvas, cells };
+}
+
+/** The pole of a light that is not above the road. */
+function poleShape() {
+  const parts = new MeshParts({ x: 0, y: 0 });
+  addRound(parts, [[0.07, -0.3], [0.06, LOWEST_M + 2.6 * APART_M]], [120, 124, 128]);
+  return parts;
+}
+
+/** Three lamps' housing with its board; its origin is the lowest lamp's middle. */
+function housingShape() {
+  const parts = new MeshParts({ x: 0, y: 0 });
+  addBox(parts, [-HOUSING_M, -0.19, -0.2], [0.06, 0.19, 2 * APART_M + 0.2], [34, 37, 40]);
+  addBox(parts, [-0.02, -0.32, -0.34], [0.02, 0.32, 2 * APART_M + 0.34], [28, 30, 33]);
+  return parts;
+}

@@ -1,0 +1,30 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What the map colours people, AVs and all others, for bodies seen from outside. */
+
+import { themeColor } from '../world/palette.js';
+
+/** @import { Three } from './road/road_world.js' */
+
+/** @type {Record<string, string|undefined>} */
+const NAMES = {
+  human: 'human', autonomous: 'av', traffic: 'traffic', scripted: 'scripted', static: 'static',
+};
+
+/**
+ * Make a function that gives the colour of a role.
+ *
+ * @param {Three} three
+ * @returns {(role: string, type: string) => number} of vehicles and objects of the scene
+ */
+export function roleColor(three) {
+  /** @type {Map<string, number>} */
+  const known = new Map();
+  return (role, type) => {
+    const name = type === 'pedestrian' || type === 'bicycle' ? 'vulnerable'
+      : NAMES[role] ?? 'recorded';
+    const color = known.get(name) ?? new three.Color(themeColor(name)).getHex();
+    known.set(name, color);
+    return color;
+  };
+}

@@ -1,0 +1,107 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Keeps the windows of one seat in step: all show the simulation time that the first one shows. */
+
+/** @import { Store } from '../store.js' */
+
+const CHANNEL = 'crgame-seat';
+// A leader that says nothing for so long is gone, or its window is hidden [ms].
+const SILENCE_MS = 400;
+
+/**
+ * What the leader says in each frame.
+ *
+ * @typedef {object} Beat
+ * @property {number} t simulation time that it shows [s]
+ * @property {number} at_ms when, by the machine's clock
+ * @property {number} rate simulated seconds per second; 0 while it stands still
+ * @property {number} epoch counts resets
+ * @property {string|null} vehicle whose view it shows
+ */
+
+/**
+ * @typedef {{info: object|null, t: number, seek: (t: number) => unknown, pause: () => void}} Player
+ */
+
+/** Says, or hears, which time is shown. */
+export class SeatClock {
+  #store;
+  #channel = new BroadcastChannel(CHANNEL);
+  /** @type {Beat|null} */
+  #heard = null;
+  #follows;
+  #last = { t: NaN, at_ms: NaN };
+
+  /**
+   * @param {Store} store
+   * @param {boolean} follows whether this window goes with another one
+   */
+  constructor(store, follows) {
+    this.#store = store;
+    this.#follows = follows;
+    if (follows) {
+      this.#channel.addEventListener('message', ({ data }) => { this.#heard = data; });
+    }
+  }
+
+  /** The vehicle that the leader shows; null while nobody leads. */
+  get vehicle() {
+    return this.#leads(performance.now()) ? this.#heard?.vehicle ?? null : null;
+  }
+
+  /**
+   * Tell the windows that follow what is shown.
+   *
+   * @param {number} now_ms the animation frame's time
+   * @param {number} t simulation time that is shown [s]
+   * @param {string|null} vehicle
+   */
+  tell(now_ms, t, vehicle) {
+    if (this.#follows) {
+      return;
+    }
+    const at_ms = performance.timeOrigin + now_ms;
+    const rate = (t - this.#last.t) / (at_ms - this.#last.at_ms) * 1000;
+    this.#last = { t, at_ms };
+    /** @type {Beat} */
+    const beat = { t, at_ms, rate: Number.isFinite(rate) ? rate : 0, epoch: this.#store.epoch,
+      vehicle };
+    this.#channel.postMessage(beat);
+  }
+
+  /**
+   * Before a frame: show what the leader shows, while there is one.
+   *
+   * @param {number} now_ms the animation frame's time
+   */
+  follow(now_ms) {
+    if (!this.#follows) {
+      return;
+    }
+    const player = /** @type {Player|undefined} */ (window.crgame.replay);
+    if (this.#store.mode === 'replay') {
+      if (player?.info && this.#leads(now_ms)) {
+        player.pause();
+        if (Math.abs(player.t - this.#time(now_ms)) > 0) {
+          player.seek(this.#time(now_ms));
+        }
+      }
+    } else {
+      this.#store.useTimeSource(this.#leads(now_ms) ? (ms) => this.#time(ms) : null);
+    }
+  }
+
+  /** @param {number} now_ms */
+  #leads(now_ms) {
+    const beat = this.#heard;
+    return beat !== null && beat.epoch === this.#store.epoch
+      && performance.timeOrigin + now_ms - beat.at_ms < SILENCE_MS;
+  }
+
+  /** @param {number} now_ms */
+  #time(now_ms) {
+    const { t, at_ms, rate } = /** @type {Beat} */ (this.#heard);
+    const since_ms = Math.max(performance.timeOrigin + now_ms - at_ms, 0);
+    return t + rate * since_ms / 1000;
+  }
+}

@@ -1,0 +1,33 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Where a driven vehicle stands on the road. */
+
+import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { poseOf } from './traffic.js';
+
+/** @import { SceneVehicle } from '../messages.js' */
+/** @import { Shown } from '../store.js' */
+/** @import { Stand } from './cameras.js' */
+/** @import { HeightAt } from './traffic.js' */
+
+/**
+ * Give where a vehicle's rear axle is on the road, and how steep that is.
+ *
+ * @param {Shown} shown
+ * @param {number} index of the vehicle
+ * @param {SceneVehicle} vehicle
+ * @param {HeightAt} heightAt
+ * @returns {Stand|null} null while it has no place
+ */
+export function standOf(shown, index, vehicle, heightAt) {
+  const row = index * VEHICLE_WIDTH;
+  const [x, y] = [shown.vehicles[row], shown.vehicles[row + 1]];
+  const yaw = shown.vehicles[row + VEHICLE.yaw];
+  if (!Number.isFinite(x + y + yaw)) {
+    return null;
+  }
+  const ahead = vehicle.rear_to_center;
+  const { z, slope } = poseOf(x + ahead * Math.cos(yaw), y + ahead * Math.sin(yaw), yaw,
+    0.35 * vehicle.shape.length, heightAt);
+  return { x, y, yaw, z: z - ahead * Math.sin(slope), slope };
+}

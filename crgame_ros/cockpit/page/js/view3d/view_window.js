@@ -1,0 +1,40 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Windows that show nothing but a view: side and rear screens of one seat. */
+
+import { VIEWPOINTS } from './cameras.js';
+import { FIELD_OF_VIEW } from './field_of_view.js';
+
+/** @import { Viewpoint } from './cameras.js' */
+
+const DEGREE = Math.PI / 180;
+
+/**
+ * What a window shows.
+ *
+ * @typedef {object} ViewWindow
+ * @property {Viewpoint} viewpoint
+ * @property {number} aside to the left of straight ahead [rad]
+ * @property {string|null} vehicle id; null for the one that the first window of the seat shows
+ * @property {number|null} fieldOfView_deg across the window; null as it is set for all [deg]
+ */
+
+/**
+ * Read a page's address.
+ *
+ * @param {string} query `?view=driver&yaw=-60`, degrees to the left; `vehicle` and `fov` besides
+ * @returns {ViewWindow|null} null for a page with map and panels
+ */
+export function readViewWindow(query) {
+  const values = new URLSearchParams(query);
+  const viewpoint = VIEWPOINTS.find((name) => name === values.get('view'));
+  if (viewpoint === undefined) {
+    return null;
+  }
+  const yaw = Number(values.get('yaw') ?? 0);
+  const angle = Number(values.get('fov') ?? NaN);
+  return {
+    viewpoint, aside: Number.isFinite(yaw) ? yaw * DEGREE : 0, vehicle: values.get('vehicle'),
+    fieldOfView_deg: angle >= FIELD_OF_VIEW.least && angle <= FIELD_OF_VIEW.most ? angle : null,
+  };
+}

@@ -1,0 +1,90 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * How CommonRoad's line markings are painted: widths, dashes and gaps.
+ *
+ * They are those of the German guideline RMS (Richtlinien für die Markierung von Straßen), which
+ * knows motorways, country roads and roads in towns.
+ */
+
+/** @import { Lanelet } from '../messages.js' */
+/** @import { Boundary } from './boundaries.js' */
+
+/** @typedef {'motorway'|'country'|'town'} RoadClass */
+/** @typedef {[painted: number, gap: number]} Dash [m] */
+
+/**
+ * One line along a boundary.
+ *
+ * @typedef {object} Stroke
+ * @property {'line'|'broad'|'curb'|'lowered'|'seam'} kind
+ * @property {number} offset of its middle to the left of the boundary [m]
+ * @property {number} width [m]
+ * @property {Dash|null} dash null for an unbroken one
+ */
+
+/** @type {Record<RoadClass, {line: number, broad: number, dash: Dash, blocks: Dash}>} */
+const LAYOUTS = {
+  motorway: { line: 0.15, broad: 0.3, dash: [6, 12], blocks: [6, 6] },
+  country: { line: 0.12, broad: 0.25, dash: [4, 8], blocks: [3, 3] },
+  town: { line: 0.12, broad: 0.25, dash: [3, 6], blocks: [3, 3] },
+};
+const KERB_M = 0.16;
+const SEAM_M = 0.08;
+// Of the two lines of a double one from their middle.
+const DOUBLE_LINE_M = 0.13;
+const MOTORWAY_TYPES = ['interstate', 'highway', 'mainCarriageWay', 'accessRamp', 'exitRamp'];
+// From 95 and 65 km/h on; at half-way between two limits [m/s].
+const MOTORWAY_MPS = 95 / 3.6;
+const COUNTRY_MPS = 65 / 3.6;
+
+/**
+ * Tell what kind of road a lanelet is part of: by its types, and how fast one may drive.
+ *
+ * @param {Pick<Lanelet, 'types'|'speed_limit'>} lanelet
+ * @returns {RoadClass}
+ */
+export function roadClass({ types, speed_limit }) {
+  if (types.some((type) => MOTORWAY_TYPES.includes(type))) {
+    return 'motorway';
+  }
+  const town = types.includes('urban') ? 'town' : 'country';
+  if (speed_limit === null) {
+    return town;
+  }
+  return speed_limit > MOTORWAY_MPS ? 'motorway' : speed_limit > COUNTRY_MPS ? 'country' : 'town';
+}
+
+/**
+ * Give what is painted, or built, along a boundary.
+ *
+ * @param {Pick<Boundary, 'marking'|'inner'>} boundary
+ * @param {Lanelet} lanelet whose boundary it is
+ * @returns {Stroke[]}
+ */
+export function strokesOf({ marking, inner }, lanelet) {
+  const layout = LAYOUTS[roadClass(lanelet)];
+  /** @type {(style: string, offset: number) => Stroke} */
+  const line = (style, offset) => ({
+    kind: 'line', offset, width: layout.line, dash: style === 'solid' ? null : layout.dash });
+  const [left, right] = marking.split('_');
+  switch (marking) {
+    case 'solid':
+    case 'dashed': return [line(marking, 0)];
+    case 'broad_solid':
+      return [{ kind: 'broad', offset: 0, width: layout.broad, dash: null }];
+    case 'broad_dashed':
+      return [{ kind: 'broad', offset: 0, width: layout.broad, dash: layout.blocks }];
+    case 'curb': return [{ kind: 'curb', offset: 0, width: KERB_M, dash: null }];
+    case 'lowered_curb': return [{ kind: 'lowered', offset: 0, width: KERB_M, dash: null }];
+    case 'solid_solid':
+    case 'dashed_dashed':
+    case 'solid_dashed':
+    case 'dashed_solid':
+      return [line(left, DOUBLE_LINE_M), line(right, -DOUBLE_LINE_M)];
+    default:
+      // Without a line, lanes side by side must still be told apart.
+      return inner && !lanelet.intersection
+        ? [{ kind: 'seam', offset: 0, width: SEAM_M, dash: null }] : [];
+  }
+}

@@ -1,0 +1,156 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a driver feels in the wheel, from what the vehicle does: the motor's force in time."""
+
+from dataclasses import dataclass
+import math
+
+from crgame_ros.driver.evdev_device import EvdevDevice
+from crgame_ros.driver.force_effect import ForceEffect, FULL_LEVEL
+from crgame_ros.driver.force_limits import ForceLimits, TorqueLimiter
+from crgame_ros.driver.steering_torque import SteeringTorque, WheelMotion
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+# Without a new state for so long (a pause, a lost simulation) there is no force [s].
+STATE_TIMEOUT_S = 0.2
+# Of the low-pass on the rate of the wheel, whose angle comes in steps [s].
+RATE_FILTER_S = 0.02
+# A device that refused an effect is asked again so much later [s].
+RETRY_S = 1.0
+
+
+@dataclass(frozen=True)
+class FeltForce:
+    """
+    What the motor gives.
+
+    :param wheel_angle: positive to the left [rad]
+    :param torque: after strength, cap and slew, positive to the left [N m]
+    """
+
+    wheel_angle: float
+    torque: float
+
+
+class ForceFeedback:
+    """
+    Refreshes the force of one device; has no clock of its own.
+
+    :param device: the wheel; it may be absent, come and go.
+    :param vehicle: that it steers.
+    """
+
+    def __init__(self, device: EvdevDevice, vehicle: VehicleParameters) -> None:
+        self._device = device
+        self._model = SteeringTorque(vehicle)
+        self._full_turn = vehicle.max_steering_wheel_angle
+        self._effect: ForceEffect | None = None
+        self._limiter: TorqueLimiter | None = None
+        self._retry_s = self._heard_s = self._stepped_s = -math.inf
+        self._time_s = self._speed = self._yaw_rate = 0.0
+        self._angle = self._rate = 0.0
+        self._off_road = False
+        self._collided_s = math.inf
+        self.problem = ''
+
+    def see_motion(self, now_s: float, time_s: float, speed: float, yaw_rate: float) -> None:
+        """
+        Take what the vehicle does.
+
+        :param now_s: steady clock [s]
+        :param time_s: simulation time [s]
+        :param speed: signed [m/s]
+        :param yaw_rate: [rad/s]
+        """
+        if time_s == self._time_s:
+            return
+        if time_s < self._time_s:
+            self._collided_s, self._off_road = math.inf, False
+        self._heard_s, self._time_s = now_s, time_s
+        self._speed, self._yaw_rate = speed, yaw_rate
+
+    def see_drivability(self, collision: bool, off_road: bool) -> None:
+        """Take whether the vehicle touches anything, and whether it has left the road."""
+        if not collision:
+            self._collided_s = math.inf
+        elif math.isinf(self._collided_s):
+            self._collided_s = self._time_s
+        self._off_road = off_road
+
+    def step(self, now_s: float, driving: bool = True) -> FeltForce | None:
+        """
+        Refresh the force.
+
+        :param now_s: steady clock [s]
+        :param driving: whether the wheel has the vehicle's controls.
+        :return: None while there is no motor.
+        """
+        effect = self._current_effect(now_s)
+        layout, limiter = self._device.layout, self._limiter
+        if effect is None or layout is None or limiter is None:
+            return None
+        dt_s = min(now_s - self._stepped_s, STATE_TIMEOUT_S)
+        self._stepped_s = now_s
+        angle = layout.steering.deflection(self._device.raw) * self._full_turn
+        if dt_s > 0.0:
+            share = dt_s / (dt_s + RATE_FILTER_S)
+            self._rate += share * ((angle - self._angle) / dt_s - self._rate)
+        self._angle = angle
+        alive = driving and now_s - self._heard_s <= STATE_TIMEOUT_S
+        wanted = self._model.torque(WheelMotion(
+            self._speed, self._yaw_rate, angle, self._rate, self._time_s, self._off_road,
+            self._time_s - self._collided_s if self._collided_s < math.inf else math.inf,
+        )) if alive else 0.0
+        torque = limiter.step(wanted, dt_s)
+        level = round(FULL_LEVEL * torque / limiter.limits.max_torque)
+        try:
+            effect.set(-level if limiter.limits.inverted else level, now_s)
+        except OSError as error:
+            self._lose(error, now_s)
+            return None
+        return FeltForce(angle, torque)
+
+    def close(self) -> None:
+        """End the force; the device stays open."""
+        if self._effect is not None and self._effect.device is self._device.force_device:
+            try:
+                self._effect.remove()
+            except OSError:
+                pass  # It is gone, and its force with it.
+        self._effect = None
+
+    def _current_effect(self, now_s: float) -> ForceEffect | None:
+        """Give the effect on the device that is there now, which may be another than before."""
+        device, limits = self._device.force_device, self._device.force_limits
+        if device is None or limits is None or limits.strength == 0.0:
+            self._effect = None
+        elif self._effect is None or self._effect.device is not device:
+            self._effect = None
+            if now_s >= self._retry_s:
+                self._begin(limits, now_s)
+        return self._effect
+
+    def _begin(self, limits: ForceLimits, now_s: float) -> None:
+        try:
+            self._effect = ForceEffect(self._device.force_device)
+        except OSError as error:
+            self._lose(error, now_s)
+            return
+        self._limiter = TorqueLimiter(limits)
+        self._stepped_s, self._rate, self.problem = now_s, 0.0, ''
+
+    def _lose(self, error: OSError, now_s: float) -> None:
+        self._effect, self._retry_s = None, now_s + RETRY_S
+        self.problem = f'no force feedback: {error.strerror or error}'

@@ -1,0 +1,70 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a wheel's motor may be asked for: strength, cap and slew, as its device map has them."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Within
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceLimits:
+    """
+    The motor of a wheel.
+
+    :param max_torque: that it gives at full level [N m]
+    :param strength: factor on the torque of the simulated steering; 0 switches it off [-]
+    :param cap: share of `max_torque` that is never exceeded [-]
+    :param slew: fastest change of the torque [N m/s]
+    :param inverted: whether a positive level turns the wheel to the right.
+    """
+
+    FORM: ClassVar[Form] = Form('see docs/driving.md, section "Force feedback"')
+
+    max_torque: Annotated[float, Within(0.05, 50.0)]
+    strength: Annotated[float, Within(0.0, 5.0)] = 1.0
+    cap: Annotated[float, Within(0.0, 1.0)] = 0.8
+    slew: Annotated[float, Within(1.0, 1000.0)] = 60.0
+    inverted: bool = False
+
+
+class TorqueLimiter:
+    """
+    Holds a torque within cap and slew.
+
+    :param limits: of the motor.
+    """
+
+    def __init__(self, limits: ForceLimits) -> None:
+        self.limits = limits
+        self.torque = 0.0
+
+    def step(self, wanted: float, dt_s: float) -> float:
+        """
+        Move towards a torque.
+
+        :param wanted: of the simulated steering [N m]; no number counts as none.
+        :param dt_s: since the last step [s]
+        :return: what the motor is to give, positive to the left [N m]
+        """
+        limits = self.limits
+        most = limits.cap * limits.max_torque
+        wanted = 0.0 if wanted != wanted else wanted * limits.strength
+        goal = min(most, max(-most, wanted))
+        change = limits.slew * max(0.0, dt_s)
+        self.torque = min(self.torque + change, max(self.torque - change, goal))
+        return self.torque

@@ -1,0 +1,153 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The torque that a driver feels at the steering wheel [N m], positive to the left."""
+
+from dataclasses import dataclass
+import math
+
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+
+@dataclass(frozen=True)
+class TorqueParameters:
+    """
+    What of the steering no vehicle file has: a typical car with power steering.
+
+    :param contact_half_length: a, of a front tyre's contact patch [m]
+    :param caster_trail: by which the kingpin leads the middle of the patch [m]
+    :param steering_ratio: of the wheel's angle to the front wheels', mechanically [-]
+    :param unassisted: share of the torque that power steering leaves to the driver [-]
+    :param damping: [N m s/rad]
+    :param friction: of the column, at any speed [N m]
+    :param scrub: of standing tyres on the road [N m]
+    :param scrub_speed: at which scrub has fallen to 1/e [m/s]
+    :param friction_rate: of the wheel, about which friction changes its sign [rad/s]
+    :param end_stop: stiffness beyond `end_stop_from` [N m/rad]
+    :param end_stop_from: share of the wheel's way to its end [-]
+    :param rumble: amplitude off the road, at `rumble_speed` and beyond [N m]
+    :param rumble_speed: [m/s]
+    :param rumble_hz: its frequency [Hz]
+    :param jolt: first amplitude after a collision [N m]
+    :param jolt_decay_s: in which it falls to 1/e [s]
+    :param jolt_hz: its frequency [Hz]
+    """
+
+    contact_half_length: float = 0.08
+    caster_trail: float = 0.02
+    steering_ratio: float = 16.0
+    unassisted: float = 0.2
+    damping: float = 0.08
+    friction: float = 0.15
+    scrub: float = 0.9
+    scrub_speed: float = 1.0
+    friction_rate: float = 0.5
+    end_stop: float = 20.0
+    end_stop_from: float = 0.97
+    rumble: float = 0.7
+    rumble_speed: float = 5.0
+    rumble_hz: float = 17.0
+    jolt: float = 2.5
+    jolt_decay_s: float = 0.15
+    jolt_hz: float = 23.0
+
+
+@dataclass(frozen=True)
+class WheelMotion:
+    """
+    What the torque depends on.
+
+    :param speed: signed, of the rear axle [m/s]
+    :param yaw_rate: [rad/s]
+    :param wheel_angle: of the steering wheel, positive to the left [rad]
+    :param wheel_rate: its rate [rad/s]
+    :param time_s: simulation time, of which the rumble is a function [s]
+    :param off_road: whether the vehicle has left the road.
+    :param since_collision_s: infinite without any [s]
+    """
+
+    speed: float
+    yaw_rate: float
+    wheel_angle: float
+    wheel_rate: float = 0.0
+    time_s: float = 0.0
+    off_road: bool = False
+    since_collision_s: float = math.inf
+
+
+class SteeringTorque:
+    """
+    Self-aligning torque, damping, friction, end stops, rumble off the road and after a collision.
+
+    The kinematic models have no tyre forces, so the front axle's share of the lateral force is
+    that of a steady turn, F = m a l_r / L with a = v dpsi/dt. The aligning moment is that of the
+    brush model with parabolic pressure (Pacejka, Tire and Vehicle Dynamics, section 3.2.1): with
+    lambda = 1 - |theta tan(alpha)| it has F = mu F_z (1 - lambda^3) and
+    M_z = mu F_z a lambda^3 (1 - lambda), and so lambda^3 = 1 - |F| / (mu F_z). The pneumatic
+    trail of a / 3 falls off as the slip grows: M_z is largest at 58 % of the grip and gone where
+    the tyre slides; the caster trail's part is left. Backwards nothing aligns.
+
+    :param vehicle: whose torque it is.
+    """
+
+    def __init__(self, vehicle: VehicleParameters,
+                 parameters: TorqueParameters | None = None) -> None:
+        self.parameters = p = parameters or TorqueParameters()
+        front = vehicle.rear_to_center / vehicle.wheelbase
+        self._mass = vehicle.mass * front
+        self._grip = vehicle.friction * self._mass * vehicle.gravity
+        self._share = p.unassisted / p.steering_ratio
+        self._end = p.end_stop_from * vehicle.max_steering_wheel_angle
+
+    def aligning(self, speed: float, yaw_rate: float) -> float:
+        """Give the torque by which the tyres turn the wheel back [N m]."""
+        p = self.parameters
+        force = self._mass * speed * yaw_rate
+        sliding = abs(force) >= self._grip
+        force = math.copysign(min(abs(force), self._grip), force)
+        left = 0.0 if sliding else math.cbrt(1.0 - abs(force) / self._grip)
+        moment = math.copysign(
+            self._grip * p.contact_half_length * left ** 3 * (1.0 - left), force)
+        forwards = max(0.0, math.tanh(speed))
+        return -(moment + force * p.caster_trail) * self._share * forwards
+
+    def resistance(self, speed: float, wheel_rate: float) -> float:
+        """Give damping and friction, the more the slower the vehicle is [N m]."""
+        p = self.parameters
+        friction = p.friction + p.scrub * math.exp(-abs(speed) / p.scrub_speed)
+        return -p.damping * wheel_rate - friction * math.tanh(wheel_rate / p.friction_rate)
+
+    def end_stop(self, wheel_angle: float) -> float:
+        """Give what holds the wheel back at its ends [N m]."""
+        beyond = max(0.0, abs(wheel_angle) - self._end)
+        return -math.copysign(self.parameters.end_stop * beyond, wheel_angle)
+
+    def shaking(self, motion: WheelMotion) -> float:
+        """Give rumble and jolt [N m]."""
+        p = self.parameters
+        torque = 0.0
+        if motion.off_road:
+            torque += p.rumble * min(1.0, abs(motion.speed) / p.rumble_speed) \
+                * math.sin(2.0 * math.pi * p.rumble_hz * motion.time_s)
+        since = motion.since_collision_s
+        if since < 10.0 * p.jolt_decay_s:
+            torque += p.jolt * math.exp(-since / p.jolt_decay_s) \
+                * math.sin(2.0 * math.pi * p.jolt_hz * since)
+        return torque
+
+    def torque(self, motion: WheelMotion) -> float:
+        """Give the sum [N m]."""
+        return (self.aligning(motion.speed, motion.yaw_rate)
+                + self.resistance(motion.speed, motion.wheel_rate)
+                + self.end_stop(motion.wheel_angle) + self.shaking(motion))

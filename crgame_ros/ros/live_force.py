@@ -1,0 +1,113 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Force feedback of a live seat: a thread of its own, so that no command waits for a motor."""
+
+from collections.abc import Callable
+import threading
+import time
+
+from crgame_ros.driver.evdev_device import EvdevDevice
+from crgame_ros.driver.force_feedback import FeltForce, ForceFeedback
+from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.vehicle.parameters import VehicleParameters
+from sensor_msgs.msg import JointState
+
+REFRESH_S = 0.008
+# How often a motor is looked for.
+LOOK_S = 0.1
+
+
+class LiveForce:
+    """
+    Refreshes the force of a seat's wheel from what sim_node and drivability_node publish.
+
+    :param endpoints: of the node.
+    :param vehicle_id: of the seat.
+    :param driving: tells whether the seat obeys the wheel now.
+    :param say: tells the user something in one line.
+    """
+
+    def __init__(self, endpoints: Endpoints, vehicle_id: str, driving: Callable[[], bool],
+                 say: Callable[[str], object]) -> None:
+        self._endpoints, self._vehicle_id = endpoints, vehicle_id
+        self._driving, self._say, self._told = driving, say, ''
+        self._publisher = endpoints.publisher('/<hv>/steering_torque', vehicle_id)
+        self._message = JointState(name=[f'{vehicle_id}/steering_wheel'])
+        self._motion: PolledSubscription | None = None
+        self._drivability: PolledSubscription | None = None
+        self._thread: threading.Thread | None = None
+        self._ended = threading.Event()
+
+    def begin(self, device: EvdevDevice, vehicle: VehicleParameters) -> None:
+        """
+        Push the wheel of a device, unless what is plugged in has no motor.
+
+        :param vehicle: that it steers.
+        """
+        self.end()
+        if device.connected and device.force_limits is None:
+            return
+        if self._motion is None:
+            self._motion = self._endpoints.polled('/<v>/odom', self._vehicle_id, depth=1)
+            self._drivability = self._endpoints.polled('/<v>/drivability', self._vehicle_id)
+        self._ended.clear()
+        self._thread = threading.Thread(
+            target=self._run, args=(ForceFeedback(device, vehicle),), name='force', daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """Let go of the wheel; the device must still be open."""
+        if self._thread is not None:
+            self._ended.set()
+            self._thread.join()
+            self._thread = None
+
+    def _run(self, force: ForceFeedback) -> None:
+        pause_s = 0.0
+        try:
+            while not self._ended.wait(pause_s):
+                start_s = time.monotonic()
+                self._look(force, start_s)
+                felt = force.step(start_s, self._driving())
+                if force.problem != self._told:
+                    self._told = force.problem
+                    if self._told:
+                        self._say(f'{self._vehicle_id}: {self._told}')
+                if felt is None:
+                    pause_s = LOOK_S
+                else:
+                    self._publish(felt)
+                    pause_s = max(0.0, REFRESH_S - (time.monotonic() - start_s))
+        finally:
+            force.close()
+
+    def _look(self, force: ForceFeedback, now_s: float) -> None:
+        assert self._motion is not None and self._drivability is not None
+        odom = self._motion.latest()
+        if odom is not None:
+            self._message.header.stamp = odom.header.stamp
+            force.see_motion(now_s, 1e-9 * from_time(odom.header.stamp),
+                             odom.twist.twist.linear.x, odom.twist.twist.angular.z)
+        report = self._drivability.latest()
+        if report is not None and report.status:
+            values = {item.key: item.value for item in report.status[0].values}
+            force.see_drivability(values.get('collision') == 'true',
+                                  values.get('road_compliance') == 'false')
+
+    def _publish(self, felt: FeltForce) -> None:
+        self._message.position = [felt.wheel_angle]
+        self._message.effort = [felt.torque]
+        self._publisher.publish(self._message)

@@ -1,0 +1,89 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A text that people read, in the languages of a study."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.schema.marks import Special
+
+MOST_CHARACTERS = 20_000
+
+
+@dataclass(frozen=True)
+class LocalText:
+    """
+    A text in one or several languages.
+
+    :param by_language: texts by the language's code; that of '' is for every language.
+    """
+
+    by_language: tuple[tuple[str, str], ...] = ()
+
+    @classmethod
+    def of(cls, given: Any, where: str = '') -> 'LocalText':
+        """
+        Take what a file says: a text, or texts by language.
+
+        :raises InputError: if it is neither.
+        """
+        if isinstance(given, str) and len(given) <= MOST_CHARACTERS:
+            return cls((('', given),))
+        if isinstance(given, Mapping) and given and all(
+                isinstance(code, str) and isinstance(text, str) and len(text) <= MOST_CHARACTERS
+                for code, text in given.items()):
+            return cls(tuple(given.items()))
+        raise InputError(f'is {short(given)}', where,
+                         'give a text, or texts by language: {en: ..., de: ...}')
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to read."""
+        return any(text for _, text in self.by_language)
+
+    def in_language(self, language: str) -> str:
+        """Give it in a language, else in that for all, else in the first that there is."""
+        texts = dict(self.by_language)
+        return texts.get(language, texts.get('', next(iter(texts.values()), '')))
+
+    def lacks(self, language: str) -> bool:
+        """Tell whether people of a language get it in another one."""
+        return bool(self.by_language) and not {language, ''} & {
+            code for code, _ in self.by_language}
+
+
+class _LocalTextMark(Special):
+    """A text, or texts by language."""
+
+    def read(self, given: Any, where: str, key: str, _base: Path) -> LocalText:
+        """Read it."""
+        if isinstance(given, LocalText):
+            return given
+        place = f'{where}: {key}' if where and key else where or key
+        return LocalText.of(given, place)
+
+    def json_schema(self) -> dict[str, Any]:
+        """Describe it as JSON Schema."""
+        return {'anyOf': [{'type': 'string'}, {
+            'type': 'object', 'additionalProperties': {'type': 'string'}, 'minProperties': 1}]}
+
+    def __str__(self) -> str:
+        """Say what is wanted."""
+        return 'a text, or texts by language: {en: ..., de: ...}'
+
+
+Text = Annotated[LocalText, _LocalTextMark()]

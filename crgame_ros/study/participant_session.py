@@ -1,0 +1,205 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A participant's session: what is done, what comes next, and how it goes on after any end."""
+
+from collections.abc import Callable, Mapping
+from enum import StrEnum
+from pathlib import Path
+import time
+from types import TracebackType
+from typing import Any, Self
+
+from crgame_ros.errors import InputError
+from crgame_ros.study.question import check_answers, Question
+from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.session_journal import SessionJournal
+from crgame_ros.study.session_script import Fields, PracticeDrives, session_of, SessionItem
+from crgame_ros.study.study_file import Page, Questions, StudyFile
+from crgame_ros.study.study_pages import questionnaire_name
+from crgame_ros.study.trial_plan import PlannedTrial
+
+
+class SessionEvent(StrEnum):
+    """What an entry of the journal says."""
+
+    BEGUN = 'begun'
+    STARTED = 'started'
+    FINISHED = 'finished'
+    ABORTED = 'aborted'
+    SKIPPED = 'skipped'
+    REPEATED = 'repeated'
+    PRACTISED = 'practised'
+    NOTE = 'note'
+    MARKER = 'marker'
+    ENDED = 'ended'
+
+
+class ParticipantSession:
+    """
+    Goes through a session; every step is in the journal before it counts.
+
+    :param study: that it is of.
+    :param folder: of the participant.
+    :param participant: anonymous id.
+    :param place: among all participants, from 0 on.
+    :param clock_s: seconds since 1970.
+    :raises InputError: if the study cannot be planned, the participant takes part elsewhere, or
+        has begun another study or place.
+    """
+
+    def __init__(self, study: StudyFile, folder: Path, participant: str, place: int,
+                 clock_s: Callable[[], float] = time.time) -> None:
+        self.study, self.participant, self.place = study, participant, place
+        self.items = session_of(study, place)
+        self._ids = {item.id: item for item in self.items}
+        self._clock_s = clock_s
+        self.journal = SessionJournal(folder)
+        begun = next((entry for entry in self.journal.entries
+                      if entry['entry'] == SessionEvent.BEGUN), None)
+        mine = {'participant': participant, 'place': place,
+                'items': [item.id for item in self.items]}
+        if begun is None:
+            self._add(SessionEvent.BEGUN, **mine)
+        elif {name: begun[name] for name in mine} != mine:
+            self.journal.close()
+            raise InputError('began with another plan', str(folder),
+                             'put the study file back, or name another participant')
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.journal.close()
+
+    @property
+    def done(self) -> frozenset[str]:
+        """Name the items that are finished or skipped."""
+        found: set[str] = set()
+        for entry in self.journal.entries:
+            if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
+                found.add(entry['item'])
+            elif entry['entry'] == SessionEvent.REPEATED:
+                found.discard(entry['item'])
+        return frozenset(found)
+
+    @property
+    def next_item(self) -> SessionItem | None:
+        """Give what is to be done now; None at the end, or once somebody has ended it."""
+        if any(entry['entry'] == SessionEvent.ENDED for entry in self.journal.entries):
+            return None
+        done = self.done
+        return next((item for item in self.items if item.id not in done), None)
+
+    def attempts(self, item: str) -> int:
+        """Count how often an item was started."""
+        return sum(entry['entry'] == SessionEvent.STARTED and entry['item'] == item
+                   for entry in self.journal.entries)
+
+    def start(self, run: str = '') -> int:
+        """
+        Say that the next item begins.
+
+        :param run: name of the recording's folder, of a drive.
+        :return: which attempt it is, from 1 on; a trial that did not finish is another attempt's.
+        """
+        item = self._now()
+        attempt = self.attempts(item.id) + 1
+        self._add(SessionEvent.STARTED, item=item.id, attempt=attempt, run=run)
+        return attempt
+
+    def questions(self, item: SessionItem) -> tuple[Question, ...]:
+        """Give what is asked in an item; empty where nothing is."""
+        if isinstance(item.what, Fields):
+            return self.study.fields
+        if isinstance(item.what, Questions):
+            return load_questionnaire(questionnaire_name(self.study, item.what)).questions
+        return ()
+
+    def finish(self, answers: Mapping[str, Any] | None = None, **told: Any) -> SessionItem:
+        """
+        Say that the next item is done: nothing of it is asked again.
+
+        :param answers: to its questions, as the participant gave them.
+        :param told: what else is known of it: a drive's outcome.
+        :raises InputError: if an answer cannot be taken, or a consent is not given.
+        """
+        item = self._now()
+        if isinstance(item.what, PracticeDrives):
+            raise InputError('is no single thing', item.id, 'call practised')
+        if isinstance(item.what, Page) and item.what.consent and told.get('agreed') is not True:
+            raise InputError('needs consent', item.id, 'agree, or end the session')
+        if isinstance(item.what, PlannedTrial) and not self.attempts(item.id):
+            raise InputError('has not begun', item.id, 'start it first')
+        taken = check_answers(self.questions(item), answers or {}, item.id)
+        self._add(SessionEvent.FINISHED, item=item.id, answers=taken, **told)
+        return item
+
+    def practised(self, good: bool, **told: Any) -> bool:
+        """
+        Take a practice drive.
+
+        :param good: whether it was as it should be.
+        :return: whether the practice is over.
+        """
+        item = self._now()
+        if not isinstance(item.what, PracticeDrives):
+            raise InputError('is no practice', item.id, 'finish it')
+        self._add(SessionEvent.PRACTISED, item=item.id, good=good, **told)
+        drives = [entry['good'] for entry in self.journal.entries
+                  if entry['entry'] == SessionEvent.PRACTISED and entry['item'] == item.id]
+        practice = item.what.practice
+        over = len(drives) >= practice.at_least and (
+            good or 0 < practice.at_most <= len(drives))
+        if over:
+            self._add(SessionEvent.FINISHED, item=item.id, answers={}, drives=len(drives))
+        return over
+
+    def abort(self, reason: str) -> None:
+        """Say that the present attempt of the next item counts for nothing; it comes again."""
+        self._add(SessionEvent.ABORTED, item=self._now().id, reason=reason)
+
+    def skip(self, reason: str) -> None:
+        """Leave the next item out, for a reason."""
+        if not reason.strip():
+            raise InputError('needs a reason', self._now().id, 'say why it is left out')
+        self._add(SessionEvent.SKIPPED, item=self._now().id, reason=reason)
+
+    def repeat(self, item: str, reason: str) -> None:
+        """Let an item that is done come again: what was told of it before stays in the journal."""
+        if item not in self._ids or item not in self.done:
+            raise InputError('is not done', item[:60], 'name an item that is')
+        self._add(SessionEvent.REPEATED, item=item, reason=reason)
+
+    def note(self, text: str, **told: Any) -> None:
+        """Keep what the experimenter remarks."""
+        self._add(SessionEvent.NOTE, text=text, **told)
+
+    def mark(self, name: str, **told: Any) -> None:
+        """Keep a marker of the experimenter's or of a secondary task."""
+        self._add(SessionEvent.MARKER, name=name, **told)
+
+    def end(self, reason: str) -> None:
+        """End the session before its last item; it does not go on any more."""
+        self._add(SessionEvent.ENDED, reason=reason)
+
+    def _now(self) -> SessionItem:
+        item = self.next_item
+        if item is None:
+            raise InputError('is over', f'session of {self.participant}', 'nothing is left to do')
+        return item
+
+    def _add(self, entry: SessionEvent, **values: Any) -> None:
+        self.journal.add({'entry': entry.value, 'at': self._clock_s(), **values})

@@ -1,0 +1,147 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Questionnaires: questions that belong together, and the scores of their answers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+import math
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+from crgame_ros.errors import InputError
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Listed
+from crgame_ros.schema.reading import read
+from crgame_ros.study.local_text import LocalText, Text
+from crgame_ros.study.names import ColumnName
+from crgame_ros.study.question import Answer, ChoiceQuestion, Question
+from crgame_ros.yaml_text import read_yaml
+
+SCALES = Path(__file__).resolve().parent / 'scales'
+_SEE = 'see docs/studies.md for the keys'
+
+
+@dataclass(frozen=True)
+class Score:
+    """
+    A number made of answers.
+
+    :param name: of its column in the tables.
+    :param items: names of the questions whose answers count.
+    :param how: `mean` or `sum` of the answers; `tally` is their mean weighted by how often each
+        was chosen in the questions of `pairs`.
+    :param factor: by which the result is multiplied.
+    :param flipped: those of the items that count with the opposite sign.
+    :param offset: is added to each answer first.
+    :param pairs: names of the questions that choose between two items, for `tally`.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    name: ColumnName
+    items: Annotated[tuple[str, ...], Listed(1, noun='item')]
+    how: Literal['mean', 'sum', 'tally'] = 'mean'
+    factor: float = 1.0
+    flipped: Annotated[tuple[str, ...], Listed(noun='item')] = ()
+    offset: float = 0.0
+    pairs: Annotated[tuple[str, ...], Listed(noun='question')] = ()
+
+    def of(self, answers: Mapping[str, Answer]) -> float:
+        """Compute it; NaN where an answer is missing."""
+        values = [answers.get(item) for item in self.items]
+        if not all(isinstance(value, int | float) for value in values):
+            return math.nan
+        signed = [(-1.0 if item in self.flipped else 1.0) * (float(value) + self.offset)
+                  for item, value in zip(self.items, values, strict=True)
+                  if isinstance(value, int | float)]
+        if self.how == 'sum':
+            return self.factor * sum(signed)
+        if self.how == 'mean':
+            return self.factor * sum(signed) / len(signed)
+        chosen = [answers.get(name) for name in self.pairs]
+        weights = [chosen.count(item) for item in self.items]
+        if None in chosen or not sum(weights):
+            return math.nan
+        return self.factor * sum(weight * value for weight, value in
+                                 zip(weights, signed, strict=True)) / sum(weights)
+
+
+@dataclass(frozen=True)
+class Questionnaire:
+    """
+    A questionnaire, as its file says it.
+
+    :param name: of it, in front of its columns in the tables.
+    :param title: above it.
+    :param text: what people read before its questions.
+    :param citation: whose it is.
+    :param questions: in their order.
+    :param scores: of the answers.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    name: ColumnName
+    questions: Annotated[tuple[Question, ...], Listed(1, 200, 'question', 'name')]
+    title: Text = LocalText()
+    text: Text = LocalText()
+    citation: str = ''
+    scores: Annotated[tuple[Score, ...], Listed(0, 50, 'score', 'name')] = ()
+
+    def check(self) -> None:
+        """Refuse scores of questions that there are not."""
+        known = {question.name: question for question in self.questions}
+        for score in self.scores:
+            for item in (*score.items, *score.flipped, *score.pairs):
+                if item not in known:
+                    raise InputError(f'names the question "{item}", which is not there',
+                                     f'scores: {score.name}', 'name questions of this file')
+            if (score.how == 'tally') != bool(score.pairs):
+                raise InputError('has "pairs" without "how: tally", or the other way round',
+                                 f'scores: {score.name}', 'give both or none')
+            for item in score.pairs:
+                kind = known[item].kind
+                if not isinstance(kind, ChoiceQuestion) or not set(
+                        map(str, kind.choices)) <= set(score.items):
+                    raise InputError(f'"{item}" does not choose between items',
+                                     f'scores: {score.name}', 'let its choices be two items')
+
+    def score(self, answers: Mapping[str, Answer]) -> dict[str, float]:
+        """Compute all scores of some answers; NaN where an answer is missing."""
+        return {score.name: score.of(answers) for score in self.scores}
+
+
+def standard_questionnaires() -> tuple[str, ...]:
+    """Name those that come with the program."""
+    return tuple(sorted(path.stem for path in SCALES.glob('*.yaml')))
+
+
+@cache
+def load_questionnaire(name: str) -> Questionnaire:
+    """
+    Read a questionnaire.
+
+    :param name: of one that comes with the program, or a file.
+    :raises InputError: naming the file, the key and the remedy.
+    """
+    if name in standard_questionnaires():
+        path = SCALES / f'{name}.yaml'
+    elif name.endswith(('.yaml', '.yml')):
+        path = Path(name)
+    else:
+        raise InputError(f'there is no questionnaire "{name[:60]}"', 'questionnaire',
+                         f'name {", ".join(standard_questionnaires())} or a YAML file')
+    return read(Questionnaire, read_yaml(path, 'questionnaire'), str(path), path.parent)

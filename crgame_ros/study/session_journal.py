@@ -1,0 +1,114 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What has happened in a participant's session, line by line: nothing of it is ever lost."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+import fcntl
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any, IO, Self
+
+from crgame_ros.errors import InputError
+
+JOURNAL = 'journal.jsonl'
+
+
+class SessionJournal:
+    """
+    A file to which entries are only ever added; each is on the disk when `add` returns.
+
+    Whatever ends the process, a line is there whole or, the last one, is dropped when the file is
+    opened again.
+
+    :param folder: of the participant; is made.
+    :raises InputError: if it cannot be written, or another process writes there.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / JOURNAL
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._file: IO[bytes] = self.path.open('a+b')
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            self._file.close()
+            raise InputError('this participant takes part already, in another process',
+                             str(folder), 'end that one first, or name another participant'
+                             ) from error
+        except OSError as error:
+            raise _refusal(self.path, error) from error
+        self.entries = list(self._recovered())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def add(self, entry: dict[str, Any]) -> None:
+        """
+        Add an entry.
+
+        :raises InputError: if it cannot be written.
+        """
+        line = json.dumps(entry, ensure_ascii=False, allow_nan=False) + '\n'
+        try:
+            self._file.write(line.encode('utf-8', 'surrogatepass'))
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise _refusal(self.path, error) from error
+        self.entries.append(json.loads(line))
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    def _recovered(self) -> Iterator[dict[str, Any]]:
+        """Read what is there; a line that was cut off is taken away."""
+        self._file.seek(0)
+        content = self._file.read()
+        whole = content[:content.rfind(b'\n') + 1]
+        if len(whole) < len(content):
+            self._file.truncate(len(whole))
+            os.fsync(self._file.fileno())
+        for line in whole.splitlines():
+            with suppress(ValueError):
+                entry = json.loads(line)
+                if isinstance(entry, dict):
+                    yield entry
+
+
+def read_journal(folder: Path) -> list[dict[str, Any]]:
+    """Read a participant's entries, also while somebody adds some."""
+    try:
+        lines = (folder / JOURNAL).read_bytes().splitlines(keepends=True)
+    except FileNotFoundError:
+        return []
+    entries = []
+    for line in lines:
+        with suppress(ValueError):
+            if line.endswith(b'\n') and isinstance(entry := json.loads(line), dict):
+                entries.append(entry)
+    return entries
+
+
+def _refusal(path: Path, error: OSError) -> InputError:
+    return InputError(f'cannot be written ({error.strerror})', str(path),
+                      'choose a folder that can be written, on a disk with room')

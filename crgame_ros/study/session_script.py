@@ -1,0 +1,94 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Everything that a participant goes through, item by item, in order."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from crgame_ros.study.study_file import Block, Break, Practice, Step, StepEntry, StudyFile
+from crgame_ros.study.trial_plan import plan_trials, PlannedTrial
+from crgame_ros.study.trial_settings import laid, TrialSettings
+
+
+@dataclass(frozen=True)
+class Fields:
+    """What is asked of a participant first."""
+
+
+@dataclass(frozen=True)
+class PracticeDrives:
+    """
+    Practice before a block.
+
+    :param practice: how often, and what is good.
+    :param settings: of it.
+    """
+
+    practice: Practice
+    settings: TrialSettings
+
+
+@dataclass(frozen=True)
+class SessionItem:
+    """
+    One thing to do.
+
+    :param id: of it, the same in each process that reads the same study.
+    :param what: to do.
+    :param trial: after which it comes, for answers; None elsewhere.
+    """
+
+    id: str  # noqa: A003
+    what: Step | Fields | PracticeDrives | PlannedTrial
+    trial: int | None = None
+
+
+def session_of(study: StudyFile, place: int) -> tuple[SessionItem, ...]:
+    """
+    Script the session of a participant.
+
+    :param place: among all participants, from 0 on.
+    :raises InputError: if the study cannot be planned.
+    """
+    items: list[SessionItem] = [SessionItem('fields', Fields())] if study.fields else []
+    items += _steps('before', study.before)
+    trials = plan_trials(study, place)
+    for block in study.blocks:
+        items += _block(study, block, [trial for trial in trials if trial.block == block.name])
+    items += _steps('after', study.after)
+    return tuple(items)
+
+
+def _block(study: StudyFile, block: Block, trials: list[PlannedTrial]) -> Iterator[SessionItem]:
+    yield from _steps(f'{block.name}/before', block.before)
+    if block.practice is not None:
+        settings = laid(study.settings, block.settings, block.practice.settings)
+        if settings.game is None and trials:
+            # Practice is in the game of the first trial where nobody says otherwise.
+            settings = TrialSettings(game=trials[0].condition.settings.game).over(settings)
+        yield SessionItem(f'{block.name}/practice', PracticeDrives(block.practice, settings))
+    for trial in trials:
+        name = f'{block.name}/{trial.place}'
+        yield SessionItem(name, trial)
+        yield from _steps(f'{name}/after', block.after_trial, trial.number)
+        if block.break_every and trial.place % block.break_every == 0 and trial != trials[-1]:
+            yield SessionItem(f'{name}/break', Break(block.break_minutes))
+    yield from _steps(f'{block.name}/after', block.after)
+
+
+def _steps(name: str, steps: tuple[StepEntry, ...],
+           trial: int | None = None) -> Iterator[SessionItem]:
+    for number, entry in enumerate(steps):
+        yield SessionItem(f'{name}/{number + 1}', entry.step, trial)

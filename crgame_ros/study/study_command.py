@@ -1,0 +1,98 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The command `crgame study`: experiments with people."""
+
+import argparse
+from functools import partial
+from pathlib import Path
+import sys
+
+from crgame_ros.errors import InputError
+from crgame_ros.paths import config_directory, scenarios_directory
+
+DESCRIPTION = """\
+Plan an experiment with people: who drives which trials in which order, and what is asked.
+
+  crgame study new my_study        # a commented study file, with its pages
+  crgame study check my_study/study.yaml
+
+docs/studies.md leads through an example."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    what = parser.add_subparsers(title='what', metavar='WHAT', required=True)
+    new = what.add_parser('new', help='write a commented study file with its pages')
+    new.add_argument('folder', type=Path, help='is made')
+    new.set_defaults(command=new_command)
+    check = what.add_parser('check', help='find mistakes, and print the plan')
+    check.add_argument('file', type=Path, help='study file')
+    check.add_argument('--participants', type=int, metavar='N',
+                       help='print the orders of so many (default: 4)', default=4)
+    check.set_defaults(command=check_command)
+
+
+def new_command(values: argparse.Namespace) -> int:
+    """
+    Write a study to begin with.
+
+    :raises InputError: if the folder is there or cannot be written.
+    """
+    source, folder = config_directory() / 'studies' / 'example', values.folder
+    scenarios = str(scenarios_directory())
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError as error:
+        raise InputError('is there already', str(folder), 'name another folder') from error
+    except OSError as error:
+        raise InputError(f'cannot be made ({error.strerror})', str(folder),
+                         'name another folder') from error
+    for path in sorted(source.iterdir()):
+        text = path.read_text(encoding='utf-8').replace('SCENARIOS', scenarios)
+        (folder / path.name).write_text(text, encoding='utf-8')
+    print(folder / 'study.yaml')
+    return 0
+
+
+def check_command(values: argparse.Namespace) -> int:
+    """
+    Look at a study.
+
+    :return: 1 if it cannot be run as it is.
+    :raises InputError: if the file cannot be read, or names what there is not.
+    """
+    from crgame_ros.recording.progress import Progress
+    from crgame_ros.study.study_check import check_study, length_of
+    from crgame_ros.study.study_file import load_study
+    from crgame_ros.study.trial_plan import plan_trials
+    if not 0 <= values.participants <= 10_000:
+        raise InputError(f'is {values.participants}', '--participants', 'give 0 to 10000')
+    study = load_study(values.file)
+    say = partial(print, file=sys.stderr, flush=True)
+    findings = check_study(study, Progress(say, 'driving a second of each condition'))
+    for finding in findings:
+        say(f'{finding.kind}: {finding.text}')
+    if any(finding.kind == 'error' for finding in findings):
+        return 1
+    for place in range(values.participants):
+        print(f'participant {place + 1}:')
+        for trial in plan_trials(study, place):
+            print(f'  {trial.number:3}  {trial.block}  {trial.condition.name}')
+    length = length_of(study)
+    print(f'a session takes about {(length.driving_s + length.else_s) / 60.0:.0f} min, '
+          f'{length.driving_s / 60.0:.0f} of them driving')
+    return 0

@@ -1,0 +1,231 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The study file: who takes part, what they see and answer, and which trials they drive."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+from crgame_ros.errors import InputError
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Folder, Keyed, Listed, Within, Wording
+from crgame_ros.schema.reading import read
+from crgame_ros.study.local_text import LocalText, Text
+from crgame_ros.study.names import Name
+from crgame_ros.study.question import Question
+from crgame_ros.study.trial_order import OrderKind
+from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
+from crgame_ros.yaml_text import read_yaml
+
+_SEE = 'see docs/studies.md for the keys'
+
+
+@dataclass(frozen=True)
+class Page:
+    """
+    A page to read.
+
+    :param file: Markdown; `consent.de.md` beside `consent.md` is that for German.
+    :param consent: whether it has to be agreed to, or the study ends.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE, short='file')
+
+    file: Annotated[str, Wording(r'[^/\0][^\0]*\.md', 'name a Markdown file beside this one')]
+    consent: bool = False
+
+
+@dataclass(frozen=True)
+class Questions:
+    """
+    A questionnaire.
+
+    :param name: of a standard one, or a YAML file beside the study's.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE, short='name')
+
+    name: Annotated[str, Wording(r'[^/\0][^\0]*', 'name a questionnaire or a YAML file')]
+
+
+@dataclass(frozen=True)
+class Break:
+    """
+    A pause.
+
+    :param minutes: that it lasts at least.
+    :param text: what people read.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    minutes: Annotated[float, Within(0.0, 240.0)] = 0.0
+    text: Text = LocalText()
+
+
+@dataclass(frozen=True)
+class DeviceCheck:
+    """
+    The participant moves every control once, as the page shows it.
+
+    :param text: what people read.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    text: Text = LocalText()
+
+
+Step = Page | Questions | Break | DeviceCheck
+STEPS: dict[str, type[Step]] = {
+    'page': Page, 'questions': Questions, 'break': Break, 'device_check': DeviceCheck}
+
+
+@dataclass(frozen=True)
+class StepEntry:
+    """
+    Something that participants do between trials.
+
+    :param step: what it is.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    step: Annotated[Step, Keyed(STEPS, 'step')]
+
+
+Steps = Annotated[tuple[StepEntry, ...], Listed(0, 50, 'step')]
+
+
+@dataclass(frozen=True)
+class Practice:
+    """
+    Driving before the first trial of a block, which is no trial.
+
+    :param settings: of it, besides those of the study and the block.
+    :param at_least: how often it is driven.
+    :param at_most: after so many the block begins whatever became of them; 0 goes on until one
+        is good.
+    :param seconds: without a collision or leaving the road that make one good [s]
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    settings: TrialSettings = NOTHING
+    at_least: Annotated[int, Within(1, 50)] = 1
+    at_most: Annotated[int, Within(0, 50)] = 3
+    seconds: Annotated[float, Within(0.0, 3600.0)] = 10.0
+
+    def check(self) -> None:
+        """Refuse a greatest number below the least."""
+        if 0 < self.at_most < self.at_least:
+            raise InputError('"at_most" is below "at_least"', '', 'give more, or 0')
+
+
+@dataclass(frozen=True)
+class Block:
+    """
+    Trials that belong together.
+
+    :param name: of it.
+    :param factors: names of those whose levels are crossed; all by default.
+    :param repetitions: how often each condition is driven.
+    :param order: of the conditions, in each repetition anew.
+    :param sequences: lists of conditions, `level` or `level/level`, that participants take in
+        turn instead.
+    :param settings: of its trials, besides those of the study.
+    :param practice: before its first trial.
+    :param before: steps before it.
+    :param after_trial: steps after each trial.
+    :param break_every: trials after which there is a break, 0 for none.
+    :param break_minutes: that it lasts at least.
+    :param after: steps after it.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    name: Name
+    factors: Annotated[tuple[str, ...], Listed(noun='factor')] | None = None
+    repetitions: Annotated[int, Within(1, 1000)] = 1
+    order: OrderKind = 'williams'
+    sequences: Annotated[tuple[tuple[str, ...], ...], Listed(noun='sequence')] = ()
+    settings: TrialSettings = NOTHING
+    practice: Practice | None = None
+    before: Steps = ()
+    after_trial: Steps = ()
+    break_every: Annotated[int, Within(0, 1000)] = 0
+    break_minutes: Annotated[float, Within(0.0, 240.0)] = 1.0
+    after: Steps = ()
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """
+    A study.
+
+    :param name: of its folder.
+    :param title: for people.
+    :param language: of participants, unless they choose another one.
+    :param languages: among which they may choose.
+    :param seed: of all orders.
+    :param participants: how many are planned, for the checks of balance.
+    :param fields: what is asked of each participant first.
+    :param settings: of all trials.
+    :param factors: what differs between conditions.
+    :param before: steps before the first block.
+    :param blocks: in their order.
+    :param after: steps after the last block.
+    :param base: directory against which file names are resolved.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    name: Name
+    blocks: Annotated[tuple[Block, ...], Listed(1, 50, 'block', 'name')]
+    title: Text = LocalText()
+    language: Literal['en', 'de'] | str = 'en'
+    languages: Annotated[tuple[str, ...], Listed(0, 20, 'language')] = ()
+    seed: Annotated[int, Within(0, 2**63 - 1)] = 0
+    participants: Annotated[int, Within(1, 10_000)] = 12
+    fields: Annotated[tuple[Question, ...], Listed(0, 50, 'question', 'name')] = ()
+    settings: TrialSettings = NOTHING
+    factors: Annotated[tuple[Factor, ...], Listed(0, 10, 'factor', 'name')] = ()
+    before: Steps = ()
+    after: Steps = ()
+    base: Annotated[Path, Folder()] = Path('.')
+
+    def check(self) -> None:
+        """Refuse blocks that name what there is not."""
+        known = {factor.name for factor in self.factors}
+        for block in self.blocks:
+            for name in block.factors or ():
+                if name not in known:
+                    raise InputError(f'names the factor "{name}", which is not there',
+                                     f'blocks: {block.name}',
+                                     f'name {", ".join(sorted(known)) or "none"}')
+
+    def factors_of(self, block: Block) -> tuple[Factor, ...]:
+        """Give the factors that are crossed in a block, in the order of the file."""
+        return tuple(factor for factor in self.factors
+                     if block.factors is None or factor.name in block.factors)
+
+
+def load_study(path: Path) -> StudyFile:
+    """
+    Read a study file.
+
+    :raises InputError: naming the file, the key and the remedy.
+    """
+    return read(StudyFile, read_yaml(path, 'study'), str(path), path.parent)

@@ -1,0 +1,38 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where the pages and questionnaires of a study are."""
+
+from pathlib import Path
+
+from crgame_ros.study.study_file import Page, Questions, StudyFile
+
+
+def page_file(study: StudyFile, page: Page, language: str) -> Path | None:
+    """
+    Find a page's file: `NAME.de.md` before `NAME.md`.
+
+    :return: None if there is none.
+    """
+    whole = study.base / page.file
+    for file in (whole.with_suffix(f'.{language}.md'), whole):
+        if file.is_file():
+            return file
+    return None
+
+
+def questionnaire_name(study: StudyFile, step: Questions) -> str:
+    """Name a questionnaire as it can be read from anywhere."""
+    is_file = step.name.endswith(('.yaml', '.yml'))
+    return str(study.base / step.name) if is_file else step.name

@@ -1,0 +1,81 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The game of a trial: its game file, with what the trial's settings say otherwise."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.game import Game
+from crgame_ros.game.game_file import load_game
+from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.schema.reading import read
+from crgame_ros.simulation.adapted_game import adapt_game, OWN
+from crgame_ros.study.trial_settings import TrialSettings
+from crgame_ros.yaml_text import read_yaml
+
+PERFECT, NONE = 'perfect', 'none'
+
+
+def seat_of(settings: TrialSettings, game: Game) -> str:
+    """
+    Name the vehicle that the participant drives.
+
+    :raises InputError: if the game has no human, or none of that name.
+    """
+    ids = [human.id for human in game.humans]
+    seat = settings.seat or (ids[0] if ids else '')
+    if seat not in ids:
+        raise InputError(f'has no human "{seat}"' if seat else 'has no human',
+                         settings.game or 'trial', f'name {" or ".join(ids)} as "seat"' if ids
+                         else 'give the game one: humans: [{id: hv0, driver: cockpit}]')
+    return seat
+
+
+def trial_game(settings: TrialSettings, driver: str) -> Game:
+    """
+    Make the game of a trial.
+
+    :param settings: of the trial, laid over everything further out.
+    :param driver: of the participant's seat.
+    :raises InputError: if a file cannot be used, or the settings do not fit the game.
+    """
+    if settings.game is None:
+        raise InputError('names no game', 'trial', 'give "game" to the study, a block or a level')
+    game = load_game(Path(settings.game))
+    seat = seat_of(settings, game)
+    game = replace(game, humans=tuple(
+        replace(human, driver=driver) if human.id == seat else human for human in game.humans),
+        events=(*game.events, *settings.events),
+        sound='on' if settings.sound else 'none')
+    if settings.duration is not None:
+        game = replace(game, duration=settings.duration)
+    return adapt_game(
+        game, load_scenario(game.scenario), seed=settings.seed or 0,
+        planner=settings.planner or OWN, options=settings.options,
+        perception=_spec(PerceptionSpec, settings.perception, PERFECT, 'perception'),
+        traffic=_spec(TrafficSpec, settings.traffic, NONE, 'traffic'))
+
+
+def _spec(kind: type[Any], name: str | None, nothing: str, what: str) -> Any:
+    if name in (None, OWN):
+        return OWN
+    if name == nothing:
+        return None
+    file = Path(str(name))
+    return read(kind, read_yaml(file, what), str(file), file.parent)

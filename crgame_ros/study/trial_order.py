@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""In which order a participant meets the conditions of a block: equal seeds, equal orders."""
+
+from collections.abc import Sequence
+import random
+from typing import Literal
+
+OrderKind = Literal['williams', 'random', 'given']
+ORDERS: tuple[OrderKind, ...] = ('williams', 'random', 'given')
+
+
+def williams_rows(count: int) -> list[list[int]]:
+    """
+    Give the sequences of a Latin square that is balanced for carry-over.
+
+    Each condition stands equally often at each place, and each follows each other equally often.
+    An even number of conditions needs as many sequences, an odd number twice as many (Williams,
+    Experimental designs balanced for the estimation of residual effects of treatments, Australian
+    Journal of Scientific Research A 2, 1949).
+
+    :param count: of conditions, at least 1.
+    :return: rows of 0 … count - 1.
+    """
+    zigzag = [(place + 1) // 2 if place % 2 else -(place // 2) for place in range(count)]
+    rows = [[(row + step) % count for step in zigzag] for row in range(count)]
+    return rows if count % 2 == 0 else rows + [row[::-1] for row in rows]
+
+
+def rows_of(kind: OrderKind, count: int) -> int:
+    """Count the participants after whom an order begins anew: a multiple of them is balanced."""
+    return len(williams_rows(count)) if kind == 'williams' else 1
+
+
+def order_of(kind: OrderKind, count: int, seed: int, place: int, pass_number: int = 0,
+             sequences: Sequence[Sequence[int]] = ()) -> list[int]:
+    """
+    Order the conditions of one pass through a block.
+
+    :param kind: `williams` gives each participant the next row of a square, whose conditions the
+        seed has shuffled; `random` shuffles for each participant and pass; `given` is the file's.
+    :param count: of conditions.
+    :param seed: of the study.
+    :param place: of the participant, from 0 on.
+    :param pass_number: which repetition of the block, from 0 on.
+    :param sequences: taken in turn by participants instead, whatever the kind, if there are any.
+    :return: a permutation of 0 … count - 1, unless a sequence says otherwise.
+    """
+    if sequences:
+        return list(sequences[place % len(sequences)])
+    if kind == 'given':
+        return list(range(count))
+    if kind == 'random':
+        return shuffled(count, f'{seed} {place} {pass_number}')
+    rows = williams_rows(count)
+    names = shuffled(count, f'{seed}')
+    # The next pass takes the next row, so that one participant alone is not always first the same.
+    return [names[item] for item in rows[(place + pass_number) % len(rows)]]
+
+
+def shuffled(count: int, seed: str) -> list[int]:
+    """Shuffle 0 … count - 1; a text's random numbers are the same on every machine."""
+    items = list(range(count))
+    random.Random(seed).shuffle(items)
+    return items

@@ -1,0 +1,101 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Which trials a participant drives, in their order: conditions crossed, settings laid over."""
+
+from dataclasses import dataclass
+from itertools import product
+
+from crgame_ros.errors import InputError
+from crgame_ros.study.study_file import Block, StudyFile
+from crgame_ros.study.trial_order import order_of
+from crgame_ros.study.trial_settings import laid, Level, TrialSettings
+
+
+@dataclass(frozen=True)
+class Condition:
+    """
+    A combination of levels.
+
+    :param levels: one of each factor of the block, by the factor's name.
+    :param settings: of its trials, laid over those of study and block.
+    """
+
+    levels: tuple[tuple[str, Level], ...]
+    settings: TrialSettings
+
+    @property
+    def name(self) -> str:
+        """Name it by its levels."""
+        return '/'.join(level.name for _, level in self.levels) or 'all'
+
+
+@dataclass(frozen=True)
+class PlannedTrial:
+    """
+    A trial to drive.
+
+    :param number: among all of the participant's, from 1 on.
+    :param block: name of its block.
+    :param place: in its block, from 1 on.
+    :param repetition: from 1 on.
+    :param condition: that it has.
+    """
+
+    number: int
+    block: str
+    place: int
+    repetition: int
+    condition: Condition
+
+
+def conditions_of(study: StudyFile, block: Block) -> tuple[Condition, ...]:
+    """Cross the levels of a block's factors; the last factor changes fastest."""
+    factors = study.factors_of(block)
+    return tuple(
+        Condition(tuple((factor.name, level) for factor, level in
+                        zip(factors, levels, strict=True)),
+                  laid(study.settings, block.settings, *(level.settings for level in levels)))
+        for levels in product(*(factor.levels for factor in factors)))
+
+
+def plan_trials(study: StudyFile, place: int) -> tuple[PlannedTrial, ...]:
+    """
+    Plan all trials of a participant.
+
+    :param place: of the participant among all, from 0 on.
+    :raises InputError: if a block's sequence names no condition of it.
+    """
+    trials: list[PlannedTrial] = []
+    for block in study.blocks:
+        conditions = conditions_of(study, block)
+        sequences = _sequences(block, [condition.name for condition in conditions])
+        in_block = 0
+        for repetition in range(block.repetitions):
+            for index in order_of(block.order, len(conditions), study.seed, place, repetition,
+                                  sequences):
+                in_block += 1
+                trials.append(PlannedTrial(len(trials) + 1, block.name, in_block, repetition + 1,
+                                           conditions[index]))
+    return tuple(trials)
+
+
+def _sequences(block: Block, names: list[str]) -> list[list[int]]:
+    for number, sequence in enumerate(block.sequences):
+        for name in sequence:
+            if name not in names:
+                raise InputError(f'names "{name}", which is no condition of the block',
+                                 f'blocks: {block.name}: sequences[{number}]',
+                                 f'name {", ".join(names)}')
+    return [[names.index(name) for name in sequence] for sequence in block.sequences]

@@ -1,0 +1,70 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where a driver sits: eyes and mirrors in a vehicle, for views out of it."""
+
+from dataclasses import dataclass
+
+from crgame_ros.vehicle.parameters import VehicleParameters
+
+Point = tuple[float, float, float]
+# A longer vehicle is a truck or a bus, with its cab over the front axle [m].
+LONGEST_CAR = 6.0
+# Roof, eyes, outer mirrors and bonnet above the road [m].
+_CAR_HEIGHTS = (1.45, 1.17, 0.98, 0.95)
+_TRUCK_HEIGHTS = (3.2, 2.45, 2.2, 1.2)
+# Where people sit in a car, behind the front axle, and in a cab, behind the bumper [m].
+_SEAT_BEHIND_AXLE, _SEAT_BEHIND_BUMPER = 1.33, 1.4
+_MIRROR_AHEAD_OF_EYE, _MIRROR_OUTSIDE = 0.53, 0.12
+_INNER_MIRROR_AHEAD_OF_EYE, _INNER_MIRROR_BELOW_ROOF = 0.5, 0.16
+
+
+@dataclass(frozen=True)
+class DriverPlace:
+    """
+    Points of a vehicle: ahead of the rear axle, to the left, above the road [m].
+
+    :param height: of the roof [m]
+    :param bonnet_height: of its highest line [m]
+    :param eye: amid the driver's eyes.
+    :param left_mirror: its middle.
+    :param right_mirror: its middle.
+    :param inner_mirror: its middle.
+    """
+
+    height: float
+    bonnet_height: float
+    eye: Point
+    left_mirror: Point
+    right_mirror: Point
+    inner_mirror: Point
+
+
+def driver_place(vehicle: VehicleParameters) -> DriverPlace:
+    """Give the places that the vehicle's file names, or what is usual for its size."""
+    is_car = vehicle.length <= LONGEST_CAR
+    usual = _CAR_HEIGHTS if is_car else _TRUCK_HEIGHTS
+    height, eye_height, mirror_height, bonnet_height = (
+        given or value for given, value in zip(
+            (vehicle.height, vehicle.eye_height, vehicle.mirror_height, vehicle.bonnet_height),
+            usual, strict=True))
+    seat = vehicle.wheelbase - _SEAT_BEHIND_AXLE if is_car \
+        else vehicle.front - _SEAT_BEHIND_BUMPER
+    eye_ahead = vehicle.eye_ahead or seat
+    mirror_ahead = vehicle.mirror_ahead or eye_ahead + _MIRROR_AHEAD_OF_EYE
+    aside = vehicle.mirror_left or 0.5 * vehicle.width + _MIRROR_OUTSIDE
+    return DriverPlace(
+        height, bonnet_height, (eye_ahead, vehicle.eye_left, eye_height),
+        (mirror_ahead, aside, mirror_height), (mirror_ahead, -aside, mirror_height),
+        (eye_ahead + _INNER_MIRROR_AHEAD_OF_EYE, 0.0, height - _INNER_MIRROR_BELOW_ROOF))

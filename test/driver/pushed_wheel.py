@@ -1,0 +1,120 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A wheel with a motor whose file is a socket: whatever is written to it can be read elsewhere."""
+
+import ctypes
+from pathlib import Path
+import socket
+import struct
+import sys
+from tempfile import gettempdir
+import time
+from typing import Any
+
+from crgame_ros.driver.device_map import load_device_map
+from crgame_ros.driver.evdev_device import EvdevDevice, EventDecoder
+from crgame_ros.driver.force_feedback import ForceFeedback
+from crgame_ros.driver.force_limits import ForceLimits
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from evdev import ecodes, ff
+
+# What is written: a mark, then the bytes of the ioctl or of the event.
+UPLOAD, EVENT, ERASE = b'U', b'E', b'X'
+EVENT_FORMAT = 'HHi'
+EFFECT_SIZE = ctypes.sizeof(ff.Effect)
+
+
+class Motor:
+    """Does what evdev does with a descriptor: uploads and writes; one effect has room."""
+
+    def __init__(self, file: socket.socket | None = None) -> None:
+        self.file = file
+        self.levels: list[int] = []
+        self.events: list[tuple[int, int, int]] = []
+        self.effects: set[int] = set()
+        self.error: OSError | None = None
+
+    def upload_effect(self, effect: ff.Effect) -> int:
+        """Take an effect as EVIOCSFF does."""
+        data = memoryview(effect).tobytes()
+        self._send(UPLOAD + data)
+        read = ff.Effect.from_buffer_copy(data)
+        assert read.type == ecodes.FF_CONSTANT
+        if read.id == -1:
+            assert not self.effects, 'a second effect'
+            self.effects.add(7)
+        else:
+            assert {read.id} == self.effects
+        self.levels.append(read.u.ff_constant_effect.level)
+        return 7
+
+    def write(self, etype: int, code: int, value: int) -> None:
+        """Take an event."""
+        self._send(EVENT + struct.pack(EVENT_FORMAT, etype, code, value))
+        self.events.append((etype, code, value))
+
+    def erase_effect(self, ff_id: int) -> None:
+        """Remove an effect as EVIOCRMFF does."""
+        self._send(ERASE)
+        self.effects.remove(ff_id)
+
+    def _send(self, data: bytes) -> None:
+        if self.error is not None:
+            raise self.error
+        if self.file is not None:
+            self.file.sendall(struct.pack('H', len(data)) + data)
+
+
+class PushedWheel(EvdevDevice):
+    """
+    A G29 that is fed by its decoder, and whose motor is a double.
+
+    :ivar motor: what is plugged in; None while it is unplugged.
+    """
+
+    def __init__(self, motor: Motor | None, limits: ForceLimits | None = None) -> None:
+        device_map = load_device_map('logitech_g29')
+        super().__init__((device_map,), directory=Path(gettempdir()) / 'no devices')
+        assert device_map.evdev is not None
+        self.device_map, self.layout = device_map, device_map.evdev.layout()
+        self.decoder = EventDecoder(device_map.evdev.gear)
+        self.motor = motor
+        self.limits = limits or device_map.force
+
+    @property
+    def force_device(self) -> Any:
+        """Give the double."""
+        return self.motor
+
+    @property
+    def force_limits(self) -> ForceLimits | None:
+        """Give its limits."""
+        return self.limits if self.motor is not None else None
+
+
+def main() -> None:
+    """Push hard to the right for ever, in the file that was handed on."""
+    wheel = PushedWheel(Motor(socket.socket(fileno=int(sys.argv[1]))))
+    force = ForceFeedback(wheel, load_vehicle_parameters())
+    n = 0
+    while True:
+        n += 1
+        force.see_motion(time.monotonic(), 0.01 * n, 20.0, 0.3)
+        force.step(time.monotonic())
+        time.sleep(0.005)
+
+
+if __name__ == '__main__':
+    main()

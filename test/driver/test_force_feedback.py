@@ -1,0 +1,325 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Force feedback: the torque's formula, its limits, and that it ends whenever it has to."""
+
+import errno
+import math
+import os
+from pathlib import Path
+import random
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+
+from crgame_ros.driver.device_map import load_device_maps, parse_device_map
+from crgame_ros.driver.evdev_device import open_evdev
+from crgame_ros.driver.force_effect import FULL_LEVEL, LENGTH_MS, RENEWAL_S
+from crgame_ros.driver.force_feedback import ForceFeedback, STATE_TIMEOUT_S
+from crgame_ros.driver.force_limits import ForceLimits, TorqueLimiter
+from crgame_ros.driver.steering_torque import SteeringTorque, WheelMotion
+from crgame_ros.errors import InputError
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from evdev import AbsInfo, ecodes, ff, UInput
+import numpy as np
+from pushed_wheel import EFFECT_SIZE, ERASE, Motor, PushedWheel, UPLOAD
+import pytest
+
+CAR = load_vehicle_parameters()
+MODEL = SteeringTorque(CAR)
+STEP_S = 0.008
+G29 = 'Logitech G29 Driving Force Racing Wheel'
+needs_uinput = pytest.mark.skipif(
+    not (os.access('/dev/uinput', os.W_OK) and os.path.isdir('/dev/input')),
+    reason='no writable /dev/uinput and /dev/input: virtual devices cannot be made here')
+
+
+def brush_moment(force: float, load: float, friction: float, half_length: float) -> float:
+    """
+    Give a tyre's aligning moment at a lateral force [N m], from the bristles themselves.
+
+    Each bristle at x of the contact leans by (a - x) tan(alpha), until its stress is the friction
+    that the parabolic pressure allows; the slip is sought that gives the force.
+    """
+    x = (np.arange(20_000) + 0.5) / 10_000 * half_length - half_length
+    dx = half_length / 10_000
+    most = friction * 0.75 * load / half_length * (1.0 - (x / half_length) ** 2)
+    stiffness = 3e7
+
+    def stress(slip: float) -> np.ndarray:
+        return np.minimum(stiffness * (half_length - x) * slip, most)
+
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stress(middle).sum() * dx < abs(force) else (low, middle)
+    return math.copysign(float(-(x * stress(low)).sum() * dx), force)
+
+
+def expected_torque(motion: WheelMotion) -> float:
+    """Write the whole torque down a second time, for the BMW 320i of config/vehicles."""
+    load = 1093.2952334674046 * 9.81 * 1.4227170936 / 2.5789128
+    force = 1093.2952334674046 * motion.speed * motion.yaw_rate * 1.4227170936 / 2.5789128
+    force = max(-1.0489 * load, min(1.0489 * load, force))
+    rack = brush_moment(force, load, 1.0489, 0.08) + 0.02 * force
+    torque = -rack * 0.2 / 16.0 * max(0.0, 1.0 - 2.0 / (math.exp(2.0 * motion.speed) + 1.0))
+    torque -= 0.08 * motion.wheel_rate
+    torque -= (0.15 + 0.9 * math.exp(-abs(motion.speed))) * math.tanh(2.0 * motion.wheel_rate)
+    for side in (1.0, -1.0):
+        torque -= side * 20.0 * max(0.0, side * motion.wheel_angle - 0.97 * 7.85)
+    if motion.off_road:
+        torque += 0.7 * min(1.0, abs(motion.speed) / 5.0) * math.sin(
+            34.0 * math.pi * motion.time_s)
+    if motion.since_collision_s < 1.5:
+        torque += 2.5 * math.exp(-motion.since_collision_s / 0.15) * math.sin(
+            46.0 * math.pi * motion.since_collision_s)
+    return torque
+
+
+def states() -> list[WheelMotion]:
+    """Draw 20 states, from standstill to sliding, backwards too."""
+    draw = random.Random(3)
+    return [WheelMotion(
+        speed := draw.choice((0.0, -4.0, draw.uniform(0.0, 40.0))),
+        draw.uniform(-12.0, 12.0) / max(abs(speed), 4.0), draw.uniform(-7.85, 7.85),
+        draw.uniform(-6.0, 6.0), draw.uniform(0.0, 30.0), draw.random() < 0.3,
+        draw.choice((math.inf, draw.uniform(0.0, 2.0)))) for _ in range(20)]
+
+
+@pytest.mark.parametrize('motion', states(), ids=range(20))
+def test_the_torque_is_the_formulas(motion: WheelMotion) -> None:
+    """The aligning part from a tyre cut into 20,000 bristles, the rest written anew."""
+    assert MODEL.torque(motion) == pytest.approx(expected_torque(motion), abs=2e-3)
+
+
+def test_the_wheel_grows_light_before_the_tyres_slide() -> None:
+    """The tyre's part is largest at 58 % of the grip; from there on it falls, never its sign."""
+    sideways = np.linspace(0.0, CAR.friction * CAR.gravity, 1001)
+    caster = 0.2 / 16.0 * 0.02 * CAR.mass * CAR.rear_to_center / CAR.wheelbase
+    tyre = np.array([-MODEL.aligning(20.0, each / 20.0) for each in sideways]) - caster * sideways
+    assert sideways[tyre.argmax()] / sideways[-1] == pytest.approx(1.0 - 0.75 ** 3, abs=0.002)
+    assert tyre[-1] == pytest.approx(0.0, abs=1e-9) and (tyre >= -1e-9).all()
+    assert 1.0 < -MODEL.aligning(20.0, 0.25) < 3.0, 'what a hand holds easily'
+
+
+def test_cap_and_slew_hold_whatever_is_asked() -> None:
+    """Random torques, of which some are no numbers or endless, at random intervals."""
+    draw = random.Random(11)
+    for _ in range(50):
+        limits = ForceLimits(max_torque=draw.uniform(0.5, 20.0), strength=draw.uniform(0.0, 5.0),
+                             cap=draw.random(), slew=draw.uniform(1.0, 200.0))
+        limiter, before = TorqueLimiter(limits), 0.0
+        for _ in range(200):
+            wanted = draw.choice((draw.gauss(0.0, 30.0), math.inf, -math.inf, math.nan, 0.0))
+            dt_s = draw.choice((0.0, -1.0, draw.uniform(0.0, 0.3)))
+            now = limiter.step(wanted, dt_s)
+            assert abs(now) <= limits.cap * limits.max_torque + 1e-12
+            assert abs(now - before) <= limits.slew * max(0.0, dt_s) + 1e-9
+            before = now
+
+
+class Drive:
+    """A wheel, and a vehicle in a bend of 20 m/s at 5 m/s^2."""
+
+    def __init__(self, limits: ForceLimits | None = None) -> None:
+        self.motor = Motor()
+        self.wheel = PushedWheel(self.motor, limits)
+        self.force = ForceFeedback(self.wheel, CAR)
+        self.now_s = 100.0
+
+    def go(self, seconds: float, *, seen: bool = True, driving: bool = True) -> float:
+        """Let time pass, with or without new states; give the last torque, 0 without a motor."""
+        torque = 0.0
+        for _ in range(round(seconds / STEP_S)):
+            self.now_s += STEP_S
+            if seen:
+                self.force.see_motion(self.now_s, self.now_s - 99.0, 20.0, 0.25)
+            felt = self.force.step(self.now_s, driving)
+            torque = 0.0 if felt is None else felt.torque
+        return torque
+
+
+def test_a_bend_pushes_back_through_one_effect() -> None:
+    """One upload makes it, the others change it; it is renewed long before the kernel ends it."""
+    drive = Drive()
+    torque = drive.go(1.0)
+    assert torque == pytest.approx(MODEL.aligning(20.0, 0.25), abs=1e-6)
+    assert drive.motor.levels[-1] == round(FULL_LEVEL * torque / 2.1) < 0
+    assert len(drive.motor.levels) == 126 and drive.motor.effects == {7}
+    plays = [event for event in drive.motor.events if event[1:] == (7, 1)]
+    assert len(plays) >= 1.0 / (RENEWAL_S + STEP_S) > 2 * 1000.0 / LENGTH_MS
+    assert (ecodes.EV_FF, ecodes.FF_AUTOCENTER, 0) in drive.motor.events
+    drive.force.close()
+    assert not drive.motor.effects and drive.motor.events[-1] == (ecodes.EV_FF, 7, 0)
+
+
+@pytest.mark.parametrize('how', [{'seen': False}, {'driving': False}], ids=['pause', 'seat'])
+def test_the_force_ends_with_the_states_or_the_seat(how: dict[str, bool]) -> None:
+    """A pause or a lost simulation is 0.2 s without a state; then it falls at the slew."""
+    drive = Drive()
+    torque = drive.go(1.0)
+    fall_s = abs(torque) / 60.0
+    assert drive.go(STATE_TIMEOUT_S + fall_s + 3 * STEP_S, **how) == 0.0
+    assert drive.motor.levels[-1] == 0
+    if how == {'driving': False}:
+        return
+    # The simulation's clock has stood: messages of the same stamp are no new states.
+    drive.force.see_motion(drive.now_s, drive.force._time_s, 20.0, 0.25)
+    assert drive.go(0.1, **how) == 0.0
+    assert drive.go(1.0) == pytest.approx(torque)
+
+
+def test_strength_direction_and_cap_are_the_maps() -> None:
+    """Twice the strength at an inverted motor of 1 N m, of which 60 % may be used."""
+    limits = ForceLimits(max_torque=1.0, strength=2.0, cap=0.6, inverted=True)
+    drive = Drive(limits)
+    assert drive.go(1.0) == pytest.approx(-0.6)
+    assert drive.motor.levels[-1] == round(0.6 * FULL_LEVEL)
+    still = Drive(ForceLimits(max_torque=1.0, strength=0.0))
+    assert still.go(0.1) == 0.0 and still.motor.levels == []
+
+
+def test_unplugged_and_plugged_in_again() -> None:
+    """The error ends it; another device gets an effect of its own, from no force on."""
+    drive = Drive()
+    torque = drive.go(1.0)
+    drive.motor.error = OSError(errno.ENODEV, 'No such device')
+    assert drive.go(STEP_S) == 0.0 and 'No such device' in drive.force.problem
+    drive.wheel.motor = None
+    assert drive.go(0.5) == 0.0
+    drive.wheel.motor = second = Motor()
+    drive.go(1.5)
+    assert second.levels[:2] == [0, 0] and second.effects == {7}
+    assert drive.go(0.5) == pytest.approx(torque) and drive.force.problem == ''
+
+
+def test_the_road_and_collisions_are_felt() -> None:
+    """Off the road the torque swings around the aligning one; a collision jolts, and fades."""
+    drive = Drive()
+    torque = drive.go(1.0)
+    drive.force.see_drivability(False, True)
+    rough = [drive.go(STEP_S) for _ in range(125)]
+    assert max(rough) > torque + 0.25 and min(rough) < torque - 0.05
+    drive.force.see_drivability(True, False)
+    jolts = [drive.go(STEP_S) for _ in range(250)]
+    assert max(np.abs(np.array(jolts[:30]) - torque)) > 0.5
+    assert jolts[-1] == pytest.approx(torque, abs=1e-3), 'while they still touch'
+
+
+def test_a_killed_process_leaves_no_force() -> None:
+    """Nobody but the process has the file: kill -9 closes it, upon which the kernel lets go."""
+    here, there = socket.socketpair()
+    process = subprocess.Popen([sys.executable, str(Path(__file__).with_name('pushed_wheel.py')),
+                                str(there.fileno())], pass_fds=(there.fileno(),),
+                               cwd=Path(__file__).parents[2])
+    there.close()
+    here.settimeout(60.0)
+    stream = here.makefile('rb')
+    level, length, erased = 0, 0, False
+    try:
+        while True:
+            head = stream.read(2)
+            if not head:
+                break
+            data = stream.read(struct.unpack('H', head)[0])
+            if data[:1] == UPLOAD and len(data) == 1 + EFFECT_SIZE:
+                effect = ff.Effect.from_buffer_copy(data[1:])
+                level, length = effect.u.ff_constant_effect.level, effect.ff_replay.length
+                if level < -0.5 * FULL_LEVEL:
+                    process.send_signal(signal.SIGKILL)
+            erased = erased or data[:1] == ERASE
+    finally:
+        process.kill()
+        assert process.wait() == -signal.SIGKILL
+    assert level < -0.5 * FULL_LEVEL and not erased, 'it was killed while it pushed'
+    assert length == LENGTH_MS, 'and one that is stopped pushes no longer than this'
+
+
+def test_maps_say_what_their_motor_holds() -> None:
+    """Each wheel that ships has a motor, nothing else; what is out of bounds is refused."""
+    for device_map in load_device_maps():
+        assert (device_map.force is not None) == (device_map.kind.name == 'WHEEL')
+    text = (Path(__file__).parents[2] / 'config/devices/logitech_g29.yaml').read_text()
+    for wrong in ('max_torque: 0', 'max_torque: 2.1, cap: 1.5', 'max_torque: 2.1, slew: 0',
+                  'strength: 1.0'):
+        with pytest.raises(InputError, match='force_feedback'):
+            parse_device_map(text.replace('max_torque: 2.1', wrong), 'm.yaml')
+
+
+class VirtualMotor:
+    """A wheel that the kernel shows like a real one, with a motor that notes what is asked."""
+
+    def __init__(self) -> None:
+        axes = [(ecodes.ABS_X, AbsInfo(32767, 0, 65535, 0, 0, 0)), *(
+            (code, AbsInfo(255, 0, 255, 0, 0, 0))
+            for code in (ecodes.ABS_Y, ecodes.ABS_Z, ecodes.ABS_RZ))]
+        self.device = UInput({
+            ecodes.EV_ABS: axes, ecodes.EV_FF: [ecodes.FF_CONSTANT, ecodes.FF_GAIN],
+            ecodes.EV_KEY: list(range(ecodes.BTN_TRIGGER, ecodes.BTN_DEAD + 1))
+            + [ecodes.BTN_TRIGGER_HAPPY3]}, name=G29, max_effects=1)
+        self.levels: list[int] = []
+        self.erased = threading.Event()
+        self._ended = False
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        while not self._ended:
+            if not select.select([self.device.fd], [], [], 0.05)[0]:
+                continue
+            for item in self.device.read():
+                if item.type == ecodes.EV_UINPUT and item.code == ecodes.UI_FF_UPLOAD:
+                    upload = self.device.begin_upload(item.value)
+                    self.levels.append(upload.effect.u.ff_constant_effect.level)
+                    upload.retval = 0
+                    self.device.end_upload(upload)
+                elif item.type == ecodes.EV_UINPUT and item.code == ecodes.UI_FF_ERASE:
+                    erase = self.device.begin_erase(item.value)
+                    erase.retval = 0
+                    self.device.end_erase(erase)
+                    self.erased.set()
+
+    def close(self) -> None:
+        """Unplug it."""
+        self._ended = True
+        self._thread.join()
+        self.device.close()
+
+
+@needs_uinput
+def test_the_kernel_takes_the_force_and_ends_it() -> None:
+    """Through evdev's own ioctls: uploads arrive, and the kernel erases what is left behind."""
+    motor = VirtualMotor()
+    try:
+        wheel = open_evdev(G29)
+        until_s = time.monotonic() + 20.0
+        while not wheel.connected and time.monotonic() < until_s:
+            time.sleep(0.05)
+            wheel.poll(time.monotonic())
+        force = ForceFeedback(wheel, CAR)
+        for n in range(100):
+            force.see_motion(time.monotonic(), 0.01 * n, 20.0, 0.25)
+            force.step(time.monotonic())
+            time.sleep(0.008)
+        assert motor.levels[-1] < -0.5 * FULL_LEVEL
+        # As any end of the process does, without a word to the motor.
+        wheel.close()
+        assert motor.erased.wait(10.0)
+    finally:
+        motor.close()

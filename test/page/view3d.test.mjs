@@ -1,0 +1,194 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The 3D view's geometry, choices and bodies, without three.js and without a browser. */
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+const VIEW = '../../crgame_ros/cockpit/page/js/view3d';
+const { above, chasing, mountedAt } = await import(`${VIEW}/cameras.js`);
+const { acrossAngle, heightAngle, readSeat, trueAngle } = await import(
+  `${VIEW}/field_of_view.js`);
+const { localOrigin } = await import(`${VIEW}/local_origin.js`);
+const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirror_optics.js`);
+const { isSoftware, Quality } = await import(`${VIEW}/quality.js`);
+const { readViewWindow } = await import(`${VIEW}/view_window.js`);
+const { MeshBuilder } = await import(`${VIEW}/bodies/mesh_builder.js`);
+const { ofObject, ofVehicle } = await import(`${VIEW}/bodies/appearance.js`);
+
+const DEGREE = Math.PI / 180;
+const near = (actual, expected, within, what) => assert.ok(
+  Math.abs(actual - expected) <= within, `${what ?? ''} ${actual} is not ${expected}`);
+const PLACE = { height: 1.42, bonnet_height: 0.95, eye: [1.25, 0.36, 1.17],
+  left_mirror: [1.78, 0.92, 0.98], right_mirror: [1.78, -0.92, 0.98],
+  inner_mirror: [1.75, 0, 1.26] };
+
+test('a picture that is true to scale subtends what reality would', () => {
+  // A screen of 0.6 m, seen from 0.7 m: half of it from the middle is atan(0.3 / 0.7).
+  near(trueAngle({ screen_width_m: 0.6, eye_distance_m: 0.7 }, 1), 2 * 23.1986 * DEGREE, 1e-5);
+  // Half as wide a window is not half the angle.
+  near(trueAngle({ screen_width_m: 0.6, eye_distance_m: 0.7 }, 0.5), 2 * 12.0948 * DEGREE, 1e-5);
+  // 1.8 m at 20 m are 5.15 degrees: so they are on the glass.
+  const across = acrossAngle({ screen_width_m: 0.6, eye_distance_m: 0.7 }, 75, 960, 1920);
+  const share = (0.9 / 20) / Math.tan(across / 2);
+  const onGlass_m = 0.6 * 0.5 * share;
+  near(2 * Math.atan(onGlass_m / 2 / 0.7) / DEGREE, 5.15, 0.01);
+});
+
+test('a chosen field of view is across the picture, within what can be drawn', () => {
+  near(acrossAngle(null, 90, 800, 1920), 90 * DEGREE, 1e-9);
+  near(acrossAngle(null, 500, 800, 1920), 140 * DEGREE, 1e-9);
+  near(heightAngle(90 * DEGREE, 2), 2 * Math.atan(0.5), 1e-9);
+  assert.ok(heightAngle(140 * DEGREE, 0.5) <= 110 * DEGREE);
+});
+
+test('what is no screen is not taken for one', () => {
+  assert.deepEqual(readSeat('60', '70'), { screen_width_m: 0.6, eye_distance_m: 0.7 });
+  for (const [width, distance] of [['', '70'], ['60', ''], ['-60', '70'], ['60', '0'],
+    ['x', '70'], ['60', 'Infinity']]) {
+    assert.equal(readSeat(width, distance), null);
+  }
+});
+
+test('a camera is mounted in the turned and climbing vehicle', () => {
+  const stand = { x: 100, y: 50, z: 3, yaw: Math.PI / 2, slope: 0 };
+  const level = mountedAt(stand, { x: 2, y: 0.5, z: 1 }, 0.1, 0.2);
+  near(level.x, 99.5, 1e-9);
+  near(level.y, 52, 1e-9);
+  near(level.z, 4, 1e-9);
+  assert.deepEqual([level.yaw, level.aside, level.pitch], [Math.PI / 2, 0.1, 0.2]);
+  // On a slope of 30 degrees: (2, 1) turned by it in the plane of heading and up.
+  const steep = mountedAt({ ...stand, slope: 30 * DEGREE }, { x: 2, y: 0.5, z: 1 });
+  near(steep.y, 50 + 2 * Math.cos(30 * DEGREE) - Math.sin(30 * DEGREE), 1e-9);
+  near(steep.z, 3 + 2 * Math.sin(30 * DEGREE) + Math.cos(30 * DEGREE), 1e-9);
+});
+
+test('chase is behind the vehicle, bird above it', () => {
+  const stand = { x: 0, y: 0, z: 0, yaw: 0, slope: 0 };
+  assert.ok(chasing(stand, { rear: -1, front: 3.5 }).x < -5);
+  const bird = above(stand);
+  assert.ok(bird.z > 30);
+  near(bird.pitch, -Math.PI / 2, 1e-9);
+});
+
+test('a flat mirror shows what is seen from the image of the eye behind it', () => {
+  const inner = MIRRORS.find(({ name }) => name === 'inner');
+  const { point, aside, pitch } = mirrorCamera(inner, PLACE);
+  // The image of the eye in the glass whose normal halves eye and line of sight.
+  const glass = PLACE.inner_mirror;
+  const toEye = PLACE.eye.map((value, axis) => value - glass[axis]);
+  const distance = Math.hypot(...toEye);
+  const sight = [Math.cos(pitch) * Math.cos(aside), Math.cos(pitch) * Math.sin(aside),
+    Math.sin(pitch)];
+  const sum = toEye.map((value, axis) => value / distance + sight[axis]);
+  const normal = sum.map((value) => value / Math.hypot(...sum));
+  const off = toEye.reduce((total, value, axis) => total + value * normal[axis], 0);
+  const image = PLACE.eye.map((value, axis) => value - 2 * off * normal[axis]);
+  near(point.x, image[0], 1e-9);
+  near(point.y, image[1], 1e-9);
+  near(point.z, image[2], 1e-9);
+});
+
+test('outer mirrors are bent: what they show is wider than in a flat one', () => {
+  const left = MIRRORS.find(({ name }) => name === 'left');
+  const bent = mirrorCamera(left, PLACE);
+  const flat = mirrorCamera({ ...left, radius: Infinity }, PLACE);
+  assert.ok(bent.height > 1.5 * flat.height);
+  // UN R46 class III: 4 m of road beside the car, 20 m behind the eyes, are in it.
+  const across = 2 * Math.atan(Math.tan(bent.height / 2) * bent.aspect);
+  const edge = left.aside - across / 2;
+  assert.ok(Math.atan2(-4, 20) > edge, `${edge / DEGREE}`);
+});
+
+test('the origin is amid the map, whole metres, and always the same', () => {
+  const scene = { bounds: [690500.3, 5335000.1, 691000.9, 5335900.7] };
+  assert.deepEqual(localOrigin(scene), { x: 690751, y: 5335450 });
+  const { x } = localOrigin(scene);
+  // From there float32 knows tenths of millimetres; from the map's zero it does not.
+  near(Math.fround(690999.123 - x), 690999.123 - x, 1e-4);
+  assert.ok(Math.abs(Math.fround(690999.123) - 690999.123) > 1e-3);
+});
+
+test('the quality finds a ratio whose pictures cost what they may', () => {
+  for (const factor of [4, 40, 400]) {
+    const quality = new Quality(true, 1);
+    const cost = () => 2 + factor * quality.ratio ** 2;
+    for (let now_ms = 0; now_ms < 60000; now_ms += 500) {
+      quality.take(cost(), now_ms);
+    }
+    assert.ok(cost() <= 16 || quality.ratio <= 0.25, `${factor}: ${quality.ratio}`);
+    const settled = quality.ratio;
+    for (let now_ms = 60000; now_ms < 90000; now_ms += 500) {
+      quality.take(cost(), now_ms);
+    }
+    assert.equal(quality.ratio, settled);
+    quality.sharp = true;
+    assert.equal(quality.ratio, 1);
+  }
+  assert.ok(new Quality(true, 1).period_ms > 0);
+  assert.equal(new Quality(false, 2).period_ms, 0);
+  assert.ok(isSoftware('ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (Subzero)))'));
+  assert.ok(isSoftware('llvmpipe (LLVM 15.0.7, 256 bits)'));
+  assert.ok(!isSoftware('ANGLE (NVIDIA Corporation, NVIDIA GeForce RTX 3060/PCIe/SSE2)'));
+});
+
+test('an address says what a window shows', () => {
+  assert.equal(readViewWindow(''), null);
+  assert.equal(readViewWindow('?view=kitchen'), null);
+  const side = readViewWindow('?view=driver&yaw=-60&vehicle=hv1&fov=50');
+  near(side.aside, -60 * DEGREE, 1e-9);
+  assert.deepEqual([side.viewpoint, side.vehicle, side.fieldOfView_deg], ['driver', 'hv1', 50]);
+  const wrong = readViewWindow('?view=chase&yaw=left&fov=1000');
+  assert.deepEqual([wrong.aside, wrong.vehicle, wrong.fieldOfView_deg], [0, null, null]);
+});
+
+test('normals point outwards, are smooth on curves and sharp at edges', () => {
+  const box = new MeshBuilder().box([-1, -1, -1], [1, 1, 1], [1, 1, 1, true]).arrays(true);
+  assert.equal(box.positions.length, 12 * 9);
+  for (let i = 0; i < box.positions.length; i += 3) {
+    const outward = [0, 1, 2].reduce(
+      (sum, axis) => sum + box.positions[i + axis] * box.normals[i + axis], 0);
+    near(outward, 1, 1e-6);
+  }
+  const wheel = new MeshBuilder().cylinder([0, 0, 0], 'y', 1, 1, [1, 1, 1], [1, 1, 1], 24);
+  const { positions, normals } = wheel.arrays(false);
+  for (let i = 0; i < positions.length; i += 3) {
+    const radial = positions[i] * normals[i] + positions[i + 2] * normals[i + 2];
+    const axial = 2 * positions[i + 1] * normals[i + 1];
+    // On the tyre along the radius, at the ends along the axis.
+    near(Math.max(radial, axial), 1, 1e-3);
+  }
+});
+
+test('bodies fit their types and sizes, and few triangles make them', () => {
+  const rectangle = (length, width) => ({ kind: 'rectangle', length, width, vertices: [] });
+  const keys = [['car', 4.5, 1.8, 'car'], ['car', 6, 2, 'van'], ['truck', 12, 2.5, 'truck'],
+    ['bus', 12, 2.5, 'bus'], ['bicycle', 1.8, 0.6, 'bicycle'],
+    ['motorcycle', 2.2, 0.8, 'motorcycle'], ['pedestrian', 0.5, 0.5, 'pedestrian']];
+  for (const [type, length, width, key] of keys) {
+    const look = ofObject({ id: '7', type, role: 'recorded', shape: rectangle(length, width) });
+    assert.equal(look.key, key);
+    const body = look.build();
+    assert.ok(body.mesh.triangles < 900, `${key}: ${body.mesh.triangles}`);
+    let [longest, widest] = [0, 0];
+    for (const painted of [true, false]) {
+      const { positions } = body.mesh.arrays(painted);
+      for (let i = 0; i < positions.length; i += 3) {
+        longest = Math.max(longest, Math.abs(positions[i]));
+        widest = Math.max(widest, Math.abs(positions[i + 1]));
+        assert.ok(positions[i + 2] > -0.01);
+      }
+    }
+    assert.ok(2 * longest < body.length + 0.4 && 2 * longest > 0.6 * body.length, key);
+    assert.ok(2 * widest < body.width + 0.8, key);
+  }
+  const skip = ofObject({ id: 'o', type: 'constructionZone', role: 'static',
+    shape: { kind: 'polygon', length: 2, width: 1,
+      vertices: [-1, -0.5, 1, -0.5, 1, 0.5, -1, 0.5] } });
+  assert.equal(skip.build().length, 2);
+  const own = ofVehicle({ id: 'hv0', role: 'human', shape: rectangle(4.508, 1.61),
+    wheelbase: 2.579, rear_to_center: 1.423, driver_place: PLACE });
+  const { wheels, length } = own.build();
+  near((wheels.front - wheels.rear) * own.length / length, 2.579, 1e-6);
+  near(-wheels.rear * own.length / length, 1.423, 1e-6);
+});

@@ -1,0 +1,86 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Force feedback over DDS: from the vehicle's motion to the wheel's motor and the topic."""
+
+from pathlib import Path
+import sys
+
+from crgame_ros.driver.force_effect import FULL_LEVEL
+from crgame_ros.driver.steering_torque import SteeringTorque
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.live_force import LiveForce
+from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from live_peer import Peer
+from nav_msgs.msg import Odometry
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import JointState
+from worker_roles import own_domain_id
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'driver'))
+from pushed_wheel import Motor, PushedWheel  # noqa: E402, I100, I202
+
+STEP_NS = 10_000_000
+CAR = load_vehicle_parameters()
+
+
+class Bend:
+    """Publishes the motion of a vehicle at 20 m/s and 5 m/s^2, step by step."""
+
+    def __init__(self, publisher: Publisher) -> None:
+        self._publisher = publisher
+        self._n = 0
+
+    def go_on(self) -> None:
+        """Publish the next step."""
+        self._n += 1
+        message = Odometry()
+        message.header.stamp = to_time(self._n * STEP_NS)
+        message.twist.twist.linear.x, message.twist.twist.angular.z = 20.0, 0.25
+        self._publisher.publish(message)
+
+
+def test_the_wheel_follows_the_vehicle_and_rests_with_it() -> None:
+    """The torque of the bend while it lasts, none 0.2 s after the last state, none at the end."""
+    domain, context = own_domain_id(), Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node('driver_node', context=context)
+    told: list[str] = []
+    motor = Motor()
+    force = LiveForce(Endpoints(node), 'hv0', lambda: True, told.append)
+    expected = SteeringTorque(CAR).aligning(20.0, 0.25)
+    with Peer(domain, ('/<hv>/steering_torque', 'hv0')) as peer:
+        heard: list[JointState] = peer.messages['/<hv>/steering_torque']
+        force.begin(PushedWheel(motor), CAR)
+        bend = Bend(peer.publisher('/<v>/odom', 'hv0'))
+
+        def pushes() -> bool:
+            bend.go_on()
+            return bool(heard) and heard[-1].effort[0] == pytest.approx(expected, abs=1e-6)
+
+        peer.wait_until(pushes, 'the torque of the bend')
+        assert heard[-1].name == ['hv0/steering_wheel'] and list(heard[-1].position) == [0.0]
+        assert motor.levels[-1] == round(FULL_LEVEL * expected / 2.1)
+        peer.wait_until(lambda: heard[-1].effort[0] == 0.0, 'rest, for nothing is published')
+        assert motor.levels[-1] == 0
+        peer.wait_until(pushes, 'the torque again')
+        force.end()
+        assert not motor.effects, 'it let go'
+        assert told == []
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)

@@ -1,0 +1,75 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Light and air: what a game may say, and what the scenario says where it does not."""
+
+import json
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.environment_spec import EnvironmentSpec
+from crgame_ros.game.game_file import dump_game, load_game, parse_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.light_and_air import environment_of
+from crgame_ros.scenario.loading import parse_scenario
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.setup import build_setup
+import pytest
+import yaml
+
+ELEMENT = ('<environment><time>{time}</time><timeOfDay>{time_of_day}</timeOfDay>'
+           '<weather>{weather}</weather><underground>wet</underground></environment>')
+
+
+def scenario_with(time_of_day: str, weather: str) -> str:
+    """Give one of our scenarios with an environment element, as commonroad-io reads it."""
+    text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
+    element = ELEMENT.format(time='19:30', time_of_day=time_of_day, weather=weather)
+    assert '</location>' in text
+    return text.replace('</location>', f'{element}</location>')
+
+
+@pytest.mark.parametrize(('time_of_day', 'weather', 'light', 'visibility'), [
+    ('night', 'fog', 'dusk', 200.0), ('sunset', 'clear', 'dusk', 30_000.0),
+    ('noon', 'heavy_rain', 'day', 30_000.0), ('unknown', 'unknown', 'day', 30_000.0)])
+def test_a_scenarios_environment(time_of_day: str, weather: str, light: str,
+                                 visibility: float) -> None:
+    scenario = parse_scenario(scenario_with(time_of_day, weather), 'test').scenario
+    assert environment_of(scenario, None) == EnvironmentSpec(light, visibility)  # type: ignore
+    # Each key of the game goes before the file's, by itself.
+    assert environment_of(scenario, EnvironmentSpec('day')) == EnvironmentSpec('day', visibility)
+    assert environment_of(scenario, EnvironmentSpec(None, 60.0)) == EnvironmentSpec(
+        light, 60.0)  # type: ignore
+
+
+@pytest.mark.parametrize(('wrong', 'told'), [
+    ({'light': 'night'}, 'use one of day, dusk'), ({'visibility': 5}, 'from 10 to 100000'),
+    ({'visibility': float('inf')}, 'from 10 to 100000'), ({'haze': 1}, '"haze" is unknown')])
+def test_what_cannot_be_shown_is_refused(wrong: dict[str, object], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        parse_game({'scenario': 'a.xml', 'environment': wrong}, 'test', Path('.'))
+
+
+def test_a_run_records_what_was_resolved() -> None:
+    game = load_game(scenarios_directory() / 'fog.yaml')
+    text = game_document(build_setup(game), epoch=0, clock_offset_ns=0, real_time_factor=1.0)
+    assert parse_game_document(text).environment == EnvironmentSpec('day', 80.0)
+    # The file itself leaves open what the game leaves open.
+    assert yaml.safe_load(dump_game(game))['environment'] == {'visibility': 80.0}
+    old = json.loads(text)
+    del old['environment']
+    assert parse_game_document(json.dumps(old)).environment is None
+    with pytest.raises(InputError, match='environment'):
+        parse_game_document(json.dumps(old | {'environment': {'visibility': -1}}))

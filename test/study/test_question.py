@@ -1,0 +1,59 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What is an answer to a question, and that it stays as it was."""
+
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.schema.reading import read
+from crgame_ros.study.local_text import LocalText
+from crgame_ros.study.question import check_answers, Question
+import pytest
+
+QUESTIONS = tuple(read(Question, values, 'file') for values in (
+    {'name': 'likert', 'likert': {'points': 5}},
+    {'name': 'slider', 'slider': {'low': -1, 'high': 1, 'step': 0.1}},
+    {'name': 'one', 'choice': {'choices': {'a': 'A', 'b': {'en': 'B', 'de': 'Bb'}}}},
+    {'name': 'many', 'choice': {'choices': {'a': 'A', 'b': 'B'}, 'several': True},
+     'required': False},
+    {'name': 'age', 'number': {'low': 18, 'high': 99, 'whole': True}},
+    {'name': 'free', 'text': {}, 'required': False}))
+GOOD = {'likert': 5, 'slider': 0.3, 'one': 'b', 'many': ['b', 'a'], 'age': 40,
+        'free': '<b>"it\'s"</b>,\n;=1+1\t😀' + 'x' * 9_000}
+
+
+def test_answers_stay_as_they_were() -> None:
+    assert check_answers(QUESTIONS, GOOD, 'answers') == GOOD
+    assert check_answers(QUESTIONS, GOOD | {'free': '', 'many': []}, 'answers')['free'] == ''
+    assert check_answers(QUESTIONS, {name: GOOD[name] for name in (
+        'likert', 'slider', 'one', 'age')}, 'answers')['many'] is None
+
+
+@pytest.mark.parametrize(('name', 'answer'), [
+    ('likert', 0), ('likert', 6), ('likert', 2.5), ('likert', '3'), ('likert', True),
+    ('likert', float('nan')), ('slider', 1.1), ('slider', float('inf')), ('slider', None),
+    ('one', 'c'), ('one', ['a']), ('one', None), ('many', ['a', 'a']), ('many', 'a'),
+    ('many', [1]), ('age', 17), ('age', 20.5), ('age', 'x'), ('free', 'x' * 10_001),
+    ('free', 7), ('nobody', 1)])
+def test_what_is_no_answer_is_told(name: str, answer: Any) -> None:
+    with pytest.raises(InputError, match=name):
+        check_answers(QUESTIONS, GOOD | {name: answer}, 'answers')
+
+
+def test_texts_are_given_in_the_language_that_there_is() -> None:
+    both, plain = LocalText.of({'en': 'Age', 'de': 'Alter'}), LocalText.of('Age')
+    assert [both.in_language(code) for code in ('de', 'en', 'fr')] == ['Alter', 'Age', 'Age']
+    assert plain.in_language('de') == 'Age' and not plain.lacks('de')
+    assert both.lacks('fr') and not LocalText().lacks('fr')

@@ -1,0 +1,119 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Scores against examples computed by hand, and the scales' published bounds."""
+
+import math
+
+from crgame_ros.errors import InputError
+from crgame_ros.schema.reading import read
+from crgame_ros.study.questionnaire import (
+    load_questionnaire,
+    Questionnaire,
+    standard_questionnaires,
+)
+import pytest
+
+RATINGS = {'mental': 70, 'physical': 10, 'temporal': 55, 'performance': 25, 'effort': 60,
+           'frustration': 40}
+# Who wins each comparison: mental 5, temporal 3, effort 4, frustration 2, performance 1.
+RANKS = ('mental', 'effort', 'temporal', 'frustration', 'performance', 'physical')
+
+
+def weighted() -> dict[str, object]:
+    """Answer the weighted index: of each pair the item that ranks higher."""
+    answers: dict[str, object] = dict(RATINGS)
+    for question in load_questionnaire('nasa_tlx').questions:
+        if '_or_' in question.name:
+            answers[question.name] = min(question.name.split('_or_'), key=RANKS.index)
+    return answers
+
+
+def test_the_task_load_index() -> None:
+    scores = load_questionnaire('nasa_tlx').score(weighted())
+    # (70 + 10 + 55 + 25 + 60 + 40) / 6
+    assert scores['raw'] == pytest.approx(43.3333333)
+    # (5 * 70 + 4 * 60 + 3 * 55 + 2 * 40 + 1 * 25 + 0 * 10) / 15
+    assert scores['weighted'] == pytest.approx(860.0 / 15.0)
+    assert load_questionnaire('nasa_tlx_raw').score(RATINGS) == {'raw': scores['raw']}
+    pairs = [question.name for question in load_questionnaire('nasa_tlx').questions[6:]]
+    assert len(pairs) == len(set(pairs)) == 15
+
+
+def test_a_missing_answer_leaves_no_score() -> None:
+    answers = weighted()
+    answers['mental_or_effort'] = None
+    scores = load_questionnaire('nasa_tlx').score(answers)
+    assert math.isnan(scores['weighted']) and not math.isnan(scores['raw'])
+    del answers['physical']
+    assert math.isnan(load_questionnaire('nasa_tlx').score(answers)['raw'])
+
+
+def test_simulator_sickness() -> None:
+    """Kennedy et al. 1993: greatest scores 200.34, 159.18, 292.32 and 235.62."""
+    ssq = load_questionnaire('ssq')
+    names = [question.name for question in ssq.questions]
+    assert len(names) == 16
+    worst = ssq.score(dict.fromkeys(names, 4))
+    assert list(worst.values()) == pytest.approx([200.34, 159.18, 292.32, 235.62])
+    assert set(ssq.score(dict.fromkeys(names, 1)).values()) == {0.0}
+    # Nausea alone, slight: it counts for nausea and for disorientation.
+    one = ssq.score(dict.fromkeys(names, 1) | {'nausea': 2})
+    assert list(one.values()) == pytest.approx([9.54, 0.0, 13.92, 2 * 3.74])
+
+
+def test_acceptance() -> None:
+    """Van der Laan et al. 1997: five items are usefulness, four satisfaction; three are turned."""
+    scale = load_questionnaire('van_der_laan')
+    names = [question.name for question in scale.questions]
+    best = {name: 5 if name in ('good', 'likeable', 'desirable') else 1 for name in names}
+    assert scale.score(best) == {'usefulness': 2.0, 'satisfaction': 2.0}
+    assert scale.score({name: 6 - value for name, value in best.items()}) == {
+        'usefulness': -2.0, 'satisfaction': -2.0}
+    assert set(scale.score(dict.fromkeys(names, 3)).values()) == {0.0}
+    # Useful 2, bad-good 4, effective 1, assisting 3, alerting 5: (1 + 1 + 2 + 0 - 2) / 5.
+    answers = dict.fromkeys(names, 3) | {'useful': 2, 'good': 4, 'effective': 1, 'alerting': 5}
+    assert scale.score(answers) == {'usefulness': pytest.approx(0.4), 'satisfaction': 0.0}
+
+
+@pytest.mark.parametrize('name', standard_questionnaires())
+def test_the_scales_are_there_in_two_languages(name: str) -> None:
+    scale = load_questionnaire(name)
+    assert scale.citation and scale.scores
+    texts = [scale.title, scale.text]
+    for question in scale.questions:
+        texts.append(question.ask)
+        texts += [getattr(question.kind, side) for side in ('left', 'right')
+                  if hasattr(question.kind, side)]
+        texts += [*getattr(question.kind, 'labels', ()),
+                  *getattr(question.kind, 'texts', {}).values()]
+    assert not [text for text in texts for code in ('en', 'de') if text and text.lacks(code)]
+
+
+@pytest.mark.parametrize(('values', 'message'), [
+    ({'scores': [{'name': 's', 'items': ['nobody']}]}, 'names the question "nobody"'),
+    ({'scores': [{'name': 's', 'items': ['a'], 'how': 'tally'}]}, 'give both or none'),
+    ({'scores': [{'name': 's', 'items': ['a'], 'how': 'tally', 'pairs': ['a']}]},
+     'does not choose between items'),
+    ({'questions': []}, 'give 1 to 200'),
+    ({'questions': [{'name': 'a', 'text': {}}, {'name': 'a', 'text': {}}]}, 'there already')])
+def test_what_is_no_questionnaire_is_told(values: dict[str, object], message: str) -> None:
+    given = {'name': 'q', 'questions': [{'name': 'a', 'slider': {}}]} | values
+    with pytest.raises(InputError, match=message):
+        read(Questionnaire, given, 'file')
+
+
+def test_an_unknown_one_is_told() -> None:
+    with pytest.raises(InputError, match='nasa_tlx, nasa_tlx_raw, ssq, van_der_laan'):
+        load_questionnaire('tlx')

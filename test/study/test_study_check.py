@@ -1,0 +1,127 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Mistakes of a study are found before anybody sits down."""
+
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.cli import main
+from crgame_ros.errors import InputError
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.schema.reading import read
+from crgame_ros.study.study_check import check_study, length_of
+from crgame_ros.study.study_file import load_study, StudyFile
+from crgame_ros.study.trial_game import trial_game
+from crgame_ros.study.trial_plan import conditions_of, plan_trials
+import pytest
+import yaml
+
+CUT_IN = str(scenarios_directory() / 'cut_in.yaml')
+PLAIN: dict[str, Any] = {
+    'name': 'demo', 'participants': 2, 'settings': {'game': CUT_IN, 'duration': 2},
+    'factors': [{'name': 'planner', 'levels': [{'name': 'a', 'planner': 'idm'},
+                                               {'name': 'b', 'planner': 'constant-velocity'}]}],
+    'blocks': [{'name': 'main'}]}
+
+
+def study_of(folder: Path, **changed: Any) -> StudyFile:
+    """Make a study that differs from the plain one."""
+    return read(StudyFile, PLAIN | changed, 'study', folder)
+
+
+def told(study: StudyFile) -> str:
+    """Give all findings."""
+    return '\n'.join(f'{finding.kind}: {finding.text}' for finding in check_study(study))
+
+
+def test_the_example_is_written_checked_and_planned(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / 'mine'
+    assert main(['study', 'new', str(folder)]) == 0
+    assert main(['study', 'check', str(folder / 'study.yaml'), '--participants', '1']) == 0
+    out, err = capsys.readouterr()
+    assert 'error' not in err and 'warning' not in err
+    assert out.count('main') == 8 and 'min' in out
+    assert main(['study', 'new', str(folder)]) == 2
+    study = load_study(folder / 'study.yaml')
+    length = length_of(study)
+    # Eight drives and three of practice of 20 s; a break of 2 min among everything else.
+    assert length.driving_s == 11 * 20.0 and length.else_s > 120.0
+
+
+def test_settings_cascade(tmp_path: Path) -> None:
+    study = study_of(
+        tmp_path, settings={'game': CUT_IN, 'duration': 2, 'planner': 'idm', 'seed': 3,
+                            'options': {'v0': 9.0}, 'view': 'chase'},
+        factors=[{'name': 'planner', 'levels': [{'name': 'a', 'seed': 4},
+                                                {'name': 'b', 'planner': 'reactive'}]}],
+        blocks=[{'name': 'one', 'settings': {'duration': 1, 'map': True}}, {'name': 'two'}])
+    a, b = (condition.settings for condition in conditions_of(study, study.blocks[0]))
+    assert (a.planner, a.options, a.seed, a.duration, a.map, a.view) == (
+        'idm', {'v0': 9.0}, 4, 1.0, True, 'chase')
+    # Another planner does not take the options of the first.
+    assert (b.planner, b.options, b.seed) == ('reactive', None, 3)
+    assert conditions_of(study, study.blocks[1])[0].settings.duration == 2.0
+    game = trial_game(a, 'idle')
+    assert game.avs is not None and {(spec.planner, spec.options['v0']) for spec in game.avs} == {
+        ('idm', 9.0)}
+    assert (game.duration, game.seed, game.humans[0].driver) == (1.0, 4, 'idle')
+
+
+@pytest.mark.parametrize(('changed', 'message'), [
+    ({'settings': {'duration': 2}}, 'names no game'),
+    ({'settings': {'game': 'nowhere.yaml'}}, 'nowhere.yaml'),
+    ({'settings': {'game': CUT_IN, 'seat': 'hv7'}}, 'has no human "hv7"'),
+    ({'settings': {'game': CUT_IN, 'duration': 2, 'planner': 'idm', 'options': {'x': 1}},
+      'factors': [{'name': 'f', 'levels': [{'name': 'a'}, {'name': 'b'}]}]}, '"x" is unknown'),
+    ({'before': [{'page': 'absent.md'}]}, 'there is no such page'),
+    ({'after': [{'questions': 'tlx'}]}, 'there is no questionnaire "tlx"'),
+    ({'blocks': [{'name': 'main', 'sequences': [['a', 'c']]}]}, 'names "c", which is no condit'),
+    ({'settings': {'game': CUT_IN, 'duration': 2, 'perception': 'absent.yaml'}}, 'absent.yaml')])
+def test_what_keeps_it_from_being_run_is_an_error(tmp_path: Path, changed: dict[str, Any],
+                                                  message: str) -> None:
+    found = told(study_of(tmp_path, **changed))
+    assert message in found and 'error: ' in found
+
+
+def test_an_unbalanced_design_is_a_warning(tmp_path: Path) -> None:
+    assert told(study_of(tmp_path)) == ''
+    assert 'take a multiple of 2 participants' in told(study_of(tmp_path, participants=3))
+    found = told(study_of(tmp_path, blocks=[{'name': 'main', 'order': 'given'}]))
+    assert 'warning: main' in found and 'error' not in found
+    assert 'order: williams' in found
+
+
+def test_texts_that_a_language_lacks_are_told(tmp_path: Path) -> None:
+    (tmp_path / 'mine.yaml').write_text(yaml.safe_dump({
+        'name': 'mine', 'questions': [{'name': 'a', 'ask': {'en': 'A?'}, 'text': {}}]}))
+    study = study_of(tmp_path, after=[{'questions': 'mine.yaml'}], languages=['en', 'de'])
+    assert 'warning: mine.yaml: has no texts in "de"' in told(study)
+
+
+def test_a_sequence_is_taken_as_it_is(tmp_path: Path) -> None:
+    study = study_of(tmp_path, blocks=[{'name': 'main', 'sequences': [['a', 'a', 'b'], ['b']]}])
+    assert [[trial.condition.name for trial in plan_trials(study, place)]
+            for place in range(3)] == [['a', 'a', 'b'], ['b'], ['a', 'a', 'b']]
+
+
+@pytest.mark.parametrize(('changed', 'message'), [
+    ({'blocks': []}, 'give 1 to 50'), ({'blocks': [{'name': 'a', 'factors': ['x']}]}, '"x"'),
+    ({'name': '../x'}, 'letters'), ({'before': [{'page': '/etc/x.md'}]}, 'beside this one'),
+    ({'factors': [{'name': 'f', 'levels': [{'name': 'a'}]}]}, 'give 2 to 50'),
+    ({'blocks': [{'name': 'a', 'practice': {'at_least': 3, 'at_most': 2}}]}, 'at_most')])
+def test_what_is_no_study_is_told(tmp_path: Path, changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        study_of(tmp_path, **changed)

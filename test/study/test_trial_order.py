@@ -1,0 +1,74 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Orders are balanced, and the same everywhere."""
+
+from collections import Counter
+from itertools import pairwise
+import subprocess
+import sys
+
+from crgame_ros.study.trial_order import order_of, ORDERS, rows_of, williams_rows
+import pytest
+
+
+@pytest.mark.parametrize('count', range(2, 9))
+@pytest.mark.parametrize('seed', [0, 7])
+def test_every_condition_follows_every_other_equally_often(count: int, seed: int) -> None:
+    rows = rows_of('williams', count)
+    assert rows == (count if count % 2 == 0 else 2 * count)
+    orders = [order_of('williams', count, seed, place) for place in range(rows)]
+    follows = Counter(pair for order in orders for pair in pairwise(order))
+    assert len(follows) == count * (count - 1)
+    assert set(follows.values()) == {1 if count % 2 == 0 else 2}
+    places = Counter((place, item) for order in orders for place, item in enumerate(order))
+    assert set(places.values()) == {rows // count}
+
+
+@pytest.mark.parametrize('kind', ORDERS)
+def test_every_order_has_every_condition_once(kind: str) -> None:
+    for count in range(1, 9):
+        for place in range(20):
+            for again in range(3):
+                assert sorted(order_of(kind, count, 3, place, again)) == list(range(count))
+
+
+def test_orders_differ_by_participant_pass_and_seed() -> None:
+    found = {tuple(order_of('random', 8, seed, place, again))
+             for seed in range(3) for place in range(5) for again in range(3)}
+    assert len(found) == 45
+    assert order_of('williams', 4, 1, 0) != order_of('williams', 4, 1, 0, pass_number=1)
+    assert order_of('given', 4, 1, 3) == [0, 1, 2, 3]
+
+
+def test_a_list_is_taken_in_turn() -> None:
+    sequences = [[0, 1, 1], [1, 0, 0]]
+    assert [order_of('williams', 2, 5, place, sequences=sequences) for place in range(3)] == [
+        [0, 1, 1], [1, 0, 0], [0, 1, 1]]
+
+
+def test_another_process_orders_alike() -> None:
+    """Whatever its hash seed: nothing depends on the order of a set."""
+    code = ('from crgame_ros.study.trial_order import order_of; '
+            'print([order_of(kind, 7, 11, 5) for kind in ("random", "williams")])')
+    told = {subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                           env={'PYTHONHASHSEED': seed, 'PYTHONPATH': ':'.join(sys.path)}).stdout
+            for seed in ('1', '2')}
+    # Written down once: another machine or Python must give them, too.
+    assert told == {f'{[order_of(kind, 7, 11, 5) for kind in ("random", "williams")]}\n'}
+    assert order_of('random', 7, 11, 5) == [0, 6, 4, 5, 3, 1, 2]
+
+
+def test_the_square_of_four_is_the_textbooks() -> None:
+    assert williams_rows(4) == [[0, 1, 3, 2], [1, 2, 0, 3], [2, 3, 1, 0], [3, 0, 2, 1]]
