@@ -59,6 +59,8 @@ class RunStatus:
         self.recording: dict[str, Any] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
                                           'text': 'nothing is recorded'}
         self.seats_lost: dict[str, bool] = {}
+        # Counts changes of the verdicts: a collision is to be heard when it is seen.
+        self.verdicts = 0
         self._vehicles: tuple[str, ...] = ()
         self._traffic_late_t = -math.inf
         self._alarms: dict[str, Alarm] = {}
@@ -209,7 +211,9 @@ class RunStatus:
         off_road = values.get('road_compliance') == 'false'
         hit = [item for item in values.get('hit', '').split(',') if item]
         self._note_violations(vehicle, hit, off_road, t)
-        self.drivability[vehicle] = {'collision': collision, 'off_road': off_road, 'hit': hit}
+        verdict = {'collision': collision, 'off_road': off_road, 'hit': hit}
+        self.verdicts += verdict != self.drivability.get(vehicle)
+        self.drivability[vehicle] = verdict
         self._alarm('collision', vehicle, collision, 'collision with ' + ', '.join(hit), t)
         self._alarm('off_road', vehicle, off_road, 'off the road', t)
 

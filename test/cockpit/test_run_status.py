@@ -42,6 +42,8 @@ def test_collision_and_road_are_alarms_while_they_last() -> None:
               'stop': 'false'}
     _take(status, 'hv0/drivability', 2, 'collision', values, 0.7)
     _take(status, 'hv0/drivability', 2, 'collision', values, 1.7)
+    # What is repeated is no change, of which pages would be told at once.
+    assert status.verdicts == 1
     assert status.alarms_document()['active'] == [
         {'id': 'collision:hv0', 'kind': 'collision', 'subject': 'hv0',
          'text': 'collision with av0, o12', 'since_t': 0.7},
@@ -52,6 +54,7 @@ def test_collision_and_road_are_alarms_while_they_last() -> None:
     _take(status, 'hv0/drivability', 0, 'valid', {
         'collision': 'false', 'road_compliance': 'true', 'hit': ''}, 2.0)
     assert _kinds(status) == []
+    assert status.verdicts == 2
 
 
 def test_checks_that_are_off_give_no_alarm() -> None:

@@ -111,7 +111,8 @@ test('levels grow with speed as vehicle acoustics has it', () => {
 const shape = { kind: 'rectangle', length: 4.5, width: 1.8, vertices: [] };
 const vehicle = (id, more = {}) => ({
   id, role: 'human', shape, rear_to_center: 1.3, wheelbase: 2.6, max_steering_angle: 0.9,
-  powertrain: 'combustion', perception: null, ...more,
+  powertrain: 'combustion', perception: null, driver_place: { eye: [1.2, 0.36, 1.2] },
+  ...more,
 });
 const row = (x, y, yaw, speed, more = {}) => [
   x, y, yaw, speed, 0, more.acceleration ?? 0, more.yaw_rate ?? 0, 0, more.throttle ?? NaN,
@@ -143,6 +144,8 @@ test('a driver hears the own vehicle, and who is near', () => {
   close(own.lateral, 2);
   assert.deepEqual(others.map(({ id, train }) => [id, train]), [['av0', ELECTRIC], ['1', HEAVY]]);
   assert.ok(others[0].pan > 0 && others[1].pan < 0);
+  // From the driver's head, 1.2 m ahead of the rear axle and 0.36 m to the left, to the middle.
+  close(others[0].distance, Math.hypot(10 + 1.3 - 1.2, -4 - 0.36));
   assert.equal(listener.hear(scene, shown, 'nobody'), null);
   assert.equal(listener.hear(scene, shown, '2'), null, 'on foot nobody has an engine');
   assert.equal(listener.hear(scene, shown, '1').own.train, HEAVY);

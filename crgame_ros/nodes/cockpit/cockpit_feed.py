@@ -96,7 +96,7 @@ class CockpitFeed:
         self._run_heard_s = 0.0
         self._slow_s = 0.0
         self._status_s = 0.0
-        self._told_run = ''
+        self._told = ('', 0)
         self._pace: tuple[float, int] = (0.0, 0)
         self._measured_factor: float | None = None
 
@@ -120,10 +120,12 @@ class CockpitFeed:
                 _read(work, problems)
         for work in (self._poll_commands, self.poll_states, self._poll_objects):
             _read(work, problems)
-        # The page holds its picture still in a pause: it must not learn of it late.
-        if now_s - self._status_s >= STATUS_PERIOD_S or self.status.run != self._told_run:
+        # The page holds its picture still in a pause, and sounds at a collision: it must not
+        # learn of them late.
+        urgent = (self.status.run, self.status.verdicts)
+        if now_s - self._status_s >= STATUS_PERIOD_S or urgent != self._told:
             self._status_s = now_s
-            self._told_run = self.status.run
+            self._told = urgent
             self._send_status(now_s)
         return problems
 

@@ -16,9 +16,6 @@ export const MOST_OTHERS = 6;
 
 // A vehicle that is longer is a lorry or a bus [m].
 const LONG_M = 7.5;
-// Where a driver's head is: shares of the wheelbase ahead of the rear axle, and of the width left.
-const HEAD_AHEAD = 0.45;
-const HEAD_LEFT = 0.2;
 // Where no pedal is told the throttle is guessed: what holds a speed, less below some [m/s], and
 // what gains more [s^2/m].
 const HOLDING = 0.15;
@@ -218,7 +215,8 @@ function centreOf(vehicle, rows, index) {
  * @returns {Moving} its driver's head
  */
 function headOf(vehicle, rows, index) {
-  return aheadOf(rows, index, HEAD_AHEAD * vehicle.wheelbase, HEAD_LEFT * vehicle.shape.width);
+  const [ahead, left] = vehicle.driver_place.eye;
+  return aheadOf(rows, index, ahead, left);
 }
 
 /**

@@ -17,6 +17,8 @@ import { Speaker } from './speaker.js';
 
 // Ears do not need every frame of the picture [ms].
 const EVERY_MS = 30;
+// By then a sound has faded [ms].
+const HUSH_MS = 60;
 const KEY = 'KeyM';
 const VOLUME = 0.7;
 const RUMBLE = 0.5;
@@ -153,6 +155,7 @@ export class Sound {
     const trouble = this.#troubleOf(heard.own.id);
     if (this.#jumped(heard)) {
       // Another ear, or another time: a moment of silence between the two.
+      this.#next_ms = now_ms + HUSH_MS;
       this.#speaker.hush();
       this.#motors.stop();
       return;
