@@ -25,8 +25,8 @@ import re
 import secrets
 from typing import Any, Literal
 
+from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.page_messages import clean_text
-from crgame_ros.cockpit.scenario_reader import ScenarioReader
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.planner.planner_registry import planner_names
 from crgame_ros.scenario import guard
@@ -34,6 +34,7 @@ from crgame_ros.yaml_text import read_yaml
 
 DRIVERS = ('auto', 'cockpit', 'idle')
 UPLOADS = 'Uploads'
+READER = 'crgame_ros.cockpit.preview'
 MAX_ENTRIES = 1000
 MAX_UPLOADS = 64
 MAX_UPLOADS_BYTES = 512 * 2 ** 20
@@ -89,7 +90,7 @@ class Library:
     """
 
     def __init__(self, folders: Sequence[tuple[str, Path]], uploads: Path, games: Path, *,
-                 reader: ScenarioReader | None = None,
+                 reader: JobProcess | None = None,
                  max_upload_bytes: int = guard.MAX_BYTES) -> None:
         self.max_upload_bytes = max_upload_bytes
         # A folder that is given twice is shown once, by its first name.
@@ -99,7 +100,7 @@ class Library:
         self._folders = tuple((name, path) for path, name in names.items())
         self._uploads = uploads.resolve()
         self._games = games.resolve()
-        self._reader = reader if reader is not None else ScenarioReader()
+        self._reader = reader if reader is not None else JobProcess(READER, 'scenario')
         self._entries: dict[str, Entry] = {}
         self._titles: dict[str, str] = {}
         self._uploading = asyncio.Lock()

@@ -30,7 +30,7 @@ MAX_TEXT = 1000
 UPLOAD_S = 60.0
 
 _log = logging.getLogger(__name__)
-Answer = Callable[[web.Request], Awaitable[web.Response]]
+Answer = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 def add_routes(app: web.Application, library: Library | None, backend: Backend) -> None:
@@ -46,10 +46,10 @@ def add_routes(app: web.Application, library: Library | None, backend: Backend) 
             app.router.add_route(method, f'/api/{path}', _nothing)
         return
     routes = _Routes(library, backend)
-    app.router.add_get('/api/scenarios', _refusable(routes.scenarios))
-    app.router.add_get('/api/preview', _refusable(routes.preview))
-    app.router.add_post('/api/upload', _refusable(routes.upload))
-    app.router.add_post('/api/load', _refusable(routes.load))
+    app.router.add_get('/api/scenarios', refusable(routes.scenarios))
+    app.router.add_get('/api/preview', refusable(routes.preview))
+    app.router.add_post('/api/upload', refusable(routes.upload))
+    app.router.add_post('/api/load', refusable(routes.load))
 
     async def closing(_: web.Application) -> AsyncIterator[None]:
         yield
@@ -84,8 +84,9 @@ class _Routes:
         return web.json_response({'ok': True, 'text': await self._backend.load_game(path)})
 
 
-def _refusable(handler: Answer) -> Answer:
-    async def answer(request: web.Request) -> web.Response:
+def refusable(handler: Answer) -> Answer:
+    """Make a handler answer with one line of JSON where it fails."""
+    async def answer(request: web.Request) -> web.StreamResponse:
         try:
             return await handler(request)
         except CrgameError as error:

@@ -112,7 +112,9 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
         viewers.append(NodeSpec('cockpit_node', 'cockpit_node', {
             'port': str(request.port), 'listen': f'"{request.listen or "127.0.0.1"}"',
             'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
-            'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"'},
+            'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"',
+            # What lies beside a folder that somebody named is theirs.
+            'archive': f'"{plan.folder.parent if request.out is None else ""}"'},
             nice=COMPANION_NICE, restart=True))
     return viewers
 

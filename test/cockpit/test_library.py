@@ -24,8 +24,8 @@ from typing import Any
 
 from cockpit_support import Cockpit, cockpit, get, in_loop, PATIENCE_S
 from crgame_ros.cockpit import library as library_module
-from crgame_ros.cockpit.library import Library
-from crgame_ros.cockpit.scenario_reader import ScenarioReader
+from crgame_ros.cockpit.job_process import JobProcess
+from crgame_ros.cockpit.library import Library, READER
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
@@ -297,7 +297,7 @@ async def test_frames_go_on_while_a_scenario_is_read(tmp_path: Path) -> None:
 @in_loop
 async def test_a_scenario_that_takes_too_long_is_given_up_and_the_next_is_read(
         tmp_path: Path) -> None:
-    reader = ScenarioReader()
+    reader = JobProcess(READER, 'scenario')
     async with with_library(tmp_path, reader=reader) as running:
         first = await entry(running, 'cut_in.yaml')
         second = await entry(running, 'roundabout.yaml')
@@ -313,7 +313,7 @@ async def test_a_scenario_that_takes_too_long_is_given_up_and_the_next_is_read(
 
 @in_loop
 async def test_a_reader_that_dies_is_replaced(tmp_path: Path) -> None:
-    reader = ScenarioReader()
+    reader = JobProcess(READER, 'scenario')
     async with with_library(tmp_path, reader=reader) as running:
         game = await entry(running, 'cut_in.yaml')
         assert (await preview(running, game))[0] == 200
