@@ -23,6 +23,7 @@ from typing import Any
 
 from crgame_ros import __version__
 from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.shown_paths import without_paths
 
 MAX_CLIENTS = 32
 # A new scene makes them void.
@@ -145,10 +146,11 @@ class Hub:
 def _encode(kind: str, content: Mapping[str, Any]) -> bytes:
     message = {'type': kind, **content}
     try:
-        return json.dumps(message, allow_nan=False, separators=(',', ':')).encode()
+        text = json.dumps(message, allow_nan=False, separators=(',', ':'))
     except ValueError:
         # JSON has no NaN and no infinity.
-        return json.dumps(_finite(message), allow_nan=False, separators=(',', ':')).encode()
+        text = json.dumps(_finite(message), allow_nan=False, separators=(',', ':'))
+    return without_paths(text).encode()
 
 
 def _finite(value: Any) -> Any:

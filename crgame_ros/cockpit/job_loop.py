@@ -30,6 +30,7 @@ import signal
 import struct
 import sys
 import traceback
+from types import FrameType
 from typing import Any, BinaryIO
 
 from crgame_ros.errors import CrgameError
@@ -37,18 +38,26 @@ from crgame_ros.errors import CrgameError
 HEADER = struct.Struct('<?Q')
 _MAX_MEMORY = 4 * 2 ** 30
 _NICE = 10
+# Of the processor's time that one job may take [s]: of 60,000 lanelets a preview takes 35 s.
+MOST_CPU_S = 20.0
 
 Job = Callable[..., dict[str, Any]]
 
 
-def serve_jobs(jobs: Mapping[str, Job], subject: str) -> None:
+def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_CPU_S) -> None:
     """
     Answer jobs until the standard input ends.
 
     :param jobs: by name; each is given the path and the other arguments by their names, and gives
         what JSON can hold.
     :param subject: what they read, for people.
+    :param most_cpu_s: after which a job is given up [s].
     """
+    def give_up(_number: int, _frame: FrameType | None) -> None:
+        raise CrgameError(f'the {subject} takes more than {most_cpu_s:g} s to read; choose a '
+                          'smaller one')
+
+    signal.signal(signal.SIGPROF, give_up)
     # Ctrl-C is for the server, which closes the standard input when it ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
@@ -58,14 +67,18 @@ def serve_jobs(jobs: Mapping[str, Job], subject: str) -> None:
     os.dup2(2, 1)
     with contextlib.suppress(BrokenPipeError):
         for line in sys.stdin.buffer:
-            _answer(jobs, json.loads(line), answers, subject)
+            _answer(jobs, json.loads(line), answers, subject, most_cpu_s)
 
 
 def _answer(jobs: Mapping[str, Job], job: dict[str, Any], answers: BinaryIO,
-            subject: str) -> None:
+            subject: str, most_cpu_s: float) -> None:
     try:
         path = Path(job.pop('path'))
-        result = jobs[job.pop('job')](path, **job)
+        signal.setitimer(signal.ITIMER_PROF, most_cpu_s)
+        try:
+            result = jobs[job.pop('job')](path, **job)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
         ok, text = True, json.dumps(result, allow_nan=False, separators=(',', ':'))
     except CrgameError as error:
         # Names of folders on this machine are nobody's business.

@@ -28,7 +28,7 @@ from crgame_ros.errors import CrgameError, InputError
 # Kept apart: jobs import CommonRoad, which the server's process may not need.
 _HEADER_BYTES = 9
 MAX_QUEUED = 8
-TIMEOUT_S = 30.0
+TIMEOUT_S = 60.0
 # Between two looks at whether somebody still waits [s].
 LOOK_S = 0.25
 

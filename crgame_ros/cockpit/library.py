@@ -15,7 +15,7 @@
 """The scenarios and games that the page offers: folders of this machine, and uploads."""
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import hashlib
 import json
@@ -104,6 +104,8 @@ class Library:
         self._entries: dict[str, Entry] = {}
         self._titles: dict[str, str] = {}
         self._uploading = asyncio.Lock()
+        # What was started last: at a reset its file is read again.
+        self._loaded = ''
 
     async def listing(self) -> dict[str, Any]:
         """Give the answer of /api/scenarios, as the folders are now."""
@@ -117,15 +119,18 @@ class Library:
                 for name, entries in folders],
             'planners': list(planner_names()), 'drivers': list(DRIVERS)}
 
-    async def preview(self, entry_id: str) -> bytes:
+    async def preview(self, entry_id: str,
+                      unwanted: Callable[[], bool] = lambda: False) -> bytes:
         """
         Show how an entry begins.
 
+        :param unwanted: tells that nobody waits for it any more.
         :return: the answer of /api/preview as JSON.
         :raises CrgameError: if there is no such entry, or it cannot be used.
         """
         entry = await self._entry(entry_id)
-        return await self._reader.run('preview', path=str(entry.path), kind=entry.kind)
+        return await self._reader.run('preview', path=str(entry.path), kind=entry.kind,
+                                      unwanted=unwanted)
 
     async def upload(self, data: bytes, title: str) -> str:
         """
@@ -151,6 +156,27 @@ class Library:
         self._entries[entry.id] = entry
         return entry.id
 
+    async def delete_upload(self, entry_id: str) -> str:
+        """
+        Delete an upload.
+
+        :return: what was done, for people.
+        :raises CrgameError: if it is no upload, is in use, or cannot be removed.
+        """
+        entry = await self._entry(entry_id)
+        if entry.kind != 'upload':
+            raise InputError('is no upload', entry.name, 'only uploads are deleted here')
+        if entry.id == self._loaded:
+            raise InputError('is the scenario of the present run', entry.title,
+                             'start another one first')
+        try:
+            await asyncio.to_thread(entry.path.unlink, missing_ok=True)
+        except OSError as error:
+            raise CrgameError(f'{entry.title}: cannot be deleted ({error.strerror})') from error
+        self._entries.pop(entry.id, None)
+        self._titles.pop(entry.id, None)
+        return f'{entry.title} is deleted'
+
     async def write_game(self, choice: Choice) -> Path:
         """
         Write the game file of a choice.
@@ -163,6 +189,7 @@ class Library:
             planners=dict(choice.planners), allowed_drivers=list(DRIVERS),
             allowed_planners=list(planner_names()))
         text = json.loads(answer)['text'].encode()
+        self._loaded = entry.id
         return await asyncio.to_thread(self._store_game, text)
 
     async def close(self) -> None:
@@ -205,8 +232,7 @@ class Library:
             kept = [other.stat().st_size for other in self._uploads.glob('*.xml')
                     if other != path]
             if len(kept) >= MAX_UPLOADS or sum(kept) + len(data) > MAX_UPLOADS_BYTES:
-                raise CrgameError(f'{len(kept)} uploads are kept already; remove some from the '
-                                  'folder of uploads')
+                raise CrgameError(f'{len(kept)} uploads are kept already; delete some')
             part = path.with_name(f'{path.stem}.{secrets.token_hex(4)}.part')
             part.write_bytes(data)
         except OSError as error:

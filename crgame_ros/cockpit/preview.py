@@ -22,6 +22,7 @@ from typing import Any
 
 from crgame_ros.cockpit.job_loop import serve_jobs
 from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
@@ -127,6 +128,9 @@ def _setup(path: Path, kind: str) -> Setup:
 def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str],
             what: str) -> str:
     value = chosen.get(vehicle, own)
+    if value == without_paths(own):
+        # As the page knows it.
+        return own
     if value != own and value not in allowed:
         raise InputError(f'that {what} cannot be chosen here', vehicle,
                          f'choose {", ".join(allowed)} or leave it as it is')

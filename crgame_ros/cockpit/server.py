@@ -41,7 +41,7 @@ _JSON_BYTES = 256 * 1024
 _POLICY = 'Content-Security-Policy'
 _HEADERS = {
     _POLICY: (
-        "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+        "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
         "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
     'X-Content-Type-Options': 'nosniff',
     'Referrer-Policy': 'no-referrer',
