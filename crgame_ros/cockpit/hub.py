@@ -26,6 +26,7 @@ from typing import Any
 from crgame_ros import __version__
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
+from crgame_ros.cockpit.shown_paths import without_paths
 
 MAX_CLIENTS = 32
 # Of one address: more would be the room of others.
@@ -211,10 +212,11 @@ def _rights(client: Client) -> dict[str, Any]:
 def _encode(kind: str, content: Mapping[str, Any]) -> bytes:
     message = {'type': kind, **content}
     try:
-        return json.dumps(message, allow_nan=False, separators=(',', ':')).encode()
+        text = json.dumps(message, allow_nan=False, separators=(',', ':'))
     except ValueError:
         # JSON has no NaN and no infinity.
-        return json.dumps(_finite(message), allow_nan=False, separators=(',', ':')).encode()
+        text = json.dumps(_finite(message), allow_nan=False, separators=(',', ':'))
+    return without_paths(text).encode()
 
 
 def _finite(value: Any) -> Any:

@@ -15,7 +15,7 @@
 """The scenarios and games that the page offers: folders of this machine, and uploads."""
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import hashlib
 import json
@@ -25,8 +25,8 @@ import re
 import secrets
 from typing import Any, Literal
 
+from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.page_messages import clean_text
-from crgame_ros.cockpit.scenario_reader import ScenarioReader
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.planner.planner_registry import planner_names
 from crgame_ros.scenario import guard
@@ -34,6 +34,7 @@ from crgame_ros.yaml_text import read_yaml
 
 DRIVERS = ('auto', 'cockpit', 'idle')
 UPLOADS = 'Uploads'
+READER = 'crgame_ros.cockpit.preview'
 MAX_ENTRIES = 1000
 MAX_UPLOADS = 64
 MAX_UPLOADS_BYTES = 512 * 2 ** 20
@@ -89,7 +90,7 @@ class Library:
     """
 
     def __init__(self, folders: Sequence[tuple[str, Path]], uploads: Path, games: Path, *,
-                 reader: ScenarioReader | None = None,
+                 reader: JobProcess | None = None,
                  max_upload_bytes: int = guard.MAX_BYTES) -> None:
         self.max_upload_bytes = max_upload_bytes
         # A folder that is given twice is shown once, by its first name.
@@ -99,10 +100,12 @@ class Library:
         self._folders = tuple((name, path) for path, name in names.items())
         self._uploads = uploads.resolve()
         self._games = games.resolve()
-        self._reader = reader if reader is not None else ScenarioReader()
+        self._reader = reader if reader is not None else JobProcess(READER, 'scenario')
         self._entries: dict[str, Entry] = {}
         self._titles: dict[str, str] = {}
         self._uploading = asyncio.Lock()
+        # What was started last: at a reset its file is read again.
+        self._loaded = ''
 
     async def listing(self) -> dict[str, Any]:
         """Give the answer of /api/scenarios, as the folders are now."""
@@ -116,15 +119,18 @@ class Library:
                 for name, entries in folders],
             'planners': list(planner_names()), 'drivers': list(DRIVERS)}
 
-    async def preview(self, entry_id: str) -> bytes:
+    async def preview(self, entry_id: str,
+                      unwanted: Callable[[], bool] = lambda: False) -> bytes:
         """
         Show how an entry begins.
 
+        :param unwanted: tells that nobody waits for it any more.
         :return: the answer of /api/preview as JSON.
         :raises CrgameError: if there is no such entry, or it cannot be used.
         """
         entry = await self._entry(entry_id)
-        return await self._reader.run('preview', path=str(entry.path), kind=entry.kind)
+        return await self._reader.run('preview', path=str(entry.path), kind=entry.kind,
+                                      unwanted=unwanted)
 
     async def upload(self, data: bytes, title: str) -> str:
         """
@@ -150,6 +156,27 @@ class Library:
         self._entries[entry.id] = entry
         return entry.id
 
+    async def delete_upload(self, entry_id: str) -> str:
+        """
+        Delete an upload.
+
+        :return: what was done, for people.
+        :raises CrgameError: if it is no upload, is in use, or cannot be removed.
+        """
+        entry = await self._entry(entry_id)
+        if entry.kind != 'upload':
+            raise InputError('is no upload', entry.name, 'only uploads are deleted here')
+        if entry.id == self._loaded:
+            raise InputError('is the scenario of the present run', entry.title,
+                             'start another one first')
+        try:
+            await asyncio.to_thread(entry.path.unlink, missing_ok=True)
+        except OSError as error:
+            raise CrgameError(f'{entry.title}: cannot be deleted ({error.strerror})') from error
+        self._entries.pop(entry.id, None)
+        self._titles.pop(entry.id, None)
+        return f'{entry.title} is deleted'
+
     async def write_game(self, choice: Choice) -> Path:
         """
         Write the game file of a choice.
@@ -162,6 +189,7 @@ class Library:
             planners=dict(choice.planners), allowed_drivers=list(DRIVERS),
             allowed_planners=list(planner_names()))
         text = json.loads(answer)['text'].encode()
+        self._loaded = entry.id
         return await asyncio.to_thread(self._store_game, text)
 
     def is_upload(self, entry_id: str) -> bool:
@@ -209,8 +237,7 @@ class Library:
             kept = [other.stat().st_size for other in self._uploads.glob('*.xml')
                     if other != path]
             if len(kept) >= MAX_UPLOADS or sum(kept) + len(data) > MAX_UPLOADS_BYTES:
-                raise CrgameError(f'{len(kept)} uploads are kept already; remove some from the '
-                                  'folder of uploads')
+                raise CrgameError(f'{len(kept)} uploads are kept already; delete some')
             part = path.with_name(f'{path.stem}.{secrets.token_hex(4)}.part')
             part.write_bytes(data)
         except OSError as error:

@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The HTTP interface of the library: list, preview, upload, load."""
+"""The HTTP interface of the library: list, preview, upload, delete, load."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -25,6 +25,7 @@ from crgame_ros.cockpit.backend import Backend
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Choice, Library
 from crgame_ros.cockpit.request_rights import actor
+from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.errors import CrgameError, InputError
 
 MAX_VEHICLES = 1000
@@ -32,13 +33,13 @@ MAX_TEXT = 1000
 UPLOAD_S = 60.0
 
 _log = logging.getLogger(__name__)
-Answer = Callable[[web.Request], Awaitable[web.Response]]
+Answer = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 def add_routes(app: web.Application, library: Library | None, backend: Backend,
                hub: Hub) -> None:
     """
-    Add /api/scenarios, preview, upload and load.
+    Add /api/scenarios, preview, upload, upload/delete and load.
 
     :param library: None answers that there is nothing to choose.
     :param backend: takes the game that is loaded.
@@ -46,14 +47,15 @@ def add_routes(app: web.Application, library: Library | None, backend: Backend,
     """
     if library is None:
         for method, path in (('GET', 'scenarios'), ('GET', 'preview'), ('POST', 'upload'),
-                             ('POST', 'load')):
+                             ('POST', 'upload/delete'), ('POST', 'load')):
             app.router.add_route(method, f'/api/{path}', _nothing)
         return
     routes = _Routes(library, backend, hub)
-    app.router.add_get('/api/scenarios', _refusable(routes.scenarios))
-    app.router.add_get('/api/preview', _refusable(routes.preview))
-    app.router.add_post('/api/upload', _refusable(routes.upload))
-    app.router.add_post('/api/load', _refusable(routes.load))
+    app.router.add_get('/api/scenarios', refusable(routes.scenarios))
+    app.router.add_get('/api/preview', refusable(routes.preview))
+    app.router.add_post('/api/upload', refusable(routes.upload))
+    app.router.add_post('/api/upload/delete', refusable(routes.delete))
+    app.router.add_post('/api/load', refusable(routes.load))
 
     async def closing(_: web.Application) -> AsyncIterator[None]:
         yield
@@ -77,8 +79,9 @@ class _Routes:
 
     async def preview(self, request: web.Request) -> web.Response:
         actor(request, self._hub, 'load')
-        content = await self._library.preview(request.query.get('id', '')[:MAX_TEXT])
-        return web.Response(body=content, content_type='application/json', charset='utf-8')
+        content = await self._library.preview(request.query.get('id', '')[:MAX_TEXT],
+                                              asker_gone(request))
+        return web.Response(text=without_paths(content.decode()), content_type='application/json')
 
     async def upload(self, request: web.Request) -> web.Response:
         actor(request, self._hub, 'load')
@@ -87,21 +90,27 @@ class _Routes:
             title = request.query.get('name', '')[:MAX_TEXT]
             return web.json_response({'id': await self._library.upload(data, title)})
 
+    async def delete(self, request: web.Request) -> web.Response:
+        actor(request, self._hub, 'load')
+        text = await self._library.delete_upload(asked_id(await request.read()))
+        return web.json_response({'ok': True, 'text': text})
+
     async def load(self, request: web.Request) -> web.Response:
         client = actor(request, self._hub, 'load')
         choice = _choice(await request.read())
         path = await self._library.write_game(choice)
         text = await self._backend.load_game(
             path, client, takes_seat=self._library.is_upload(choice.id))
-        return web.json_response({'ok': True, 'text': text})
+        return web.json_response({'ok': True, 'text': without_paths(text)})
 
 
-def _refusable(handler: Answer) -> Answer:
-    async def answer(request: web.Request) -> web.Response:
+def refusable(handler: Answer) -> Answer:
+    """Make a handler answer with one line of JSON where it fails."""
+    async def answer(request: web.Request) -> web.StreamResponse:
         try:
             return await handler(request)
         except CrgameError as error:
-            return web.json_response({'error': str(error)}, status=400)
+            return web.json_response({'error': without_paths(str(error))}, status=400)
         except web.HTTPRequestEntityTooLarge:
             return web.json_response({'error': 'that is too much'}, status=413)
         except TimeoutError:
@@ -113,6 +122,22 @@ def _refusable(handler: Answer) -> Answer:
             return web.json_response(
                 {'error': 'it failed; the log of the server says why'}, status=500)
     return answer
+
+
+def asker_gone(request: web.Request) -> Callable[[], bool]:
+    """Give a function that tells whether nobody waits for the answer any more."""
+    def gone() -> bool:
+        return request.transport is None or request.transport.is_closing()
+    return gone
+
+
+def asked_id(body: bytes) -> str:
+    """
+    Read the `id` that a request names.
+
+    :raises InputError: if it names none.
+    """
+    return _text(_object(body).get('id'))
 
 
 async def _nothing(_: web.Request) -> web.Response:
@@ -131,13 +156,18 @@ async def _body(request: web.Request, limit: int) -> bytes:
     return bytes(data)
 
 
-def _choice(body: bytes) -> Choice:
+def _object(body: bytes) -> dict[str, Any]:
     try:
         content = json.loads(body)
     except (ValueError, RecursionError) as error:
         raise InputError('is no JSON', 'choice', 'load the page again') from error
     if not isinstance(content, dict):
         raise InputError('is no JSON object', 'choice', 'load the page again')
+    return content
+
+
+def _choice(body: bytes) -> Choice:
+    content = _object(body)
     return Choice(_text(content.get('id')), _by_vehicle(content.get('humans', []), 'driver'),
                   _by_vehicle(content.get('avs', []), 'planner'))
 

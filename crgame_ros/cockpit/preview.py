@@ -12,31 +12,19 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""
-Reading scenarios for the page, in a process of its own.
+"""Reading scenarios for the page, in a process of its own (`job_loop`)."""
 
-A scenario can take seconds and much memory to read; the process that serves the page, and may
-carry somebody's hands on the wheel, has neither. `python -m crgame_ros.cockpit.preview` reads jobs
-from its standard input, one JSON object a line, and answers each on its standard output.
-"""
-
-from collections.abc import Callable, Mapping
-import contextlib
+from collections.abc import Mapping
 from dataclasses import replace
-import json
 import math
-import os
 from pathlib import Path
-import resource
-import signal
-import struct
-import sys
-import traceback
-from typing import Any, BinaryIO
+from typing import Any
 
+from crgame_ros.cockpit.job_loop import serve_jobs
 from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
 from crgame_ros.game.game_file import dump_game, load_game
@@ -46,10 +34,7 @@ from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup, Setup
 
-HEADER = struct.Struct('<?Q')
 UPLOAD = 'upload'
-_MAX_MEMORY = 4 * 2 ** 30
-_NICE = 10
 
 
 def check(path: Path) -> dict[str, Any]:
@@ -123,38 +108,7 @@ def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping
 
 def main() -> None:
     """Answer jobs until the standard input ends."""
-    # Ctrl-C is for the server, which closes the standard input when it ends.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(_NICE)
-    resource.setrlimit(resource.RLIMIT_AS, (_MAX_MEMORY, _MAX_MEMORY))
-    answers = os.fdopen(os.dup(1), 'wb')
-    # What a library prints must not get into the answers.
-    os.dup2(2, 1)
-    with contextlib.suppress(BrokenPipeError):
-        for line in sys.stdin.buffer:
-            _answer(json.loads(line), answers)
-
-
-def _answer(job: dict[str, Any], answers: BinaryIO) -> None:
-    try:
-        path = Path(job.pop('path'))
-        result = _JOBS[job.pop('job')](path, **job)
-        ok, text = True, json.dumps(result, allow_nan=False, separators=(',', ':'))
-    except CrgameError as error:
-        # Names of folders on this machine are nobody's business.
-        ok, text = False, str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
-    except (MemoryError, RecursionError):
-        ok, text = False, 'the scenario is too large to be read'
-    except Exception:
-        traceback.print_exc()
-        ok, text = False, 'the scenario cannot be read; the log of the server says why'
-    data = text.encode('utf-8', 'replace')
-    answers.write(HEADER.pack(ok, len(data)) + data)
-    answers.flush()
-
-
-_JOBS: dict[str, Callable[..., dict[str, Any]]] = {
-    'check': check, 'preview': preview, 'compose': compose}
+    serve_jobs({'check': check, 'preview': preview, 'compose': compose}, 'scenario')
 
 
 def _scenario(path: Path, source: str) -> LoadedScenario:
@@ -177,6 +131,9 @@ def _setup(path: Path, kind: str) -> Setup:
 def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str],
             what: str) -> str:
     value = chosen.get(vehicle, own)
+    if value == without_paths(own):
+        # As the page knows it.
+        return own
     if value != own and value not in allowed:
         raise InputError(f'that {what} cannot be chosen here', vehicle,
                          f'choose {", ".join(allowed)} or leave it as it is')

@@ -28,6 +28,7 @@ from crgame_ros.cockpit.replay_criticality import measured_criticality, recorded
 from crgame_ros.cockpit.replay_index import index_run, RunIndex
 from crgame_ros.cockpit.replay_marks import Mark
 from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.epochs import Epoch, epoch_numbers, read_epoch
 from crgame_ros.recording.reader import BagReader
@@ -211,8 +212,8 @@ class ReplayBackend:
     async def _answer_info(self, request: web.Request) -> web.Response:
         content = await self._read(self._info, self._asked_epoch(request))
         # A string, compressed: an hour's documents are some megabytes of repetitions.
-        response = web.Response(text=json.dumps(content, separators=(',', ':')),
-                                content_type='application/json')
+        text = without_paths(json.dumps(content, separators=(',', ':')))
+        response = web.Response(text=text, content_type='application/json')
         response.enable_compression()
         return response
 
@@ -296,7 +297,8 @@ def _whole_number(text: str | None) -> int | None:
 
 
 def _missing(text: str) -> web.HTTPNotFound:
-    return web.HTTPNotFound(text=json.dumps({'error': text}), content_type='application/json')
+    return web.HTTPNotFound(text=json.dumps({'error': without_paths(text)}),
+                            content_type='application/json')
 
 
 def open_replay(path: Path, epoch: int | None, say: Callable[[str], None],

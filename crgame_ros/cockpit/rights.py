@@ -25,7 +25,7 @@ _DRIVES = ('input', 'claim', 'release', 'ask', 'hand_over', 'answer', 'ready', '
 _DEEDS = {'start': 'start the run', 'pause': 'pause the run', 'step': 'step through the run',
           'reset': 'reset the run', 'stop': 'stop the run', 'rate': 'change the speed of time',
           'planner': 'stop a planner or let it go on', 'trigger': 'trigger events',
-          'load': 'choose what is run', 'invite': 'make links'}
+          'load': 'choose what is run', 'invite': 'make links', 'delete': 'delete runs'}
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,16 @@ class Rights:
         """
         Say why something may not be done, empty if it may.
 
-        :param kind: of a message, load or invite.
+        :param kind: of a message, load, invite, runs or delete.
         :param action: of the run control.
         """
         deed = _DEEDS.get(action or kind, '')
         if kind == 'control' and action == 'start' and (self.directs or self.drives):
             # A driver may say that they are ready: who asks more is refused where it is known.
             return ''
-        if kind in (*_DIRECTS, 'load', 'invite') and not self.directs:
+        if kind == 'runs' and not (self.directs or self.drives):
+            return f'only who drives or directs can look at past runs; you are a {self.role}'
+        if kind in (*_DIRECTS, 'load', 'invite', 'delete') and not self.directs:
             return f'only a director can {deed}; you are a {self.role}'
         if kind in _DRIVES and not self.drives:
             return f'only a driver can take a seat; you are a {self.role}'

@@ -14,14 +14,21 @@
 # limitations under the License.
 """Where the files of a run are, which are there, and what they say of its contacts."""
 
+import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 from crgame_ros.recording.run_folder import FINISHED_MARK, run_folder
 
 # Of a run: its game and recordings, and what is made from them.
-_KINDS = ('game.yaml', 'bag*', '*.xml', 'timing*.json', 'report*.html')
+RUN_FILES = ('game.yaml', 'bag*', '*.xml', 'timing*.json', 'report*.html')
+
+
+def run_id(folder: Path) -> str:
+    """Give the name by which pages know a run; it says nothing of where it is."""
+    return hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
 
 
 def files_document(session: Path, epoch: int) -> dict[str, Any]:
@@ -32,12 +39,12 @@ def files_document(session: Path, epoch: int) -> dict[str, Any]:
     :param epoch: of the run.
     """
     folder = run_folder(session, epoch)
-    names = [path.name for kind in _KINDS for path in sorted(folder.glob(kind))]
-    here = Path.cwd()
-    shown = folder.relative_to(here) if folder.is_relative_to(here) else folder
+    names = [path.name for kind in RUN_FILES for path in sorted(folder.glob(kind))]
+    # Where it lies on this machine is for those at its terminal.
+    name = folder.relative_to(session.parent).as_posix()
     complete = (folder / FINISHED_MARK).exists()
-    return {'epoch': epoch, 'folder': str(shown), 'names': names, 'complete': complete,
-            'contacts': _contacts(folder) if complete else []}
+    return {'epoch': epoch, 'run': run_id(folder), 'folder': name, 'names': names,
+            'complete': complete, 'contacts': _contacts(folder) if complete else []}
 
 
 def _contacts(folder: Path) -> list[dict[str, Any]]:

@@ -44,9 +44,10 @@ SHUTDOWN_S = 0.8
 _STALL_CHECK_S = 0.5
 _JSON_BYTES = 256 * 1024
 
+_POLICY = 'Content-Security-Policy'
 _HEADERS = {
-    'Content-Security-Policy': (
-        "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    _POLICY: (
+        "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
         "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
     'X-Content-Type-Options': 'nosniff',
     'Referrer-Policy': 'no-referrer',
@@ -186,7 +187,10 @@ def _refusal(access: Access, request: web.Request, port: int) -> str:
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    own = response.headers.get(_POLICY)
     response.headers.update(_HEADERS)
+    if own is not None:
+        response.headers[_POLICY] = own
     static = request.path.startswith(('/static/', '/three/')) or request.path == page_files.PLOTLY
     response.headers[hdrs.CACHE_CONTROL] = 'no-cache' if static else 'no-store'
 

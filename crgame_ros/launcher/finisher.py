@@ -67,10 +67,11 @@ class Finisher:
         if left and _is_closed(folders[-1]):
             self._start(left[-1])
 
-    def finish_all(self) -> int:
+    def finish_all(self, asked_to_end: bool = False) -> int:
         """
         Finish, now that the graph has ended, what is left.
 
+        :param asked_to_end: whether somebody ended it: then it need not have begun.
         :return: 0, or 1 if something could not be written, or nothing was recorded at all.
         """
         # It takes a second to import.
@@ -87,7 +88,7 @@ class Finisher:
             (folder / FINISHED_MARK).unlink(missing_ok=True)
         codes = set(self._codes.values())
         # A first game that nobody drove, before they chose another one, is no failure.
-        return 0 if OK in codes and codes <= {OK, EMPTY} else 1
+        return 0 if codes <= {OK, EMPTY} and (OK in codes or asked_to_end) else 1
 
     def write_reports(self) -> None:
         """Write the reports of what `finish_all` has finished; a second signal leaves them out."""

@@ -89,6 +89,11 @@ class Graph:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
+    @property
+    def was_asked_to_end(self) -> bool:
+        """Whether a signal ended it, such as that of Ctrl-C."""
+        return self._signal is not None
+
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._signal = number
 

@@ -44,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     :return: exit code: 0 at a good end, 2 for bad input, 1 for other failures.
     """
+    began = False
     try:
         request = parse_arguments(sys.argv[1:] if arguments is None else arguments)
         if request.replay is not None:
@@ -62,13 +63,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with held(os.environ['ROS_DOMAIN_ID'], request.namespace):
                 specs = node_specs(plan)
                 load(shared_modules(specs, plan))
-                code = Graph(specs, say, Roster(plan.roster), finisher, request.namespace).run()
+                graph = Graph(specs, say, Roster(plan.roster), finisher, request.namespace)
+                began = True
+                code = graph.run()
         finally:
             shutil.rmtree(plan.private, ignore_errors=True)
             plan.roster.unlink(missing_ok=True)
             plan.claim.unlink(missing_ok=True)
         with writing(say):
-            code = max(code, finisher.finish_all())
+            code = max(code, finisher.finish_all(graph.was_asked_to_end))
         finisher.write_reports()
         say(f'again: ./run.sh {plan.game_file}; tools: ./crgame --help')
         return code
@@ -76,7 +79,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'error: {error}', file=sys.stderr, flush=True)
         return error.exit_code
     except KeyboardInterrupt:
-        return 130
+        if began:
+            return 130
+        say('ended before the run began')
+        return 0
 
 
 def announce(plan: RunPlan) -> None:

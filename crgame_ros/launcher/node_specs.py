@@ -117,7 +117,9 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
             'certificate': _path(request.certificate), 'key': _path(request.key),
             'private': f'"{plan.private}"', 'seats': f'[{seats}]',
             'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
-            'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"'},
+            'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"',
+            # What lies beside a folder that somebody named is theirs.
+            'archive': f'"{plan.folder.parent if request.out is None else ""}"'},
             nice=COMPANION_NICE, restart=True))
     return viewers
 

@@ -21,6 +21,8 @@ from tempfile import TemporaryDirectory
 
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.opening import Opening
+from crgame_ros.cockpit.runs.run_archive import RunArchive
+from crgame_ros.cockpit.runs.run_routes import add_run_routes
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.nodes.cockpit.cockpit_backend import LiveBackend
 from crgame_ros.paths import scenarios_directory
@@ -47,6 +49,9 @@ class CockpitNode(Node):
             read_only=True)).value
         self._runs: str = declare('runs', '', ParameterDescriptor(
             description="folder of the session's files, which the page names; none if empty",
+            read_only=True)).value
+        self._archive: str = declare('archive', '', ParameterDescriptor(
+            description='folder of other sessions, whose runs the page lists; none if empty',
             read_only=True)).value
         self._work: str = declare('directory', 'cockpit', ParameterDescriptor(
             description='folder for uploaded scenarios and for the games that people choose',
@@ -91,6 +96,9 @@ class CockpitNode(Node):
         access = opening.access()
         app = create_app(LiveBackend(self, Path(self._runs) if self._runs else None), access,
                          Library(folders, work / 'uploads', work / 'games'))
+        if self._runs:
+            archive = RunArchive(Path(self._runs), Path(self._archive) if self._archive else None)
+            add_run_routes(app, archive, work)
         runner, port = await listen(app, opening.host, opening.port)
         if port != opening.port:
             self.get_logger().warning(f'port {opening.port} is taken')

@@ -25,9 +25,11 @@ from typing import Any
 
 from browser_support import Browser
 import commonroad
+from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.game.game_file import load_game
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import run_folders
+from crgame_ros.recording.run_record import read_run_record
 from crgame_ros.simulation.setup import build_setup
 from live_browser_support import Graph, live_graph, LivePage, SCENARIOS
 from lxml import etree
@@ -114,10 +116,75 @@ def test_a_run_is_over_at_its_own_duration_and_says_how_it_went(page: LivePage) 
     assert 0.5 * 10 * SHORT_S < accepted <= 10 * SHORT_S
     assert {'Mean step error', 'Largest lag', 'Precision ratio'} <= set(page.run(
         'return [...document.querySelectorAll("#outcome dt")].map((node) => node.textContent)'))
-    assert folder_on_card(page) == page.graph.launcher.out / 'run_2'
+    assert folder_on_card(page) == Path('run/run_2')
     assert page.run('return crgame.store.alarms') == []
     assert page.text('#recording').startswith('Recorded')
     assert page.text('.clock-state') == 'Ended'
+    assert page.browser.console_errors() == []
+
+
+def test_the_card_has_score_links_and_the_last_seconds(page: LivePage) -> None:
+    """The score is that of `crgame score`, the files are the run's, and its end is seen again."""
+    page.wait('document.querySelector(".score[data-state=told]")', 'the score')
+    folder = page.graph.launcher.out / 'run_2'
+    expected = scores_of(read_run_record(folder / 'bag'), {}, drives_only=True)
+    told = page.run("""return [...document.querySelectorAll('.score-vehicle')].map((node) => [
+        node.dataset.vehicle, node.querySelector('.score-points').textContent]);""")
+    assert told == [[each.vehicle_id, f'{100 * each.nuplan.score:.0f}']
+                    for each in expected.vehicles if each.nuplan is not None]
+    sizes = page.run_async("""const found = {};
+        for (const link of document.querySelectorAll('.outcome-files a[download]')) {
+          const answer = await fetch(link.href);
+          found[link.textContent] = [answer.status, (await answer.arrayBuffer()).byteLength];
+        }
+        return found;""")
+    (scenario,) = folder.glob('*.xml')
+    for path in (scenario, folder / 'game.yaml', folder / 'timing.json'):
+        assert sizes[path.name] == [200, path.stat().st_size]
+    assert sizes['Everything as ZIP'][1] > (folder / 'bag' / 'bag_0.mcap').stat().st_size
+    page.click('#outcome [data-action=look]')
+    page.wait('crgame.lastSeconds.isOpen && crgame.world.shown.t < 2'
+              ' && !document.querySelector("#outcome").checkVisibility()')
+    page.click('#last-seconds [data-action=end]')
+    page.wait('crgame.world.shown.t === crgame.store.latest.t')
+
+
+def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
+    """The run before is shown again in another tab, and deleted; the last one stays."""
+    out = page.graph.launcher.out
+    page.tab('runs')
+    page.wait('document.querySelectorAll(".run").length === 2'
+              ' && [...document.querySelectorAll("img.run-picture")].every('
+              '(image) => image.complete && image.naturalWidth > 0)', 'pictures of two runs')
+    keys = page.run('return [...document.querySelectorAll(".run")].map((n) => n.dataset.run)')
+    assert page.run('return [...document.querySelectorAll(".run")].map((n) => n.dataset.name)'
+                    ) == ['run/run_2', 'run']
+    for key in keys:
+        page.click(f'[data-run="{key}"] input[type=checkbox]')
+    page.wait_for_text('#panel-runs button.wide', 'Compare 2 runs')
+    page.run('window.open = (address) => { window.opened = address; };')
+    page.click('#panel-runs button.wide')
+    status, text = page.run_async("""const answer = await fetch(window.opened);
+        return [answer.status, await answer.text()];""")
+    assert status == 200 and 'run/run_2' in text
+    own = page.driver.current_window_handle
+    page.driver.switch_to.new_window('tab')
+    try:
+        page.browser.open(f'{page.graph.address}replay/{keys[0]}/')
+        page.wait('window.crgame?.ready && crgame.store.mode === "replay" && crgame.world.shown'
+                  ' && crgame.store.scene.title === "A crash"', 'the replay')
+    finally:
+        page.driver.close()
+        page.driver.switch_to.window(own)
+    # The first run is finished only when another one has ended.
+    page.wait('!document.querySelector(`[data-run="${arguments[0]}"] [data-action=delete]`)'
+              '.disabled || (crgame.runs.refresh(), false)', 'the first run to be finished',
+              keys[1])
+    page.click(f'[data-run="{keys[1]}"] [data-action=delete]')
+    page.click('dialog.confirm[open] .danger')
+    page.wait('document.querySelectorAll(".run").length === 1', 'one run')
+    assert (out / 'run_2' / 'bag').is_dir() and (out / 'cockpit').is_dir()
+    assert not (out / 'bag').exists() and not (out / 'game.yaml').exists()
     assert page.browser.console_errors() == []
 
 
@@ -156,8 +223,10 @@ def test_each_run_has_its_own_files(graph: Graph) -> None:
     """Bag, scenario, timing report and game of each, and nothing of another."""
     folders = run_folders(graph.launcher.out)
     assert [folder.name for folder in folders] == ['run', 'run_2', 'run_3', 'run_4']
+    # The first one was deleted.
+    folders = folders[1:]
     schema = etree.XMLSchema(etree.parse(str(SCHEMA)))
-    for folder, scenario in zip(folders, (CUT_IN, CUT_IN, CUT_IN, TRAFFIC), strict=True):
+    for folder, scenario in zip(folders, (CUT_IN, CUT_IN, TRAFFIC), strict=True):
         game = load_game(folder / 'game.yaml')
         assert game.scenario.name == f'{scenario}.xml'
         (xml,) = folder.glob('*.xml')
@@ -168,7 +237,7 @@ def test_each_run_has_its_own_files(graph: Graph) -> None:
         assert len(root.findall('planningProblem')) == max(1, driven)
         contacts = json.loads((folder / 'timing.json').read_text())['contacts']
         assert [(item['vehicle'], item['with'], item['kind']) for item in contacts] == [
-            ('av0', 'hv0', 'stopped track')] * (folder in folders[1:3])
+            ('av0', 'hv0', 'stopped track')] * (folder in folders[:2])
         assert not (folder / '.finished').exists()
         with BagReader(folder / 'bag') as reader:
             assert reader.complete
@@ -176,4 +245,4 @@ def test_each_run_has_its_own_files(graph: Graph) -> None:
                 ['/vehicles/state']))
             first = min(item.message.header.stamp.sec for item in reader.decoded(
                 ['/vehicles/state']))
-        assert folder == folders[0] or last - first <= SHORT_S
+        assert last - first <= SHORT_S

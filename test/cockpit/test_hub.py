@@ -23,7 +23,9 @@ from cockpit_support import cockpit, in_loop, next_text, wait_until
 from crgame_ros import __version__
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.shown_paths import without_paths
 import numpy as np
+import pytest
 
 
 class Sink:
@@ -146,3 +148,18 @@ async def test_a_client_that_leaves_is_told_of_at_once_and_once() -> None:
         assert not running.hub.clients
         await breaking.close()
     assert running.backend.gone == ['c1', 'c2']
+
+
+@pytest.mark.parametrize(('text', 'shown'), [
+    ('keys:/tmp/a/cut_in.keys.yaml', 'keys:cut_in.keys.yaml'),
+    ('policy:/usr/x/p.py:load', 'policy:p.py:load'),
+    ('/usr/share/my folder/', 'my folder/'),
+    ('/tmp/ärger/x.xml: no lanelet 7', 'x.xml: no lanelet 7'),
+    ('/sim/reset: no answer in 5 s', '/sim/reset: no answer in 5 s'),
+    ('/hv0/drivability, 3/4 of /timing/cycle', '/hv0/drivability, 3/4 of /timing/cycle'),
+    ('http://127.0.0.1/tmp/x', 'http://127.0.0.1/tmp/x')])
+def test_a_page_learns_the_names_of_files_and_not_where_they_are(text: str, shown: str) -> None:
+    hub = Hub('live')
+    hub.set_document('status', {'reason': text})
+    assert without_paths(text) == shown
+    assert json.loads(hub._documents['status'])['reason'] == shown

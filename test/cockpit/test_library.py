@@ -20,12 +20,15 @@ from contextlib import asynccontextmanager
 import math
 from pathlib import Path
 import shutil
+import signal
 from typing import Any
 
 from cockpit_support import Cockpit, cockpit, get, in_loop, PATIENCE_S
 from crgame_ros.cockpit import library as library_module
-from crgame_ros.cockpit.library import Library
-from crgame_ros.cockpit.scenario_reader import ScenarioReader
+from crgame_ros.cockpit.job_process import JobProcess
+from crgame_ros.cockpit.library import Library, READER
+from crgame_ros.cockpit.shown_paths import without_paths
+from crgame_ros.errors import InputError
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
@@ -74,6 +77,12 @@ async def upload(running: Cockpit, data: bytes, **query: str) -> tuple[int, dict
         return answer.status, await answer.json()
 
 
+async def delete(running: Cockpit, entry_id: Any) -> tuple[int, dict[str, Any]]:
+    async with running.http.post(f'{running.address}/api/upload/delete', json={'id': entry_id},
+                                 headers=HEADER) as answer:
+        return answer.status, await answer.json()
+
+
 async def load(running: Cockpit, **choice: Any) -> tuple[int, dict[str, Any]]:
     async with running.http.post(f'{running.address}/api/load', json=choice,
                                  headers=HEADER) as answer:
@@ -111,7 +120,8 @@ async def test_a_preview_shows_the_scene_and_where_everything_starts(tmp_path: P
     for row, pose in zip(content['states']['objects'], poses.tolist(), strict=True):
         assert row[:3] == [None if math.isnan(value) else value for value in pose]
     assert content['humans'] == [
-        {'id': human.id, 'driver': human.driver} for human in setup.humans]
+        {'id': human.id, 'driver': without_paths(human.driver)} for human in setup.humans]
+    assert content['humans'][0]['driver'] == 'keys:cut_in.keys.yaml'
     assert content['avs'] == [
         {'id': 'av0', 'planner': setup.avs[0].spec.planner,
          'planning_problem': setup.avs[0].planning_problem.planning_problem_id}]
@@ -166,6 +176,39 @@ async def test_an_upload_is_kept_listed_and_previewed(tmp_path: Path) -> None:
     async with with_library(tmp_path) as running:
         item = (await listed(running))['folders'][1]['entries'][0]
         assert (item['id'], item['title']) == (content['id'], 'ZAM_CutIn-1_1_T-1')
+
+
+@in_loop
+async def test_uploads_and_nothing_else_are_deleted(tmp_path: Path) -> None:
+    async with with_library(tmp_path) as running:
+        _, content = await upload(running, CUT_IN)
+        own = await entry(running, 'cut_in.yaml')
+        for wanted in (own, '', '../x', 7):
+            assert (await delete(running, wanted))[0] == 400
+        assert (await load(running, id=content['id']))[0] == 200
+        status, answer = await delete(running, content['id'])
+        assert status == 400 and 'of the present run' in answer['error']
+        assert (await load(running, id=own))[0] == 200
+        assert (await delete(running, content['id']))[0] == 200
+        assert (await listed(running))['folders'][1]['entries'] == []
+    assert list((tmp_path / 'uploads').iterdir()) == []
+
+
+@in_loop
+async def test_a_preview_that_nobody_waits_for_is_ended(tmp_path: Path) -> None:
+    reader = JobProcess(READER, 'scenario')
+    async with with_library(tmp_path, reader=reader) as running:
+        first = await entry(running, 'cut_in.yaml')
+        assert (await preview(running, first))[0] == 200
+        process = reader._process
+        assert process is not None
+        process.send_signal(signal.SIGSTOP)
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(0.5):
+                await preview(running, first)
+        # Its page has gone: the next one need not wait until the time is over.
+        assert (await preview(running, await entry(running, 'roundabout.yaml')))[0] == 200
+    assert process.returncode is not None
 
 
 BAD = {'nothing': b'', 'no XML': b'hello', 'HTML': b'<html><script>1</script></html>',
@@ -297,7 +340,7 @@ async def test_frames_go_on_while_a_scenario_is_read(tmp_path: Path) -> None:
 @in_loop
 async def test_a_scenario_that_takes_too_long_is_given_up_and_the_next_is_read(
         tmp_path: Path) -> None:
-    reader = ScenarioReader()
+    reader = JobProcess(READER, 'scenario')
     async with with_library(tmp_path, reader=reader) as running:
         first = await entry(running, 'cut_in.yaml')
         second = await entry(running, 'roundabout.yaml')
@@ -313,7 +356,7 @@ async def test_a_scenario_that_takes_too_long_is_given_up_and_the_next_is_read(
 
 @in_loop
 async def test_a_reader_that_dies_is_replaced(tmp_path: Path) -> None:
-    reader = ScenarioReader()
+    reader = JobProcess(READER, 'scenario')
     async with with_library(tmp_path, reader=reader) as running:
         game = await entry(running, 'cut_in.yaml')
         assert (await preview(running, game))[0] == 200
@@ -352,3 +395,22 @@ async def test_a_folder_that_is_gone_or_holds_anything_is_no_error(tmp_path: Pat
         ('empty.xml', 'scenario'), ('title.yaml', 'game')]
     assert folders['Own'][0]['title'] == 'empty'
     assert folders['Own'][1]['title'] == ('bTitle/b' + 'x' * 80)[:80]
+
+
+@in_loop
+async def test_a_scenario_that_takes_much_of_the_processor_is_given_up(tmp_path: Path) -> None:
+    """In its own process, which then reads the next one."""
+    (tmp_path / 'slow.py').write_text(
+        'from crgame_ros.cockpit import job_loop\n'
+        'def spin(path):\n'
+        '    while True:\n'
+        '        sum(range(1000))\n'
+        "job_loop.serve_jobs({'spin': spin, 'name': lambda path: {'name': path.name}}, 'scenario',"
+        ' 0.2)\n')
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv('PYTHONPATH', str(tmp_path))
+        reader = JobProcess('slow', 'scenario')
+        with pytest.raises(InputError, match=r'takes more than 0\.2 s to read'):
+            await reader.run('spin', path='/x')
+        assert await reader.run('name', path='/a/b.xml') == b'{"name":"b.xml"}'
+        await reader.close()

@@ -97,7 +97,7 @@ async def test_every_answer_has_the_headers_that_protect_the_page() -> None:
         for path in ('/', '/static/js/main.js', '/plotly.js', '/api/scenarios', '/nothing'):
             async with running.http.get(f'{running.address}{path}') as answer:
                 policy = answer.headers['Content-Security-Policy']
-                assert policy.startswith("default-src 'self'; style-src 'self' 'unsafe-inline'")
+                assert policy.startswith("default-src 'self'; style-src 'self'; img-src")
                 assert "frame-ancestors 'none'" in policy and 'script-src' not in policy
                 assert answer.headers['X-Content-Type-Options'] == 'nosniff'
                 assert answer.headers['Referrer-Policy'] == 'no-referrer'

@@ -5,6 +5,9 @@
 import type { Connection } from '../../crgame_ros/cockpit/page/js/connection.js';
 import type { Driving } from '../../crgame_ros/cockpit/page/js/driving/driving.js';
 import type { createPerson } from '../../crgame_ros/cockpit/page/js/person.js';
+import type { createInstantReplay } from
+  '../../crgame_ros/cockpit/page/js/after/instant_replay.js';
+import type { createScenario } from '../../crgame_ros/cockpit/page/js/panels/scenario.js';
 import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
 import type { createPerception } from
   '../../crgame_ros/cockpit/page/js/perception/perception.js';
@@ -23,6 +26,8 @@ interface Crgame {
   perception?: ReturnType<typeof createPerception>;
   sound?: Sound;
   view3d?: View3d;
+  lastSeconds?: ReturnType<typeof createInstantReplay>;
+  scenario?: ReturnType<typeof createScenario>;
   ready?: boolean;
   [part: string]: unknown;
 }

@@ -64,6 +64,7 @@ globalThis.getComputedStyle = ({ style }) => ({
 });
 page.matchMedia = () => ({ matches: false });
 
+const { HELD_MS } = await import('../../crgame_ros/cockpit/page/js/after/restart_key.js');
 const { attachKeys } = await import('../../crgame_ros/cockpit/page/js/world/keys.js');
 const { Keyboard } = await import('../../crgame_ros/cockpit/page/js/driving/keyboard.js');
 const { attachGestures } = await import('../../crgame_ros/cockpit/page/js/world/gestures.js');
@@ -149,12 +150,26 @@ test('driving keys, by their place: throttle, brake, left, right', () => {
 });
 
 test('a key that repeats tells nothing new, and no widget gets it', () => {
-  const { told, down } = keyboard();
+  const { told, down, up } = keyboard();
   down('KeyS');
   assert.ok(down('KeyS', { repeat: true }).defaultPrevented);
   assert.equal(told.changed, 1);
   down('KeyR');
+  assert.deepEqual([told.reversed, told.changed], [0, 1]);
+  up('KeyR');
   assert.deepEqual([told.reversed, told.changed], [1, 1]);
+});
+
+test('R is the gear when it is tapped, not when it is held or its hands went off', async () => {
+  const { told, keys, down, up } = keyboard();
+  down('KeyR');
+  await new Promise((resolve) => { setTimeout(resolve, HELD_MS + 20); });
+  up('KeyR');
+  down('KeyR');
+  keys.release();
+  up('KeyR');
+  up('KeyR');
+  assert.equal(told.reversed, 0);
 });
 
 test('keys drive only while they may, and never with a command key', () => {

@@ -127,6 +127,12 @@ def test_at_the_end_of_a_run_nobody_waits_for_the_checker(
     assert 'nuPlan score, of 1' in text and 'CommonRoad cost SM1' in text
 
 
+def test_an_end_before_the_start_is_no_failure_where_somebody_wanted_it(tmp_path: Path) -> None:
+    """Ctrl-C while a run waits for its driver; by itself a run records something."""
+    assert Finisher(tmp_path, lambda _: None).finish_all(asked_to_end=True) == 0
+    assert Finisher(tmp_path, lambda _: None).finish_all() == 1
+
+
 def test_without_report_there_is_none(session: Path) -> None:
     """What `--no-report` asks for."""
     finisher = Finisher(session, lambda _: None, reports=False)

@@ -151,7 +151,13 @@ export class Connection {
   }
 }
 
-/** @param {Location} location */
+/**
+ * Give the socket beside a page: the replay of a past run has an address below the cockpit's.
+ *
+ * @param {Location} location of the page
+ */
 function socketUrl(location) {
-  return `${location.protocol === 'https:' ? 'wss:' : 'ws:'}//${location.host}/ws`;
+  const url = new URL('ws', location.href);
+  url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+  return url.href;
 }

@@ -24,11 +24,16 @@ const PARTS = [
   ['./panels/events.js', 'createEvents', '#panel-events', 'events'],
   ['./panels/planners.js', 'createPlanners', '#planners', 'planners'],
   ['./panels/timing.js', 'createTiming', '#timekeeping', 'timing'],
+  ['./after/instant_replay.js', 'createInstantReplay', '#last-seconds', 'lastSeconds'],
+  ['./after/restart_key.js', 'createRestart', '#stage', 'restart'],
+  ['./after/run_list.js', 'createRunList', '#panel-runs', 'runs'],
   ['./panels/outcome.js', 'createOutcome', '#outcome', 'outcome'],
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
   ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
   ['./view3d/view3d.js', 'createView3d', '#stage', 'view3d'],
+  ['./world/around.js', 'createAround', '#around', 'around'],
+  ['./panels/save_panel.js', 'createSaving', '#panels', 'saving'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
 

@@ -259,10 +259,40 @@ export {};
 /**
  * @typedef {object} Files
  * @property {number} epoch
+ * @property {string} run id by which /api/runs knows it
  * @property {string} folder
  * @property {string[]} names
  * @property {boolean} complete
  * @property {NamedContact[]} contacts
+ */
+
+/**
+ * What /api/runs says of a run, and /api/runs/score.
+ *
+ * @typedef {object} PastRun
+ * @property {string} id
+ * @property {string} name
+ * @property {string} title
+ * @property {string} scenario
+ * @property {number|null} began_ms since 1970
+ * @property {number|null} duration_s of its recording
+ * @property {number|null} contacts null where nobody knows
+ * @property {boolean} closed whether it can be read
+ * @property {boolean} finished whether it can be deleted
+ * @property {boolean} own whether it belongs to this session
+ * @property {number} bytes
+ * @property {{name: string, bytes: number}[]} files
+ *
+ * @typedef {{name: string, value: number|null, weight: number, definition: string}} ScorePart
+ * @typedef {object} VehicleScore
+ * @property {string} vehicle
+ * @property {string} role
+ * @property {number|null} score of 1
+ * @property {ScorePart[]} parts
+ * @property {number|null} distance [m]
+ * @property {number|null} fastest [m/s]
+ * @property {string[]} remarks
+ * @typedef {{vehicles: VehicleScore[], refusal: string}} Score
  */
 
 /** @typedef {'info'|'warn'|'error'} NoticeLevel */

@@ -5,6 +5,7 @@
 import { element, part, setAttribute, setText } from './dom.js';
 import { isTyping } from './driving/focus.js';
 import { icon } from './driving/icons.js';
+import { confirm } from './panels/confirm.js';
 import { reasonAgainst } from './rights.js';
 
 /** @import { Connection } from './connection.js' */
@@ -50,7 +51,6 @@ class RunControl {
   #factor = element('select', { 'aria-label': 'Real-time factor',
     title: 'Simulated seconds per second' });
   #root;
-  #confirm = buildConfirmation();
   #clock;
   #lamp;
 
@@ -147,8 +147,8 @@ class RunControl {
 
   /** @param {RunAction} action */
   async #order(action) {
-    const { confirm } = ORDERS[action];
-    if (!confirm || await this.#confirm.ask(...confirm, ORDERS[action].label)) {
+    const order = ORDERS[action];
+    if (!order.confirm || await confirm(...order.confirm, order.label)) {
       await this.#request({ type: 'control', action });
     }
   }
@@ -237,38 +237,6 @@ function recordingNow({ recording, run }, connected) {
   }
   return run !== 'ended' ? { state: 'unknown' }
     : { ...told, state: told.state === 'recording' ? 'recorded' : told.state };
-}
-
-function buildConfirmation() {
-  const title = element('h2', { id: 'confirm-title' });
-  const text = element('p');
-  const yes = element('button', { type: 'button', class: 'drive-button danger' });
-  const no = element('button', { type: 'button', class: 'drive-button', text: 'Cancel' });
-  const dialog = element('dialog', { class: 'confirm', 'aria-labelledby': 'confirm-title' },
-    title, text, element('div', { class: 'dialog-buttons' }, no, yes));
-  document.body.append(dialog);
-  no.addEventListener('click', () => dialog.close('no'));
-  yes.addEventListener('click', () => dialog.close('yes'));
-  return {
-    /**
-     * @param {string} question
-     * @param {string} consequence
-     * @param {string} verb
-     * @returns {Promise<boolean>}
-     */
-    ask(question, consequence, verb) {
-      setText(title, question);
-      setText(text, consequence);
-      setText(yes, verb);
-      dialog.returnValue = 'no';
-      dialog.showModal();
-      no.focus();
-      return new Promise((resolve) => {
-        dialog.addEventListener('close', () => resolve(dialog.returnValue === 'yes'),
-          { once: true });
-      });
-    },
-  };
 }
 
 /**

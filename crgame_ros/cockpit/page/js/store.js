@@ -19,9 +19,9 @@ import { SampleRing } from './samples.js';
 /** @import { PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
 
-// At 100 Hz the ring of raw samples holds 5 s, that of scenario steps at 10 Hz 10 s.
-const RAW_SAMPLES = 500;
-const RAW_STEPS = 100;
+// What the last 10 s can be shown from once more: at 100 Hz, and scenario steps at up to 25 Hz.
+const RAW_SAMPLES = 1020;
+const RAW_STEPS = 260;
 const HISTORY_SPACING_S = 0.05;
 const HISTORY_S = 120;
 // An object whose next step is late moves on so long beyond it [s].

@@ -58,7 +58,8 @@ export class Driving {
     this.calibration = new CalibrationDialog(
       (index, profile) => this.gamepads.setProfile(index, profile));
     this.#devicePanel = new DevicePanel(this.gamepads, (index) => this.calibration.open(index));
-    this.hud = new Hud(part(root, 'hud'), store, () => this.#subject());
+    this.hud = new Hud(part(root, 'hud'), store, () => this.#subject(),
+      this.keyboard);
     store.on('seats', () => this.#takeSeat());
     store.on('hello', () => this.#tellDevice(true));
     store.on('connection', (connected) => this.#connectionChanged(connected));

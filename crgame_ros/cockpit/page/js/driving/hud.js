@@ -47,7 +47,7 @@ export class Hud {
   #root;
   #store;
   #subject;
-  #parts = buildParts();
+  #parts;
   #limits = new SpeedLimits(null);
   #numbersAt_ms = -Infinity;
   #limitAt_ms = -Infinity;
@@ -61,14 +61,17 @@ export class Hud {
    * @param {Store} store
    * @param {() => Subject} subject which vehicle to show, what the hands do, and what has gone
    *   wrong with the connection
+   * @param {Keyboard} keyboard whose keys are drawn, and pressed by fingers
    */
-  constructor(root, store, subject) {
+  constructor(root, store, subject, keyboard) {
     this.#root = root;
     this.#store = store;
     this.#subject = subject;
+    this.#parts = buildParts(keyboard);
     root.replaceChildren(this.#parts.banner, this.#parts.board);
     root.classList.add('hud');
     store.on('scene', (scene) => this.#takeScene(scene));
+    store.on('events', ({ fired }) => this.#limits.takeEvents(fired));
     this.#takeScene(store.scene);
     /** @param {number} now_ms */
     const frame = (now_ms) => {
@@ -81,6 +84,7 @@ export class Hud {
   /** @param {Scene|null} scene */
   #takeScene(scene) {
     this.#limits = new SpeedLimits(scene);
+    this.#limits.takeEvents(this.#store.fired);
     this.#vehicleId = null;
   }
 
@@ -138,6 +142,7 @@ export class Hud {
     p.wheel.turn(Number.isFinite(command) ? command
       : row[VEHICLE.steering_angle] / (this.#vehicle?.max_steering_angle || 1));
     setAttribute(p.keycaps.node, 'hidden', !driven);
+    setAttribute(this.#root, 'data-driven', driven);
     if (driven) {
       p.keycaps.show(keyboard, reverse);
     }
@@ -215,7 +220,8 @@ function signed(value, digits) {
   return `${value < 0 ? '−' : '+'}${text}`;
 }
 
-function buildParts() {
+/** @param {Keyboard} keyboard */
+function buildParts(keyboard) {
   /** @type {(name: string, title?: string) => HTMLElement} */
   const span = (name, title) => element('span', { class: `hud-${name}`, title });
   const parts = {
@@ -226,7 +232,7 @@ function buildParts() {
     command: span('command', 'Steering command, positive to the left'),
     limit: element('span', { class: 'hud-limit', role: 'img', title: 'Speed limit' }),
     throttle: new PedalBar('throttle', 'Throttle'), brake: new PedalBar('brake', 'Brake'),
-    steering: new SteeringBar(), wheel: new SteeringWheel(), keycaps: new Keycaps(),
+    steering: new SteeringBar(), wheel: new SteeringWheel(), keycaps: new Keycaps(keyboard),
     lights: new LightSigns(),
     banner: element('div', { class: 'hud-banner', role: 'status', 'aria-live': 'polite' }),
   };

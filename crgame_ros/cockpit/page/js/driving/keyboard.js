@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The driving keys, raw: which of them are held, and each press of the gear key. */
 
+import { HELD_MS } from '../after/restart_key.js';
 import { LIGHT_BUTTONS } from '../lights.js';
 import { isTyping } from './focus.js';
 
@@ -28,11 +29,13 @@ export class Keyboard {
   #report;
   /** @type {Set<string>} */
   #held = new Set();
+  // When R was pressed: it is told when it is let go, because held it means something else [ms].
+  #reverseSince_ms = NaN;
 
   /**
    * @param {() => boolean} enabled whether keys drive now
    * @param {{changed: () => void, reversed: () => void}} report `changed` at each change of the
-   *   held keys, `reversed` at each press of R
+   *   held keys, `reversed` at each tap on R
    */
   constructor(enabled, report) {
     this.#enabled = enabled;
@@ -70,8 +73,29 @@ export class Keyboard {
     return this.#held.has(code);
   }
 
+  /**
+   * Press a key as a finger does on the page.
+   *
+   * @param {string} code place of a key
+   */
+  press(code) {
+    if (this.#enabled()) {
+      this.#take(code, performance.now());
+    }
+  }
+
+  /**
+   * Let a key go that `press` has pressed.
+   *
+   * @param {string} code place of a key
+   */
+  lift(code) {
+    this.#leave(code, performance.now());
+  }
+
   /** Let go of everything; a key that is still down must be pressed anew. */
   release() {
+    this.#reverseSince_ms = NaN;
     if (this.#held.size > 0) {
       this.#held.clear();
       this.#report.changed();
@@ -101,21 +125,47 @@ export class Keyboard {
     if (event.repeat) {
       return;
     }
-    if (action === 'reverse') {
-      this.#report.reversed();
-    } else if (!this.#held.has(event.code)) {
-      this.#held.add(event.code);
+    this.#take(event.code, event.timeStamp);
+  }
+
+  /**
+   * @param {string} code
+   * @param {number} now_ms
+   */
+  #take(code, now_ms) {
+    if (ACTIONS[code] === 'reverse') {
+      this.#reverseSince_ms = now_ms;
+    } else if (!this.#held.has(code)) {
+      this.#held.add(code);
       this.#report.changed();
     }
   }
 
+  /**
+   * @param {string} code
+   * @param {number} now_ms
+   * @returns {boolean} whether it was held
+   */
+  #leave(code, now_ms) {
+    if (ACTIONS[code] === 'reverse') {
+      if (now_ms - this.#reverseSince_ms < HELD_MS) {
+        this.#report.reversed();
+      }
+      this.#reverseSince_ms = NaN;
+    }
+    const held = this.#held.delete(code);
+    if (held) {
+      this.#report.changed();
+    }
+    return held;
+  }
+
   /** @param {KeyboardEvent} event */
   #up(event) {
-    if (this.#held.delete(event.code)) {
+    if (this.#leave(event.code, event.timeStamp)) {
       // Firefox activates a focused button when the space bar is released.
       event.preventDefault();
       event.stopPropagation();
-      this.#report.changed();
     }
   }
 }

@@ -1,6 +1,6 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The driving keys as they lie on the keyboard, lit while they are held. */
+/** The driving keys as they lie on the keyboard, lit while they are held; fingers press them. */
 
 import { element, setAttribute, setText } from '../dom.js';
 
@@ -21,12 +21,23 @@ export class Keycaps {
   /** @type {Map<string, HTMLElement>} */
   #caps = new Map();
 
-  constructor() {
+  /** @param {Pick<Keyboard, 'press'|'lift'>} keyboard is pressed by fingers */
+  constructor(keyboard) {
     for (const [code, text, , title, sign] of CAPS) {
+      const lift = () => keyboard.lift(code);
       this.#caps.set(code, element('kbd', { class: `cap cap-${code}`, title,
-        text: sign === undefined ? text : `${text} ${sign}` }));
+        text: sign === undefined ? text : `${text} ${sign}`, on: {
+        pointerdown: (event) => {
+          event.preventDefault();
+          // A finger that slides off still holds the key.
+          /** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId);
+          keyboard.press(code);
+        },
+        pointerup: lift, pointercancel: lift, lostpointercapture: lift,
+        contextmenu: (event) => event.preventDefault(),
+      } }));
     }
-    this.node = element('div', { class: 'keycaps', role: 'img',
+    this.node = element('div', { class: 'keycaps', role: 'group',
       'aria-label': 'Keys: W throttle, A left, S brake, D right, space brake, R reverse, '
         + 'comma and period indicators, J hazard lights, G horn' },
     ...this.#caps.values());

@@ -4,25 +4,48 @@
 
 import { boxOf, contains, outlineOf } from '../outline.js';
 
-/** @import { Box, Scene } from '../messages.js' */
+/** @import { Box, FiredEvent, Scene } from '../messages.js' */
 
 /**
- * @typedef {{limit: number|null, center: number[], one_way: boolean, ring: number[],
- *   box: Box}} Lane
+ * @typedef {{id: number, limit: number|null, usual: number|null, center: number[],
+ *   one_way: boolean, ring: number[], box: Box}} Lane
  */
 
 /** Finds the lanelet under a point. */
 export class SpeedLimits {
   /** @type {Lane[]} */
   #lanes = [];
+  #scene;
 
   /** @param {Scene|null} scene the scene document */
   constructor(scene) {
+    this.#scene = scene;
     for (const lanelet of scene?.lanelets ?? []) {
       this.#lanes.push({
-        limit: lanelet.speed_limit ?? null, center: lanelet.center, one_way: lanelet.one_way,
+        id: lanelet.id, limit: lanelet.speed_limit ?? null, usual: lanelet.speed_limit ?? null,
+        center: lanelet.center, one_way: lanelet.one_way,
         ring: outlineOf(lanelet), box: boxOf([...lanelet.left, ...lanelet.right]),
       });
+    }
+  }
+
+  /**
+   * Let events that have fired set limits, the latest last.
+   *
+   * @param {FiredEvent[]} fired
+   */
+  takeEvents(fired) {
+    for (const lane of this.#lanes) {
+      lane.limit = lane.usual;
+    }
+    for (const { name } of fired) {
+      const event = this.#scene?.events?.find((entry) => entry.name === name);
+      if (event?.kind === 'speed_limit') {
+        const all = event.lanelets.length === 0;
+        this.#lanes.filter(({ id }) => all || event.lanelets.includes(id)).forEach((lane) => {
+          lane.limit = event.speed;
+        });
+      }
     }
   }
 

@@ -21,13 +21,16 @@ const KINDS = {
   late: ['Running late', false],
   late_traffic: ['Traffic late', false],
 };
+// Nobody is late in a pause.
+const WHILE_RUNNING = ['late', 'late_traffic'];
 // So long an alarm stays to be seen after it has ended [ms].
 const LINGERS_MS = 4000;
 const CONNECTS_WITHIN_MS = 3000;
 
 /**
  * @typedef {{chip: HTMLElement, says: HTMLElement, whom: HTMLElement}} Chip and its two texts
- * @typedef {Alarm & Chip & {timer: number, urgent: boolean, ended: boolean}} Shown
+ * @typedef {Alarm & Chip & {timer: number, urgent: boolean, ended: boolean, known: boolean,
+ *   mine: boolean}} Shown
  */
 
 /**
@@ -52,16 +55,24 @@ export function createAlarms(root, store) {
   let wasConnected = false;
   const update = () => {
     wasConnected ||= store.connected;
-    const active = [...store.alarms, ...(wasConnected ? ownAlarms(store) : [])];
+    const runs = store.status === null || store.status.run === 'running'
+      || store.mode === 'replay';
+    const own = store.alarms.filter(({ kind }) => runs || !WHILE_RUNNING.includes(kind));
+    const active = [...own, ...(wasConnected ? ownAlarms(store) : [])];
     for (const alarm of active) {
       const entry = alarms.get(alarm.id)
-        ?? { ...alarm, ...makeChip(alarm), timer: 0, urgent: false, ended: false };
+        ?? { ...alarm, ...makeChip(alarm), timer: 0, urgent: false, ended: false, known: false,
+          mine: true };
       if (!alarms.has(alarm.id)) {
         alarms.set(alarm.id, entry);
         root.append(entry.chip);
+        entry.chip.addEventListener('click', () => {
+          entry.known = true;
+          update();
+        });
       }
       clearTimeout(entry.timer);
-      Object.assign(entry, alarm, { ended: false });
+      Object.assign(entry, alarm, { ended: false, mine: concerns(alarm, store) });
       describe(entry, store.scene);
     }
     const ids = new Set(active.map((alarm) => alarm.id));
@@ -75,7 +86,15 @@ export function createAlarms(root, store) {
     paint(frame, signs, alarms);
     fitWords(root);
   };
+  let run = '';
   store.on('alarms', update);
+  store.on('seats', update);
+  store.on('status', (status) => {
+    if (status.run !== run) {
+      run = status.run;
+      update();
+    }
+  });
   window.addEventListener('resize', () => fitWords(root));
   store.on('connection', update);
   update();
@@ -85,6 +104,21 @@ export function createAlarms(root, store) {
     update();
   }, CONNECTS_WITHIN_MS);
   return { kinds: () => [...alarms.values()].map((alarm) => alarm.kind) };
+}
+
+/**
+ * Whether an alarm is about what this page drives or, while it drives nothing, follows; whatever
+ * is not about a vehicle concerns everybody.
+ *
+ * @param {Alarm} alarm
+ * @param {Store} store
+ */
+function concerns({ subject }, { scene, seats, me }) {
+  if (!scene?.vehicles.some(({ id }) => id === subject)) {
+    return true;
+  }
+  const seat = Object.keys(seats).find((id) => me.id !== '' && seats[id].holder === me.id);
+  return subject === (seat ?? window.crgame?.world?.followed ?? subject);
 }
 
 /**
@@ -108,7 +142,8 @@ function ownAlarms(store) {
 function makeChip(alarm) {
   const says = element('span', { class: 'alarm-word' });
   const whom = element('span', { class: 'alarm-subject' });
-  return { chip: element('div', { class: 'alarm' }, icon(alarm.kind), says, whom), says, whom };
+  const chip = element('button', { type: 'button', class: 'alarm' }, icon(alarm.kind), says, whom);
+  return { chip, says, whom };
 }
 
 /**
@@ -118,10 +153,11 @@ function makeChip(alarm) {
 function describe(entry, scene) {
   const [word, urgent] = KINDS[entry.kind] ?? [oneLine(entry.kind).replaceAll('_', ' '), true];
   entry.urgent = urgent;
-  entry.chip.className = `alarm ${urgent ? 'urgent' : 'minor'}${entry.ended ? ' ended' : ''}`;
+  entry.chip.className = `alarm ${urgent ? 'urgent' : 'minor'}${entry.ended ? ' ended' : ''}`
+    + `${entry.known ? ' known' : ''}`;
   entry.chip.dataset.kind = entry.kind;
   const since = Number.isFinite(entry.since_t) ? ` (since ${clockTime(entry.since_t)})` : '';
-  entry.chip.title = oneLine(entry.text) + since;
+  entry.chip.title = `${oneLine(entry.text)}${since}${entry.known ? '' : ': click if you know'}`;
   setText(entry.says, word);
   // Which vehicle it is must be said; that the recorder records need not.
   const isVehicle = scene?.vehicles.some((vehicle) => vehicle.id === entry.subject);
@@ -149,7 +185,7 @@ function fitWords(root) {
  * @param {Map<string, Shown>} alarms
  */
 function paint(frame, signs, alarms) {
-  const all = [...alarms.values()];
+  const all = [...alarms.values()].filter((alarm) => alarm.mine && !alarm.known);
   const active = all.filter((alarm) => !alarm.ended);
   const worst = ['urgent', 'minor'].find(
     (level) => all.some((alarm) => alarm.urgent === (level === 'urgent'))) ?? '';

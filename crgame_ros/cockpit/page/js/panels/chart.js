@@ -33,6 +33,8 @@ export class Chart {
   #shown = new Map();
   /** @type {DOMRectReadOnly|null} */
   #box = null;
+  /** @type {Trace[]} */
+  #traces = [];
 
   /**
    * @param {Plotly} library
@@ -53,6 +55,22 @@ export class Chart {
     new ResizeObserver(([entry]) => { this.#box = entry.contentRect; }).observe(this.#plot);
   }
 
+  /** The element in which Plotly has drawn. */
+  get plot() {
+    return this.#plot;
+  }
+
+  /**
+   * What was drawn last, a row for each point: quantity, unit, line, time [s], value.
+   *
+   * @returns {(string|number)[][]}
+   */
+  get rows() {
+    const { title, unit } = this.quantity;
+    return this.#traces.flatMap(({ name, x, y }) => Array.from(x, (t, i) => (
+      [title, unit, name, t, y[i] ?? NaN])).filter((row) => Number.isFinite(row[4])));
+  }
+
   /**
    * Draw.
    *
@@ -60,6 +78,7 @@ export class Chart {
    * @param {ChartView} view
    */
   update(traces, view) {
+    this.#traces = traces;
     this.#showValues(traces);
     const box = this.#box;
     if (box === null || box.width === 0) {
@@ -80,13 +99,14 @@ export class Chart {
     const { colours, rem } = view;
     const axis = {
       gridcolor: colours.grid, linecolor: colours.grid, zeroline: false, fixedrange: !view.frozen,
-      tickfont: { size: 0.72 * rem, color: colours.text }, ticks: '',
+      tickfont: { size: Math.max(12, 0.72 * rem), color: colours.text }, ticks: '',
     };
     return {
       width: box.width, height: box.height, showlegend: false,
       margin: { l: 2.9 * rem, r: 0.5 * rem, t: 0.4 * rem, b: 1.4 * rem },
       paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
-      font: { family: 'system-ui, sans-serif', size: 0.75 * rem, color: colours.text },
+      font: { family: 'system-ui, sans-serif', color: colours.text,
+        size: Math.max(12, 0.75 * rem) },
       hovermode: view.frozen ? 'x unified' : false, dragmode: view.frozen ? 'zoom' : false,
       hoverlabel: { bgcolor: colours.surface, bordercolor: colours.grid },
       xaxis: { ...axis, range: [view.from, view.to], nticks: 6, hoverformat: '.2f' },

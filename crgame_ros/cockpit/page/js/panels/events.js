@@ -106,7 +106,7 @@ function timeOf(entry, store) {
  * @param {() => void} press
  */
 function makeCard(event, press) {
-  const label = event.label || event.name;
+  const label = oneLine(event.label || event.name);
   const button = element('button', { type: 'button', class: 'primary', on: { click: press } });
   const state = element('p', { class: 'event-state' });
   const error = element('p', { class: 'field-error', role: 'alert' });

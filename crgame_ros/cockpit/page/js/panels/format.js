@@ -53,6 +53,19 @@ export function errorText(error) {
   return error instanceof Error ? error.message : String(error);
 }
 
+// What is written from right to left, or turns what stands beside it around.
+const TURNING = /[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069]/;
+
+/**
+ * Keep a text that a person or a file gave from turning around what stands beside it.
+ *
+ * @param {string} text
+ * @returns {string} the same, or between the signs that isolate it (Unicode's FSI and PDI)
+ */
+export function isolated(text) {
+  return TURNING.test(text) ? `\u2068${text}\u2069` : text;
+}
+
 /**
  * Make one readable line of whatever a server or an exception said.
  *
@@ -60,5 +73,5 @@ export function errorText(error) {
  * @returns {string}
  */
 export function oneLine(text) {
-  return String(text ?? '').replace(/\s+/g, ' ').trim();
+  return isolated(String(text ?? '').replace(/\s+/g, ' ').trim());
 }

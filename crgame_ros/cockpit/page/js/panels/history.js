@@ -113,6 +113,16 @@ export class HistoryPanel {
     return (this.#store.scene?.vehicles ?? []).filter(({ id }) => this.#selected.has(id));
   }
 
+  /** The plots that have been drawn. */
+  get charts() {
+    return [...this.#charts.values()].filter((chart) => chart.rows.length > 0);
+  }
+
+  /** What the plots show, as `Chart.rows`. */
+  get rows() {
+    return this.charts.flatMap((chart) => chart.rows);
+  }
+
   /** @param {boolean} on whether the plots stand still, to be looked at closely */
   freeze(on) {
     this.#frozen = on ? this.#now() : null;

@@ -33,6 +33,11 @@ const PATHS = {
   sound_off: 'M3 9h4l5-5v16l-5-5H3zM16 9l6 6M22 9l-6 6',
   stop: 'M6 6h12v12H6z',
   go: 'M7 4.5v15l12-7.5z',
+  pause: 'M8 5v14M16 5v14',
+  bin: 'M4 7h16M9 7V4h6v3M6 7l1 13h10l1-13M10 11v5M14 11v5',
+  download: 'M12 4v12M7 11l5 5 5-5M4 17v3h16v-3',
+  full: 'M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5',
+  speech: 'M4 5h16v11h-9l-4 4v-4H4zM8 9h8M8 12h5',
   bolt: 'M13 2L4 14h7l-1 8 9-12h-7z',
   clock: 'M12 3a9 9 0 1 0 .01 0zM12 7v5l3.5 2',
 };

@@ -2,48 +2,36 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What stands over the world while no run goes on: how the last went, or whom the next awaits. */
 
+import { fetchScore } from '../after/run_api.js';
+import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
-import { clockTime, NONE, oneLine, plural } from './format.js';
+import { clockTime, errorText, oneLine } from './format.js';
 import { icon } from './icons.js';
+import { figures, fileList, part, table, why } from './outcome_card.js';
 import { TABLE_I, valueOf } from './timing.js';
 
 /** @import { Connection } from '../connection.js' */
-/** @import { Contact, Files, Recording, Reply, RunAction, RunState } from '../messages.js' */
-/** @import { Scene, Status } from '../messages.js' */
+/** @import { Scored } from '../after/score.js' */
+/** @import { Files, Reply, RunAction, RunState, Scene, Status } from '../messages.js' */
+/** @import { Result } from './outcome_card.js' */
 /** @import { Store } from '../store.js' */
 
-// More of a kind are counted.
-const MOST_TOLD = 5;
+// So long a page tells its driver of a mishap while the run goes on [ms].
+const MISHAP_MS = 10000;
 // In which words a figure of table I is said of a run that is over.
 /** @type {Record<string, string>} */
 const FINAL_NAMES = { final_error_ms: 'Lag at the end' };
 
 /**
- * How a run went.
- *
- * @typedef {object} Result
- * @property {{title: string, text: string}} why
- * @property {boolean} stays
- * @property {number} t [s]
- * @property {boolean} driven
- * @property {(Contact & {part: string})[]} contacts
- * @property {{vehicle: string, t: number}[]} departures
- * @property {{id: string, name: string, accepted: number, refused: number, fallbacks: number}[]
- *   } planners
- * @property {[name: string, text: string, explanation: string][]} figures
- * @property {Recording} recording
- * @property {Files|null} files
- */
-
-/**
  * What is to be said, by phase: that the run is over, that this was closed, that a driver is
- * awaited, that everything is ready.
+ * awaited, that everything is ready, that this page's driver has hit something or left the road.
  *
  * @typedef {{phase: 'over', connected: boolean} & Result} Over
  * @typedef {{phase: 'driver', seat: string, run: RunState, holder: string|null,
  *   holderName: string, me: string}} Awaiting
  * @typedef {{phase: 'ready'|'none', run: RunState, mine: string|null}} Ready
- * @typedef {{phase: 'none', run?: undefined}|{phase: 'closed'}|Over|Awaiting|Ready} Facts
+ * @typedef {{phase: 'mishap', run: RunState, text: string}} Mishap
+ * @typedef {{phase: 'none', run?: undefined}|{phase: 'closed'}|Over|Awaiting|Ready|Mishap} Facts
  */
 
 /** The card; one per page. */
@@ -55,6 +43,11 @@ class Outcome {
   #files = null;
   #shown = '';
   #closedEpoch = -1;
+  // Score by run, as far as it was asked for; mishaps of this run that have been told.
+  /** @type {Map<string, Scored>} */
+  #scores = new Map();
+  #told = 0;
+  #mishapTimer = 0;
 
   /**
    * @param {HTMLElement} root
@@ -73,6 +66,9 @@ class Outcome {
       ['hello', 'scene', 'seats', 'status', 'connection'])) {
       store.on(name, () => this.#show());
     }
+    store.on('epoch', () => {
+      this.#told = 0;
+    });
     this.#show();
   }
 
@@ -106,6 +102,7 @@ class Outcome {
       case 'none': return [];
       case 'over': return this.#card(facts);
       case 'closed': return [this.#reopen()];
+      case 'mishap': return this.#mishap(facts);
       case 'driver': return this.#bar(driverText(facts), facts);
       case 'ready': return this.#bar(facts.mine
         ? `You drive ${facts.mine}: start when you are ready.`
@@ -125,6 +122,11 @@ class Outcome {
       }
       return { phase: 'over', connected, ...this.#result(status, scene) };
     }
+    const mine = Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null;
+    const mishaps = mine === null || !connected ? [] : mishapsOf(status, mine);
+    if (mishaps.length > this.#told) {
+      return { phase: 'mishap', run: status.run, text: mishaps[mishaps.length - 1].text };
+    }
     if (!connected || status.n !== 0 || !['waiting', 'paused'].includes(status.run)) {
       return { phase: 'none' };
     }
@@ -133,8 +135,7 @@ class Outcome {
       return { phase: 'driver', seat, run: status.run, holder: seats[seat]?.holder ?? null,
         holderName: seats[seat]?.holder_name ?? '', me: me.id };
     }
-    return { phase: status.run === 'paused' ? 'ready' : 'none', run: status.run,
-      mine: Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null };
+    return { phase: status.run === 'paused' ? 'ready' : 'none', run: status.run, mine };
   }
 
   /**
@@ -145,7 +146,10 @@ class Outcome {
   #result(status, scene) {
     const files = this.#files?.epoch === status.epoch ? this.#files : null;
     const { timing } = status;
+    const { seats, me } = this.#store;
     return {
+      scored: this.#score(status, files),
+      mine: Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null,
       why: why(status), stays: Boolean(status.stays), t: status.t,
       driven: scene.vehicles.length > 0,
       contacts: (status.contacts ?? []).map((item) => ({ ...item, part: part(item, files) })),
@@ -161,6 +165,70 @@ class Outcome {
   }
 
   /**
+   * Give the score of the run, once its recording is closed and the server has told it.
+   *
+   * @param {Status} status
+   * @param {Files|null} files
+   * @returns {Scored}
+   */
+  #score({ recording }, files) {
+    if (files === null || recording.state === 'recording') {
+      return recording.state === 'none' ? { state: 'none', why: 'nothing was recorded' }
+        : { state: 'waiting' };
+    }
+    const known = this.#scores.get(files.run);
+    if (known !== undefined) {
+      return known;
+    }
+    this.#scores.set(files.run, { state: 'waiting' });
+    fetchScore(files.run).then(
+      (score) => this.#scores.set(files.run, { state: 'told', score }),
+      (error) => this.#scores.set(files.run, { state: 'none', why: errorText(error) }),
+    ).then(() => this.#show());
+    return { state: 'waiting' };
+  }
+
+  /**
+   * @param {Mishap} facts
+   * @returns {Node[]}
+   */
+  #mishap({ run, text }) {
+    clearTimeout(this.#mishapTimer);
+    if (run === 'running') {
+      this.#mishapTimer = setTimeout(() => this.#dismiss(), MISHAP_MS);
+    }
+    return [icon('warn'), element('span', { role: 'status', text }),
+      this.#button('look', run === 'running' ? 'Pause and look again' : 'Look again',
+        () => this.#lookAgain(run), 'The last 10 s once more', 'drive-button'),
+      this.#button('again', 'Begin anew', () => this.#order('reset'),
+        'The same game from its first step (hold R)', 'drive-button'),
+      this.#button('close', '', () => this.#dismiss(), 'Close this and drive on', 'icon-button')];
+  }
+
+  #dismiss() {
+    const { status } = this.#store;
+    const mine = window.crgame.driving?.seat;
+    this.#told = status === null || !mine ? 0 : mishapsOf(status, mine).length;
+    this.#show();
+  }
+
+  /** @param {RunState} run */
+  async #lookAgain(run) {
+    if (run === 'running') {
+      await this.#order('pause');
+      await new Promise((resolve) => {
+        const end = this.#store.on('status', (status) => {
+          if (status.run !== 'running') {
+            end();
+            resolve(undefined);
+          }
+        });
+      });
+    }
+    window.crgame.lastSeconds?.open();
+  }
+
+  /**
    * @param {Over} facts
    * @returns {Node[]}
    */
@@ -171,19 +239,24 @@ class Outcome {
       element('header', {}, title, this.#button('close', '', () => this.#close(),
         'Close this and look at the scene', 'icon-button')),
       element('p', { class: 'outcome-why', text: facts.why.text }),
+      scoreBlock(facts.scored, facts.mine),
       table(facts),
-      ...(facts.figures.length > 0 ? figures(facts.figures) : []),
       fileList(facts),
+      ...(facts.figures.length > 0 ? figures(facts.figures) : []),
       connected && stays ? null : element('p', { class: 'outcome-gone', role: 'status',
         text: connected ? 'The program ends with this run.'
           : 'The program at the other end is no longer there: this is how it was last seen. '
             + 'Start it again to drive again.' }),
       element('div', { class: 'outcome-buttons' },
         this.#button('again', 'Again', () => this.#order('reset'),
-          'The same game from its first step, with a recording of its own',
+          'The same game from its first step, with a recording of its own (hold R)',
           'drive-button primary', !connected || !stays),
+        this.#button('next', 'Next game', () => window.crgame.scenario?.startNext(),
+          'The next one of the list', 'drive-button', !connected || !stays),
         this.#button('another', 'Another game', () => this.#another(),
-          'Choose a game or a scenario', 'drive-button', !connected || !stays)),
+          'Choose a game or a scenario', 'drive-button', !connected || !stays),
+        this.#button('look', 'Last 10 s', () => this.#lookAgain('ended'),
+          'The last 10 s once more, at will slowed', 'drive-button')),
     ].filter((item) => item !== null);
   }
 
@@ -260,23 +333,20 @@ class Outcome {
   }
 }
 
-/** @param {Status} status */
-function why({ reason, t }) {
-  const after = clockTime(t);
-  /** @param {string} text */
-  const over = (text) => ({ title: 'The run is over', text });
-  const [kind, , vehicle] = (reason ?? '').split(' ');
-  switch (kind) {
-    case 'duration': return over(`Its duration of ${after} is over.`);
-    case 'stop': return over(`Somebody stopped it after ${after}.`);
-    case 'signal': return over(`It was ended at the terminal after ${after}.`);
-    case 'drivability':
-      return over(`${vehicle} touched something or left the road after ${after}, `
-        + 'which ends this game.');
-    case 'silence': return { title: 'The simulation is silent',
-      text: `It was heard last at ${after}. The terminal may tell why.` };
-    default: return over(`It ended after ${after}.`);
-  }
+/**
+ * What a vehicle has hit and where it left the road, in the order of time.
+ *
+ * @param {Status} status
+ * @param {string} mine
+ */
+function mishapsOf({ contacts = [], departures = [] }, mine) {
+  return [
+    ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map((item) => ({
+      t: item.t, text: `You touched ${item.vehicle === mine ? item.with : item.vehicle} at `
+        + `${clockTime(item.t)}.` })),
+    ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
+      t, text: `You left the road at ${clockTime(t)}.` })),
+  ].sort((a, b) => a.t - b.t);
 }
 
 /** @param {Awaiting} facts */
@@ -287,76 +357,6 @@ function driverText({ seat, run, holder, holderName, me }) {
   }
   const whose = holder === me ? 'your hands are' : `the hands of ${oneLine(holderName)} are`;
   return `${seat} waits: ${whose} off the controls.`;
-}
-
-/** @param {Result} facts */
-function table(facts) {
-  const rows = facts.driven ? [
-    ['Contacts', told(facts.contacts, (item) => `${item.vehicle} with ${item.with}`,
-      (item) => item.part)],
-    ['Off the road', told(facts.departures, (item) => item.vehicle)],
-  ] : [['Driven', 'by nobody: traffic was alone']];
-  for (const { id, name, accepted, refused, fallbacks } of facts.planners) {
-    rows.push([`${id}${name ? ` · ${oneLine(name)}` : ''}`, [
-      `${plural(accepted, 'plan')} accepted`, `${refused} refused`,
-      plural(fallbacks, 'fallback')].join(', ')]);
-  }
-  return element('table', { class: 'figures' }, element('tbody', {}, ...rows.map(
-    ([name, text]) => element('tr', {}, element('th', { scope: 'row', text: name }),
-      element('td', { text })))));
-}
-
-/**
- * Which side of whom it was and who could have avoided it, once the timing report says so.
- *
- * @param {Contact} contact
- * @param {Files|null} files
- */
-function part(contact, files) {
-  const pair = [contact.vehicle, contact.with].sort().join();
-  const named = files?.contacts?.find((item) => [item.vehicle, item.with].sort().join() === pair);
-  return named === undefined ? ''
-    : ` (${oneLine(named.side)} of ${named.vehicle}; could have avoided it: `
-      + `${oneLine(named.avoidable_by)})`;
-}
-
-/**
- * @template {{t: number}} Item
- * @param {Item[]} items
- * @param {(item: Item) => string} name
- * @param {(item: Item) => string} remark = () => ''
- */
-function told(items, name, remark = () => '') {
-  if (items.length === 0) {
-    return 'none';
-  }
-  const texts = items.slice(0, MOST_TOLD).map(
-    (item) => `${name(item)} at ${clockTime(item.t)}${remark(item)}`);
-  const more = items.length - texts.length;
-  return [...texts, ...(more > 0 ? [`${more} more`] : [])].join('; ');
-}
-
-/** @param {Result['figures']} items */
-function figures(items) {
-  return [element('h3', { text: 'How it kept time (table I)' }),
-    element('dl', { class: 'outcome-figures' }, ...items.map(
-      ([name, text, explanation]) => element('div', { title: explanation },
-        element('dt', { text: name }), element('dd', { text: text || NONE }))))];
-}
-
-/** @param {Over} facts */
-function fileList({ files, recording, connected }) {
-  if (recording?.state === 'failed') {
-    return element('p', { class: 'field-error', text: oneLine(recording.text) });
-  }
-  if (files === null) {
-    return null;
-  }
-  return element('div', { class: 'outcome-files', 'data-complete': files.complete },
-    element('span', { class: 'dim', text: 'Files in ' }), element('code', { text: files.folder }),
-    element('ul', {}, ...files.names.map((text) => element('li', { text }))),
-    files.complete || !connected ? null : element('span', { class: 'dim', role: 'status',
-      text: 'Scenario and timing report are being written …' }));
 }
 
 /**

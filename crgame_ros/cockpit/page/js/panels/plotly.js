@@ -6,10 +6,13 @@
  * What is used of it; traces and layouts are described at plotly.com/javascript/reference.
  *
  * @typedef {{react: (node: HTMLElement, traces: object[], layout: object, config: object) =>
- *   unknown}} Plotly
+ *   unknown, toImage: (node: HTMLElement, options: object) => Promise<string>}} Plotly
  */
 
 const ADDRESS = '/plotly.js';
+// An element with this id tells Plotly's maps, which are not used, that their styles are there:
+// it would add them inline, which the page does not allow.
+const MAP_STYLES = '9f215cf04c5486422605d13261cb87401f4e7763b6296af81e98efbc0130da53';
 
 /** @type {Promise<Plotly>|null} */
 let loading = null;
@@ -30,7 +33,9 @@ export function loadPlotly() {
       script.remove();
       reject(new Error('The plots cannot be drawn: the server does not give the library Plotly.'));
     });
-    document.head.append(script);
+    const styles = document.createElement('meta');
+    styles.id = MAP_STYLES;
+    document.head.append(styles, script);
   });
   return loading;
 }

@@ -5,16 +5,17 @@
 import { element, setAttribute, setText } from '../dom.js';
 import { reasonAgainst } from '../rights.js';
 import { Busy } from './busy.js';
+import { confirm } from './confirm.js';
 import { acceptDrops } from './drop.js';
 import { errorText, oneLine, plural } from './format.js';
 import { icon } from './icons.js';
-import { fetchPreview, fetchScenarios, load, upload } from './scenario_api.js';
+import { deleteUpload, fetchPreview, fetchScenarios, load, upload } from './scenario_api.js';
 import { ScenarioForm } from './scenario_form.js';
 import { ScenarioList } from './scenario_list.js';
 import { ScenarioPreview } from './scenario_preview.js';
 
 /** @import { Connection } from '../connection.js' */
-/** @import { Offer, Preview } from '../messages.js' */
+/** @import { Entry, Offer, Preview } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
 // What the server refuses anyway is not even sent [bytes].
@@ -29,9 +30,12 @@ class ScenarioPanel {
   /** @type {Offer} */
   #offered = { folders: [], planners: [], drivers: [] };
   #chosen = '';
+  // What was started last here.
+  #begun = '';
   /** @type {AbortController|null} */
   #abort = null;
-  #list = new ScenarioList((entry) => this.choose(entry.id));
+  #list = new ScenarioList((entry) => this.choose(entry.id),
+    (entry) => this.#delete(entry));
   #form = new ScenarioForm();
   #busy = new Busy();
   #canvas = element('canvas', { class: 'preview', 'aria-label': 'Preview of the scenario' });
@@ -138,7 +142,7 @@ class ScenarioPanel {
   async take(files) {
     this.#clearErrors();
     const [file] = files;
-    const wrong = refusal(files);
+    const wrong = wrongFiles(files);
     if (wrong) {
       setText(this.#errors.upload, wrong);
       return;
@@ -163,6 +167,7 @@ class ScenarioPanel {
     try {
       const text = await load({ id: this.#chosen, ...this.#form.choices });
       this.#busy.say(text ? `${text.replace(/[.…\s]+$/, '')} …` : 'Loading …');
+      this.#begun = this.#chosen;
       await begun.promise;
       if (this.#store.status?.run === 'paused' && !waitsForSeveral(this.#store)) {
         await this.#connection.request({ type: 'control', action: 'start' });
@@ -175,6 +180,47 @@ class ScenarioPanel {
     }
     this.#busy.end();
     this.#start.disabled = false;
+  }
+
+  /** @param {Entry} entry an upload */
+  async #delete(entry) {
+    this.#clearErrors();
+    if (!await confirm(`Delete the upload ${oneLine(entry.title)}?`,
+      'It can be uploaded again. Recordings of it keep the map.', 'Delete')) {
+      return;
+    }
+    try {
+      await deleteUpload(entry.id);
+      if (this.#chosen === entry.id) {
+        this.#chosen = '';
+        this.#card.hidden = true;
+        this.#start.disabled = true;
+      }
+      await this.refresh();
+    } catch (error) {
+      setText(this.#errors.list, errorText(error));
+    }
+  }
+
+  /** Start the game after the present one in the list, the first one after the last. */
+  async startNext() {
+    await this.refresh();
+    const games = this.#list.games;
+    const title = this.#store.scene?.title;
+    const at = games.findIndex((entry) => entry.id === this.#begun);
+    const present = at >= 0 ? at : games.findIndex((entry) => entry.title === title);
+    if (games.length === 0) {
+      this.#store.receive({ type: 'notice', level: 'warn', text: 'There is no other game.' });
+      return;
+    }
+    await this.choose(games[(present + 1) % games.length].id);
+    if (!this.#start.disabled) {
+      await this.start();
+    }
+    const refusal = Object.values(this.#errors).map((node) => node.textContent).find(Boolean);
+    if (refusal) {
+      this.#store.receive({ type: 'notice', level: 'error', text: refusal });
+    }
   }
 
   /** Before it happens, say whose run it ends. */
@@ -220,7 +266,7 @@ class ScenarioPanel {
   #show(preview) {
     this.#card.hidden = false;
     const { scene } = preview;
-    setText(this.#name, scene.title || scene.benchmark_id);
+    setText(this.#name, oneLine(scene.title || scene.benchmark_id));
     setText(this.#facts, [
       scene.title === scene.benchmark_id ? '' : scene.benchmark_id,
       plural(scene.lanelets.length, 'lanelet'), plural(preview.humans.length, 'human'),
@@ -255,7 +301,7 @@ function fieldError() {
 }
 
 /** @param {File[]} files */
-function refusal(files) {
+function wrongFiles(files) {
   if (files.length !== 1) {
     return files.length === 0 ? 'That is no file.' : 'Drop one file at a time.';
   }

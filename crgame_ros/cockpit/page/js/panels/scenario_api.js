@@ -6,8 +6,8 @@ import { oneLine } from './format.js';
 
 /** @import { Choice, Offer, Preview } from '../messages.js' */
 
-// Sent with all that changes something: no page of another site can add it unasked.
-const OWN = { 'X-Crgame': '1' };
+/** Sent with all that changes something: no page of another site can add it unasked. */
+export const OWN = { 'X-Crgame': '1' };
 
 /** Names this page, so that the others are told who has done it. */
 function own() {
@@ -40,6 +40,18 @@ export async function upload(file) {
 }
 
 /**
+ * @param {string} id of an upload
+ * @returns {Promise<string>} what was done
+ */
+export async function deleteUpload(id) {
+  const reply = await ask('/api/upload/delete', {
+    method: 'POST', body: JSON.stringify({ id }),
+    headers: { ...OWN, 'Content-Type': 'application/json' },
+  });
+  return oneLine(reply.text);
+}
+
+/**
  * @param {Choice} choice id, humans [{id, driver}], avs [{id, planner}]
  * @returns {Promise<string>} what was done
  */
@@ -52,11 +64,14 @@ export async function load(choice) {
 }
 
 /**
+ * Ask the server for JSON.
+ *
  * @param {string} path
  * @param {RequestInit} [options]
  * @returns {Promise<any>} what the server sent, of the type that this path gives
+ * @throws {Error} with one line for people
  */
-async function ask(path, options = {}) {
+export async function ask(path, options = {}) {
   let response;
   try {
     response = await fetch(path, { credentials: 'same-origin', ...options });

@@ -3,11 +3,15 @@
 /** The scenarios to choose from, by folder, with a filter. */
 
 import { element } from '../dom.js';
+import { oneLine } from './format.js';
 import { icon } from './icons.js';
 
 /** @import { Entry, Offer } from '../messages.js' */
 
 const KINDS = { game: 'game', scenario: 'CommonRoad', upload: 'uploaded' };
+
+/** @param {Entry} entry */
+const isGame = (entry) => entry.kind === 'game';
 
 /**
  * Games are made to be driven; a bare scenario comes after them.
@@ -15,23 +19,26 @@ const KINDS = { game: 'game', scenario: 'CommonRoad', upload: 'uploaded' };
  * @param {Entry[]} entries
  */
 function gamesFirst(entries) {
-  /** @param {Entry} entry */
-  const isGame = (entry) => entry.kind === 'game';
   return [...entries.filter(isGame), ...entries.filter((entry) => !isGame(entry))];
 }
 
 /** A list of buttons of which one is chosen. */
 export class ScenarioList {
   #chosen;
+  #unwanted;
   #list = element('div', { class: 'scenario-list', role: 'radiogroup', 'aria-label': 'Scenario' });
   #nothing = element('p', { class: 'hint', hidden: true });
   #filter;
   /** @type {Map<string, {entry: Entry, button: HTMLButtonElement, words: string}>} */
   #entries = new Map();
 
-  /** @param {(entry: Entry) => void} chosen gets the entry that somebody chose */
-  constructor(chosen) {
+  /**
+   * @param {(entry: Entry) => void} chosen gets the entry that somebody chose
+   * @param {(entry: Entry) => void} unwanted gets the upload that somebody wants deleted
+   */
+  constructor(chosen, unwanted) {
     this.#chosen = chosen;
+    this.#unwanted = unwanted;
     this.#filter = element('input', {
       type: 'search', placeholder: 'Filter by name', 'aria-label': 'Filter the scenarios',
       on: { input: () => this.#sift() },
@@ -70,18 +77,27 @@ export class ScenarioList {
     return this.#entries.get(id)?.entry;
   }
 
+  /** The games, in the order of the list. */
+  get games() {
+    return [...this.#entries.values()].map(({ entry }) => entry).filter(isGame);
+  }
+
   /** @param {Entry} entry */
   #item(entry) {
-    const title = entry.title || entry.name;
+    const title = oneLine(entry.title || entry.name);
     const button = element('button', {
-      type: 'button', role: 'radio', class: 'scenario', 'data-id': entry.id, title: entry.name,
+      type: 'button', role: 'radio', class: 'scenario', 'data-id': entry.id,
+      title: oneLine(entry.name),
       on: { click: () => this.#chosen(entry) },
     }, icon('check'),
     element('span', { class: 'scenario-title', text: title }));
     this.#entries.set(entry.id, {
       entry, button, words: `${title} ${entry.name} ${KINDS[entry.kind]}`.toLowerCase(),
     });
-    return button;
+    return entry.kind !== 'upload' ? button : element('div', { class: 'upload' }, button,
+      element('button', { type: 'button', class: 'icon-button', title: 'Delete this upload',
+        'aria-label': `Delete ${title}`, 'data-action': 'delete', 'data-id': entry.id,
+        on: { click: () => this.#unwanted(entry) } }, icon('bin')));
   }
 
   #sift() {

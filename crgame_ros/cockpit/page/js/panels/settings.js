@@ -43,6 +43,26 @@ export function createSettings(root) {
     settings.setTheme(THEMES[(at + 1) % THEMES.length][0]);
   });
   root.prepend(button);
+  addFullscreen(root);
   settings.setTheme(recall('theme'));
   return settings;
+}
+
+/**
+ * A whole screen for the road, where the browser gives one.
+ *
+ * @param {HTMLElement} root
+ */
+function addFullscreen(root) {
+  if (!document.fullscreenEnabled) {
+    return;
+  }
+  const full = element('button', { type: 'button', id: 'fullscreen', class: 'icon-button',
+    title: 'Full screen', 'aria-label': 'Full screen', 'aria-pressed': 'false', on: {
+      click: () => (document.fullscreenElement === null
+        ? document.documentElement.requestFullscreen() : document.exitFullscreen()),
+    } }, icon('full'));
+  document.addEventListener('fullscreenchange', () => full.setAttribute('aria-pressed',
+    String(document.fullscreenElement !== null)));
+  root.append(full);
 }

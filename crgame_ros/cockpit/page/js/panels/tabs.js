@@ -8,7 +8,7 @@ import { recall, remember } from './memory.js';
 
 const NAMES = [
   ['drive', 'Drive'], ['history', 'History'], ['scenario', 'Scenario'], ['events', 'Events'],
-  ['criticality', 'Criticality'], ['timing', 'Timing'],
+  ['criticality', 'Criticality'], ['timing', 'Timing'], ['runs', 'Runs'],
 ];
 const NARROWEST_REM = 22;
 const WIDEST_SHARE = 0.6;

@@ -3,6 +3,7 @@
 /** What is being shown, in the header and in the browser's tab. */
 
 import { setText } from '../dom.js';
+import { isolated } from './format.js';
 
 /** @import { Store } from '../store.js' */
 
@@ -16,7 +17,7 @@ const PROGRAM = 'crgame';
  */
 export function createTitle(root, store) {
   const update = () => {
-    const title = store.scene?.title || PROGRAM;
+    const title = isolated(store.scene?.title || PROGRAM);
     setText(root, title);
     root.title = [title, store.scene?.benchmark_id].filter(Boolean).join(' · ');
     document.title = [title, store.mode === 'replay' ? 'replay' : '', PROGRAM]

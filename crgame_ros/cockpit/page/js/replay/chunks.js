@@ -20,7 +20,7 @@ const RETRY_MS = 1000;
  * @throws {Error} with a text for people
  */
 export async function ask(path, query) {
-  const answer = await fetch(`/api/replay/${path}?${queryOf(query)}`);
+  const answer = await fetch(`api/replay/${path}?${queryOf(query)}`);
   if (!answer.ok) {
     const { error } = await answer.json().catch(() => ({}));
     throw new Error(error ?? `The server answered ${answer.status}.`);

@@ -46,7 +46,8 @@ export class LabelLayer {
       return;
     }
     const { camera, shown, store, palette, ratio } = view;
-    const font = `600 ${FONT_REM * palette.rem_px}px system-ui, 'DejaVu Sans', sans-serif`;
+    const size_px = Math.max(12, FONT_REM * palette.rem_px);
+    const font = `600 ${size_px}px system-ui, 'DejaVu Sans', sans-serif`;
     if (font !== this.#font) {
       this.#font = font;
       this.#widths.clear();
@@ -115,7 +116,7 @@ export class LabelLayer {
       width = context.measureText(text).width;
       this.#widths.set(text, width);
     }
-    const height = 1.35 * FONT_REM * palette.rem_px;
+    const height = 1.35 * Math.max(12, FONT_REM * palette.rem_px);
     const px = camera.toX(x, y);
     // Below it on the screen: with its heading up, what lies before a vehicle stays free.
     let py = camera.toY(x, y) + Math.max(0.6 * thing.look.extent * camera.scale, 9)

@@ -53,7 +53,7 @@ function drawBar(context, palette, right, y, length, text) {
   context.lineTo(right, y - 0.4 * rem);
   context.stroke();
   context.fillStyle = palette.overlay;
-  context.font = `${0.85 * rem}px system-ui, 'DejaVu Sans', sans-serif`;
+  context.font = `${Math.max(12, 0.85 * rem)}px system-ui, 'DejaVu Sans', sans-serif`;
   context.textAlign = 'right';
   context.textBaseline = 'alphabetic';
   context.fillText(text, right, y - 0.7 * rem);
@@ -82,7 +82,7 @@ function drawNorth(context, camera, palette, ratio, x, y) {
   context.lineTo(-0.5 * rem, 0.1 * rem);
   context.closePath();
   context.fill();
-  context.font = `600 ${0.85 * rem}px system-ui, 'DejaVu Sans', sans-serif`;
+  context.font = `600 ${Math.max(12, 0.85 * rem)}px system-ui, 'DejaVu Sans', sans-serif`;
   context.textAlign = 'center';
   context.textBaseline = 'middle';
   context.fillText('N', 0, 0.75 * rem);

@@ -19,6 +19,8 @@ const NAMES = /** @type {const} */ ([
  */
 export function themeColor(name) {
   const probe = document.createElement('span');
+  // Else, where the system forces its colours upon pages, all would be one.
+  probe.style.forcedColorAdjust = 'none';
   probe.style.color = `var(--${name})`;
   document.documentElement.append(probe);
   const color = getComputedStyle(probe).color;

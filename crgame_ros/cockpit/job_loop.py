@@ -1,0 +1,93 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The other end of `job_process`: a process that answers jobs until its standard input ends.
+
+Reading can take seconds and much memory; the process that serves the page, and may carry
+somebody's hands on the wheel, has neither. Jobs are JSON objects, one a line, with the name of the
+`job`, a `path` and further arguments; each is answered on the standard output.
+"""
+
+from collections.abc import Callable, Mapping
+import contextlib
+import json
+import os
+from pathlib import Path
+import resource
+import signal
+import struct
+import sys
+import traceback
+from types import FrameType
+from typing import Any, BinaryIO
+
+from crgame_ros.errors import CrgameError
+
+HEADER = struct.Struct('<?Q')
+_MAX_MEMORY = 4 * 2 ** 30
+_NICE = 10
+# Of the processor's time that one job may take [s]: of 60,000 lanelets a preview takes 35 s.
+MOST_CPU_S = 20.0
+
+Job = Callable[..., dict[str, Any]]
+
+
+def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_CPU_S) -> None:
+    """
+    Answer jobs until the standard input ends.
+
+    :param jobs: by name; each is given the path and the other arguments by their names, and gives
+        what JSON can hold.
+    :param subject: what they read, for people.
+    :param most_cpu_s: after which a job is given up [s].
+    """
+    def give_up(_number: int, _frame: FrameType | None) -> None:
+        raise CrgameError(f'the {subject} takes more than {most_cpu_s:g} s to read; choose a '
+                          'smaller one')
+
+    signal.signal(signal.SIGPROF, give_up)
+    # Ctrl-C is for the server, which closes the standard input when it ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(_NICE)
+    resource.setrlimit(resource.RLIMIT_AS, (_MAX_MEMORY, _MAX_MEMORY))
+    answers = os.fdopen(os.dup(1), 'wb')
+    # What a library prints must not get into the answers.
+    os.dup2(2, 1)
+    with contextlib.suppress(BrokenPipeError):
+        for line in sys.stdin.buffer:
+            _answer(jobs, json.loads(line), answers, subject, most_cpu_s)
+
+
+def _answer(jobs: Mapping[str, Job], job: dict[str, Any], answers: BinaryIO,
+            subject: str, most_cpu_s: float) -> None:
+    try:
+        path = Path(job.pop('path'))
+        signal.setitimer(signal.ITIMER_PROF, most_cpu_s)
+        try:
+            result = jobs[job.pop('job')](path, **job)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+        ok, text = True, json.dumps(result, allow_nan=False, separators=(',', ':'))
+    except CrgameError as error:
+        # Names of folders on this machine are nobody's business.
+        ok, text = False, str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
+    except (MemoryError, RecursionError):
+        ok, text = False, f'the {subject} is too large to be read'
+    except Exception:
+        traceback.print_exc()
+        ok, text = False, f'the {subject} cannot be read; the log of the server says why'
+    data = text.encode('utf-8', 'replace')
+    answers.write(HEADER.pack(ok, len(data)) + data)
+    answers.flush()

@@ -1,0 +1,142 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A process that reads files for the page: one job at a time, ended when it takes long."""
+
+import asyncio
+from collections.abc import Callable
+import json
+import logging
+import os
+from pathlib import Path
+import sys
+from typing import Any
+
+from crgame_ros.errors import CrgameError, InputError
+
+# Kept apart: jobs import CommonRoad, which the server's process may not need.
+_HEADER_BYTES = 9
+MAX_QUEUED = 8
+TIMEOUT_S = 60.0
+# Between two looks at whether somebody still waits [s].
+LOOK_S = 0.25
+
+_PACKAGES = Path(__file__).resolve().parents[2]
+_log = logging.getLogger(__name__)
+
+
+class JobProcess:
+    """
+    Runs jobs of a module that serves them (`job_loop`) in a process, started when first needed.
+
+    :param module: dotted name.
+    :param subject: what its jobs read, for people: scenario or run.
+    :param timeout_s: after which a job is given up and the process ended [s].
+    """
+
+    def __init__(self, module: str, subject: str, timeout_s: float = TIMEOUT_S) -> None:
+        self._module = module
+        self._subject = subject
+        self._timeout_s = timeout_s
+        self._lock = asyncio.Lock()
+        self._queued = 0
+        self._process: asyncio.subprocess.Process | None = None
+
+    async def start(self) -> None:
+        """Start the process before its first job, which then need not wait for its imports."""
+        async with self._lock:
+            await self._running()
+
+    async def run(self, job: str, *, unwanted: Callable[[], bool] = lambda: False,
+                  **arguments: Any) -> bytes:
+        """
+        Run a job.
+
+        :param job: its name.
+        :param unwanted: tells that nobody waits for it any more: then it is ended.
+        :param arguments: its arguments, as JSON can hold them.
+        :return: its result as JSON.
+        :raises CrgameError: if it fails, takes too long, is unwanted, or too many wait.
+        """
+        if self._queued >= MAX_QUEUED:
+            raise CrgameError(f'too many {self._subject}s are being read; try again in a moment')
+        self._queued += 1
+        try:
+            async with self._lock:
+                return await self._run({'job': job, **arguments}, unwanted)
+        finally:
+            self._queued -= 1
+
+    async def close(self) -> None:
+        """End the process."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        if process.returncode is None:
+            process.kill()
+        await process.wait()
+        # Else its pipes would be closed when the loop is already gone.
+        if process.stdin is not None:
+            process.stdin.close()
+
+    async def _run(self, job: dict[str, Any], unwanted: Callable[[], bool]) -> bytes:
+        done = False
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                ok, answer = await self._wanted(job, unwanted)
+            done = True
+        except TimeoutError as error:
+            raise CrgameError(f'the {self._subject} takes more than {self._timeout_s:g} s to '
+                              'read; choose a smaller one') from error
+        except (ConnectionError, asyncio.IncompleteReadError) as error:
+            _log.error('the process that reads %ss ended during %s', self._subject, job['job'])
+            raise CrgameError(f'the {self._subject} cannot be read: it is too large') from error
+        finally:
+            if not done:
+                await self.close()
+        if not ok:
+            raise InputError(answer.decode('utf-8', 'replace'))
+        return answer
+
+    async def _wanted(self, job: dict[str, Any],
+                      unwanted: Callable[[], bool]) -> tuple[bool, bytes]:
+        """Exchange a job for its answer as long as somebody waits for that."""
+        exchange = asyncio.create_task(self._exchange(json.dumps(job).encode() + b'\n'))
+        try:
+            while not (await asyncio.wait([exchange], timeout=LOOK_S))[0]:
+                if unwanted():
+                    raise CrgameError('nobody waits for it any more')
+            return exchange.result()
+        finally:
+            exchange.cancel()
+
+    async def _exchange(self, line: bytes) -> tuple[bool, bytes]:
+        process = await self._running()
+        assert process.stdin is not None and process.stdout is not None
+        process.stdin.write(line)
+        await process.stdin.drain()
+        header = await process.stdout.readexactly(_HEADER_BYTES)
+        answer = await process.stdout.readexactly(int.from_bytes(header[1:], 'little'))
+        return header[0] == 1, answer
+
+    async def _running(self) -> asyncio.subprocess.Process:
+        process = self._process
+        if process is None or process.returncode is not None:
+            # The very package that asks, and nothing from the working directory.
+            paths = [str(_PACKAGES), *filter(None, [os.environ.get('PYTHONPATH')])]
+            process = self._process = await asyncio.create_subprocess_exec(
+                sys.executable, '-P', '-m', self._module,
+                stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+                env={**os.environ, 'PYTHONPATH': os.pathsep.join(paths)})
+        return process

@@ -1,0 +1,59 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** R held begins the run anew; R tapped is the reverse gear. */
+
+import { element, setAttribute } from '../dom.js';
+import { isTyping } from '../driving/focus.js';
+
+/** @import { Connection } from '../connection.js' */
+/** @import { Store } from '../store.js' */
+
+/** So long the key is held until the run begins anew [ms]. */
+export const HELD_MS = 800;
+// A tap shows nothing [ms].
+const SHOWN_AFTER_MS = 250;
+const KEY = 'KeyR';
+
+/**
+ * Listen to the key.
+ *
+ * @param {HTMLElement} root gets the hint
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {{held: boolean}} held: whether the key is down and counts
+ */
+export function createRestart(root, store, connection) {
+  const state = { held: false };
+  const hint = element('div', { class: 'restart-hint', role: 'status', hidden: true,
+    text: 'Hold R to begin anew' });
+  root.append(hint);
+  /** @type {number[]} */
+  let timers = [];
+  const end = () => {
+    timers.forEach(clearTimeout);
+    timers = [];
+    state.held = false;
+    setAttribute(hint, 'hidden', true);
+  };
+  const restart = async () => {
+    end();
+    const { ok, text } = await connection.request({ type: 'control', action: 'reset' });
+    if (!ok) {
+      store.receive({ type: 'notice', level: 'warn', text });
+    }
+  };
+  window.addEventListener('keydown', (event) => {
+    if (event.code !== KEY || event.repeat || event.ctrlKey || event.metaKey || event.altKey
+        || isTyping(event.target) || document.querySelector('dialog[open]')
+        || store.mode !== 'live' || !store.connected || store.status === null) {
+      return;
+    }
+    end();
+    state.held = true;
+    timers = [setTimeout(() => setAttribute(hint, 'hidden', false), SHOWN_AFTER_MS),
+      setTimeout(restart, HELD_MS)];
+  }, true);
+  window.addEventListener('keyup', (event) => event.code === KEY && end(), true);
+  window.addEventListener('blur', end);
+  return state;
+}

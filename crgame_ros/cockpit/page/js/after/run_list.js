@@ -1,0 +1,220 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The panel of past runs: pictures to choose from, to replay, compare, fetch and delete. */
+
+import { element, setAttribute, setText } from '../dom.js';
+import { confirm } from '../panels/confirm.js';
+import { clockTime, errorText, oneLine, plural } from '../panels/format.js';
+import { icon } from '../panels/icons.js';
+import * as api from './run_api.js';
+import { scoreBlock } from './score.js';
+
+/** @import { PastRun } from '../messages.js' */
+/** @import { Store } from '../store.js' */
+
+const MOST_COMPARED = 6;
+const MEGA = 1e6;
+
+/** The list; one per page. */
+class RunList {
+  #store;
+  #root;
+  #list = element('ul', { class: 'runs' });
+  #error = element('p', { class: 'field-error', role: 'alert' });
+  #hint = element('p', { class: 'hint', role: 'status' });
+  #compare = element('button', { type: 'button', class: 'wide', disabled: true,
+    on: { click: () => this.#open(api.comparisonAddress([...this.#chosen])) } },
+  'Compare the chosen runs');
+  /** @type {Set<string>} */
+  #chosen = new Set();
+  // By id, as they are shown: pictures are not asked for again.
+  /** @type {Map<string, {text: string, node: HTMLElement}>} */
+  #items = new Map();
+
+  /**
+   * @param {HTMLElement} root
+   * @param {Store} store
+   */
+  constructor(root, store) {
+    this.#store = store;
+    this.#root = root;
+    root.append(element('div', { class: 'stack' }, this.#compare, this.#error, this.#hint,
+      this.#list));
+    new MutationObserver(() => this.#seen()).observe(root, { attributeFilter: ['hidden'] });
+    store.on('files', () => this.#seen());
+    store.on('hello', () => this.#seen());
+    this.#seen();
+  }
+
+  #seen() {
+    if (!this.#root.hidden && this.#store.mode === 'live') {
+      this.refresh();
+    } else if (this.#store.mode === 'replay') {
+      setText(this.#hint, 'A recording is being shown: its cockpit has the list of runs.');
+      setAttribute(this.#compare, 'hidden', true);
+    }
+  }
+
+  /** Ask the server what there is. */
+  async refresh() {
+    try {
+      const runs = await api.fetchRuns();
+      setText(this.#error, '');
+      this.#show(runs);
+    } catch (error) {
+      setText(this.#error, errorText(error));
+    }
+  }
+
+  /** @param {PastRun[]} runs */
+  #show(runs) {
+    const known = new Map(runs.map((run) => [run.id, run]));
+    for (const id of [...this.#chosen].filter((each) => !known.get(each)?.closed)) {
+      this.#chosen.delete(id);
+    }
+    this.#items = new Map(runs.map((run) => {
+      const text = JSON.stringify(run);
+      const shown = this.#items.get(run.id);
+      return [run.id, shown?.text === text ? shown : { text, node: this.#item(run) }];
+    }));
+    const nodes = [...this.#items.values()].map(({ node }) => node);
+    if (nodes.some((node, i) => this.#list.children[i] !== node)
+        || nodes.length !== this.#list.children.length) {
+      this.#list.replaceChildren(...nodes);
+    }
+    setText(this.#hint, runs.length === 0 ? 'Nothing has been recorded yet.' : '');
+    this.#count();
+  }
+
+  #count() {
+    const chosen = this.#chosen.size;
+    this.#compare.disabled = chosen < 2 || chosen > MOST_COMPARED;
+    setText(this.#compare, chosen < 2 ? 'Choose runs to compare them'
+      : chosen > MOST_COMPARED ? `At most ${MOST_COMPARED} can be compared`
+        : `Compare ${chosen} runs`);
+  }
+
+  /** @param {PastRun} run */
+  #item(run) {
+    const score = element('div', { class: 'run-score' });
+    const title = run.title || run.scenario || run.name;
+    return element('li', { class: 'card run', 'data-run': run.id, 'data-name': run.name },
+      run.closed ? element('img', { class: 'run-picture', src: api.pictureAddress(run.id),
+        loading: 'lazy', alt: `The end of ${run.name} from above, with the ways driven` }) : null,
+      element('div', { class: 'run-head' },
+        run.closed ? this.#choice(run) : null,
+        element('h3', {}, element('bdi', { text: title }))),
+      element('p', { class: 'dim', text: facts(run) }),
+      element('div', { class: 'run-buttons' },
+        ...(run.closed ? this.#links(run, score) : []),
+        element('button', { type: 'button', 'data-action': 'delete', disabled: !run.finished,
+          title: run.finished ? 'Delete its files'
+            : 'It is being recorded, or its files are being written',
+          'aria-label': `Delete ${run.name}`, on: { click: () => this.#delete(run) } },
+        icon('bin'))),
+      run.closed ? fileMenu(run) : null, score);
+  }
+
+  /** @param {PastRun} run */
+  #choice(run) {
+    return element('input', { type: 'checkbox', 'aria-label': `Compare ${run.name}`,
+      checked: this.#chosen.has(run.id), on: { change: (event) => {
+        const box = /** @type {HTMLInputElement} */ (event.currentTarget);
+        this.#chosen[box.checked ? 'add' : 'delete'](run.id);
+        this.#count();
+      } } });
+  }
+
+  /**
+   * @param {PastRun} run
+   * @param {HTMLElement} score
+   */
+  #links(run, score) {
+    const report = run.files.find(({ name }) => name === 'report.html');
+    return [
+      button('replay', 'Replay', () => this.#open(api.replayAddress(run.id))),
+      report === undefined ? null
+        : button('report', 'Report', () => this.#open(api.fileAddress(run.id, report.name))),
+      button('score', 'Score', () => this.#score(run, score)),
+    ].filter((item) => item !== null);
+  }
+
+  /** @param {string} address */
+  #open(address) {
+    window.open(address, '_blank', 'noopener');
+  }
+
+  /**
+   * @param {PastRun} run
+   * @param {HTMLElement} root
+   */
+  async #score(run, root) {
+    if (root.firstElementChild) {
+      root.replaceChildren();
+      return;
+    }
+    root.replaceChildren(scoreBlock({ state: 'waiting' }, null));
+    try {
+      const score = await api.fetchScore(run.id);
+      root.replaceChildren(scoreBlock({ state: 'told', score }, null));
+    } catch (error) {
+      root.replaceChildren(scoreBlock({ state: 'none', why: errorText(error) }, null));
+    }
+  }
+
+  /** @param {PastRun} run */
+  async #delete(run) {
+    const megabytes = (run.bytes / MEGA).toFixed(1);
+    if (!await confirm(`Delete ${run.name}?`, `${plural(run.files.length, 'file')}, ${megabytes} `
+      + 'MB: recording, scenario and reports. They cannot be brought back.', 'Delete')) {
+      return;
+    }
+    try {
+      await api.deleteRun(run.id);
+    } catch (error) {
+      setText(this.#error, errorText(error));
+    }
+    await this.refresh();
+  }
+}
+
+/** @param {PastRun} run */
+function facts({ name, began_ms, duration_s, contacts, closed, bytes }) {
+  return [
+    began_ms === null ? '' : new Date(began_ms).toLocaleString(),
+    closed ? '' : 'being recorded', duration_s === null ? '' : clockTime(duration_s),
+    contacts === null ? '' : plural(contacts, 'contact'), `${(bytes / MEGA).toFixed(1)} MB`,
+    oneLine(name),
+  ].filter(Boolean).join(' · ');
+}
+
+/** @param {PastRun} run */
+function fileMenu({ id, files }) {
+  return element('details', { class: 'run-files' }, element('summary', { text: 'Download' }),
+    element('ul', {},
+      element('li', {}, element('a', { href: api.zipAddress(id), download: true,
+        text: 'Everything as ZIP' })),
+      ...files.map(({ name, bytes }) => element('li', {},
+        element('a', { href: api.fileAddress(id, name), download: true, text: name }),
+        element('span', { class: 'dim', text: ` ${(bytes / MEGA).toFixed(2)} MB` })))));
+}
+
+/**
+ * @param {string} action
+ * @param {string} text
+ * @param {() => void} act
+ */
+function button(action, text, act) {
+  return element('button', { type: 'button', 'data-action': action, text, on: { click: act } });
+}
+
+/**
+ * Make the panel; what there is is asked for when it is seen.
+ *
+ * @param {HTMLElement} root #panel-runs
+ * @param {Store} store
+ * @returns {RunList}
+ */
+export function createRunList(root, store) {
+  return new RunList(root, store);
+}

@@ -1,0 +1,64 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** How well everybody drove, in numbers that the server makes from the recording. */
+
+import { element } from '../dom.js';
+import { fixed } from '../panels/format.js';
+
+/** @import { Score, VehicleScore } from '../messages.js' */
+
+const KMH = 3.6;
+
+/**
+ * What is known of a score: that it is being made, it, or why there is none.
+ *
+ * @typedef {{state: 'waiting'}|{state: 'told', score: Score}|{state: 'none', why: string}} Scored
+ */
+
+/**
+ * Build the table of scores.
+ *
+ * @param {Scored} scored
+ * @param {string|null} mine the vehicle that this page drives, shown first
+ * @returns {HTMLElement}
+ */
+export function scoreBlock(scored, mine) {
+  const root = element('section', { class: 'score', 'aria-label': 'Score',
+    'data-state': scored.state });
+  if (scored.state === 'waiting') {
+    root.append(element('p', { class: 'dim', role: 'status', text: 'Scoring the run …' }));
+  } else if (scored.state === 'none' || scored.score.vehicles.length === 0) {
+    const why = scored.state === 'none' ? scored.why : scored.score.refusal;
+    root.append(element('p', { class: 'dim', text: `No score: ${why || 'nobody drove'}` }));
+  } else {
+    const { vehicles } = scored.score;
+    /** @param {VehicleScore} each */
+    const rank = ({ vehicle, role }) => (vehicle === mine ? 0 : role === 'human' ? 1 : 2);
+    const [first, ...others] = [...vehicles].sort((a, b) => rank(a) - rank(b));
+    root.append(vehicleScore(first, true), ...others.map((each) => vehicleScore(each, false)));
+  }
+  return root;
+}
+
+/**
+ * @param {VehicleScore} scored
+ * @param {boolean} open whether its parts are to be seen at once
+ */
+function vehicleScore({ vehicle, role, score, parts, distance, fastest, remarks }, open) {
+  const points = score === null ? '–' : fixed(100 * score, 0);
+  return element('details', { class: 'score-vehicle', open, 'data-vehicle': vehicle },
+    element('summary', { title: 'Multipliers times the weighted mean, as nuPlan scores a drive' },
+      element('strong', { class: role === 'human' ? 'human' : 'av', text: vehicle }),
+      element('span', { class: 'score-points', text: points }),
+      element('span', { class: 'dim', text: score === null ? remarks.join('; ') : 'of 100' }),
+      element('span', { class: 'score-way',
+        text: `${fixed(distance, 0)} m, up to ${fixed((fastest ?? NaN) * KMH, 0)} km/h` })),
+    element('ul', { class: 'score-parts' }, ...parts.map(
+      ({ name, value, weight, definition }) => element('li', {
+        title: `${definition}; ${weight > 0 ? `weight ${weight}` : 'multiplies the rest'}`,
+        'data-short': value !== null && value < 1 },
+      element('span', { text: name }),
+      element('meter', { min: 0, max: 1, low: 0.5, high: 0.9, optimum: 1, value: value ?? 0,
+        'aria-label': name }),
+      element('b', { text: value === null ? '–' : `${fixed(100 * value, 0)} %` })))));
+}

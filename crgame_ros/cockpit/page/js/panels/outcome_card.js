@@ -1,0 +1,147 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** How a run went, in words: why it ended, who touched whom, its planners, timing and files. */
+
+import { fileAddress, replayAddress, zipAddress } from '../after/run_api.js';
+import { element } from '../dom.js';
+import { clockTime, NONE, oneLine, plural } from './format.js';
+
+/** @import { Scored } from '../after/score.js' */
+/** @import { Contact, Files, Recording, Status } from '../messages.js' */
+
+// More of a kind are counted.
+const MOST_TOLD = 5;
+const REPORT = 'report.html';
+
+/**
+ * How a run went.
+ *
+ * @typedef {object} Result
+ * @property {{title: string, text: string}} why
+ * @property {boolean} stays
+ * @property {number} t [s]
+ * @property {boolean} driven
+ * @property {(Contact & {part: string})[]} contacts
+ * @property {{vehicle: string, t: number}[]} departures
+ * @property {{id: string, name: string, accepted: number, refused: number, fallbacks: number}[]
+ *   } planners
+ * @property {[name: string, text: string, explanation: string][]} figures
+ * @property {Recording} recording
+ * @property {Files|null} files
+ * @property {Scored} scored
+ * @property {string|null} mine the vehicle that this page drives
+ */
+
+/** @param {Status} status */
+export function why({ reason, t, contacts = [] }) {
+  const after = clockTime(t);
+  /** @param {string} text */
+  const over = (text) => ({ title: 'The run is over', text });
+  const [kind, , vehicle] = (reason ?? '').split(' ');
+  switch (kind) {
+    case 'duration': return over(`Its duration of ${after} is over.`);
+    case 'stop': return over(`Somebody stopped it after ${after}.`);
+    case 'signal': return over(`It was ended at the terminal after ${after}.`);
+    case 'drivability': {
+      const hit = contacts.findLast((item) => [item.vehicle, item.with].includes(vehicle));
+      return { title: hit === undefined ? 'Off the road' : 'Collision',
+        text: `${vehicle} ${hit === undefined ? 'left the road'
+          : `and ${hit.vehicle === vehicle ? hit.with : hit.vehicle} touched`} after ${after}, `
+          + 'which ends this game.' };
+    }
+    case 'silence': return { title: 'The simulation is silent',
+      text: `It was heard last at ${after}. The terminal may tell why.` };
+    default: return over(`It ended after ${after}.`);
+  }
+}
+
+/** @param {Result} facts */
+export function table(facts) {
+  const rows = facts.driven ? [
+    ['Contacts', told(facts.contacts, (item) => `${item.vehicle} with ${item.with}`,
+      (item) => item.part)],
+    ['Off the road', told(facts.departures, (item) => item.vehicle)],
+  ] : [['Driven', 'by nobody: traffic was alone']];
+  for (const { id, name, accepted, refused, fallbacks } of facts.planners) {
+    rows.push([`${id}${name ? ` · ${oneLine(name)}` : ''}`, [
+      `${plural(accepted, 'plan')} accepted`, `${refused} refused`,
+      plural(fallbacks, 'fallback')].join(', ')]);
+  }
+  return element('table', { class: 'figures' }, element('tbody', {}, ...rows.map(
+    ([name, text]) => element('tr', {}, element('th', { scope: 'row', text: name }),
+      element('td', { text })))));
+}
+
+/**
+ * Which side of whom it was and who could have avoided it, once the timing report says so.
+ *
+ * @param {Contact} contact
+ * @param {Files|null} files
+ */
+export function part(contact, files) {
+  const pair = [contact.vehicle, contact.with].sort().join();
+  const named = files?.contacts?.find((item) => [item.vehicle, item.with].sort().join() === pair);
+  return named === undefined ? ''
+    : ` (${oneLine(named.side)} of ${named.vehicle}; could have avoided it: `
+      + `${oneLine(named.avoidable_by)})`;
+}
+
+/**
+ * @template {{t: number}} Item
+ * @param {Item[]} items
+ * @param {(item: Item) => string} name
+ * @param {(item: Item) => string} remark = () => ''
+ */
+function told(items, name, remark = () => '') {
+  if (items.length === 0) {
+    return 'none';
+  }
+  const texts = items.slice(0, MOST_TOLD).map(
+    (item) => `${name(item)} at ${clockTime(item.t)}${remark(item)}`);
+  const more = items.length - texts.length;
+  return [...texts, ...(more > 0 ? [`${more} more`] : [])].join('; ');
+}
+
+/** @param {Result['figures']} items */
+export function figures(items) {
+  return [element('details', {}, element('summary', { text: 'How it kept time (table I)' }),
+    element('dl', { class: 'outcome-figures' }, ...items.map(
+      ([name, text, explanation]) => element('div', { title: explanation },
+        element('dt', { text: name }), element('dd', { text: text || NONE })))))];
+}
+
+/**
+ * What can be looked at and fetched.
+ *
+ * @param {Result & {connected: boolean}} facts
+ */
+export function fileList({ files, recording, connected }) {
+  if (recording?.state === 'failed') {
+    return element('p', { class: 'field-error', text: oneLine(recording.text) });
+  }
+  if (files === null) {
+    return null;
+  }
+  const { run, names, complete } = files;
+  const closed = recording.state !== 'recording';
+  return element('div', { class: 'outcome-files', 'data-complete': complete },
+    element('span', { class: 'dim', text: 'Files in ' }), element('code', { text: files.folder }),
+    element('ul', {}, ...!connected ? names.map((text) => element('li', { text }))
+      : [names.includes(REPORT) ? link('Report', fileAddress(run, REPORT), false) : null,
+        closed ? link('Replay of the whole run', replayAddress(run), false) : null,
+        ...names.filter((name) => name !== REPORT && name.includes('.')).map(
+          (name) => link(name, fileAddress(run, name), true)),
+        closed ? link('Everything as ZIP', zipAddress(run), true) : null]),
+    complete || !connected ? null : element('span', { class: 'dim', role: 'status',
+      text: 'Scenario, timing report and report are being written …' }));
+}
+
+/**
+ * @param {string} text
+ * @param {string} href
+ * @param {boolean} download instead of showing it in another tab
+ */
+function link(text, href, download) {
+  return element('li', {}, element('a', { href, text, download, target: download ? null : '_blank',
+    rel: 'noopener' }));
+}

@@ -1,0 +1,113 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What is on the map, in words: for those who do not see it, and for tests. */
+
+import { element, setText } from '../dom.js';
+import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { icon } from '../panels/icons.js';
+import { recall, remember } from '../panels/memory.js';
+
+/** @import { Shown, Store } from '../store.js' */
+
+const EVERY_MS = 1000;
+const REACH = 100;
+const MOST_TOLD = 5;
+const KMH = 3.6;
+const OBJECT_WIDTH = 6;
+const STANDING = 0.3;
+
+/** @typedef {{id: string, x: number, y: number, yaw: number, speed: number}} Body [m, rad, m/s] */
+
+/**
+ * Say who is around a vehicle, the nearest first.
+ *
+ * @param {Body} own
+ * @param {Body[]} others
+ * @param {boolean} driven whether this page drives it
+ * @returns {string}
+ */
+export function describeAround(own, others, driven) {
+  const near = others.map((other) => ({
+    other, distance: Math.hypot(other.x - own.x, other.y - own.y) }))
+    .filter(({ distance }) => distance <= REACH).sort((a, b) => a.distance - b.distance);
+  const told = near.slice(0, MOST_TOLD).map(({ other, distance }) => (
+    `${other.id} ${Math.round(distance)} m ${directionOf(own, other)}, ${pace(other.speed)}`));
+  const more = near.length - told.length;
+  return [`${driven ? 'You drive' : 'Watching'} ${own.id}, ${pace(own.speed)}.`,
+    told.length === 0 ? `Nobody within ${REACH} m.`
+      : `Around: ${told.join('; ')}${more > 0 ? `; and ${more} more` : ''}.`].join(' ');
+}
+
+/** @param {number} speed [m/s] */
+function pace(speed) {
+  return Math.abs(speed) < STANDING ? 'standing'
+    : `${Math.round(Math.abs(speed) * KMH)} km/h${speed < 0 ? ' backwards' : ''}`;
+}
+
+/**
+ * In one of eight directions, as seen by its driver.
+ *
+ * @param {Body} own
+ * @param {Body} other
+ */
+function directionOf(own, other) {
+  const angle = Math.atan2(other.y - own.y, other.x - own.x) - own.yaw;
+  const eighth = Math.round(angle / (Math.PI / 4)) & 7;
+  return ['ahead', 'ahead left', 'left', 'behind left', 'behind', 'behind right', 'right',
+    'ahead right'][eighth];
+}
+
+/**
+ * Keep the text up to date, once a second at most; it is read out only when that is asked for.
+ *
+ * @param {HTMLElement} root #around
+ * @param {Store} store
+ * @returns {{describe: () => string}}
+ */
+export function createAround(root, store) {
+  const describe = () => {
+    const seat = window.crgame.driving?.seat ?? null;
+    const id = seat ?? window.crgame.world.followed;
+    const shown = store.displayed(performance.now());
+    const bodies = shown === null ? [] : bodiesOf(store, shown);
+    const own = bodies.find((body) => body.id === id);
+    return own === undefined ? `The whole map, with ${bodies.length} vehicles and objects.`
+      : describeAround(own, bodies.filter((body) => body !== own), seat !== null);
+  };
+  const button = element('button', { type: 'button', class: 'icon-button', id: 'announce',
+    'aria-label': 'Read out what is around', title: 'Read out what is around', on: {
+      click: () => announce(root.getAttribute('aria-live') !== 'polite'),
+    } }, icon('speech'));
+  /** @param {boolean} on */
+  const announce = (on) => {
+    root.setAttribute('aria-live', on ? 'polite' : 'off');
+    button.setAttribute('aria-pressed', String(on));
+    remember('announce', on ? 'yes' : '');
+  };
+  document.querySelector('#bar-end')?.append(button);
+  announce(recall('announce') === 'yes');
+  setInterval(() => {
+    if (store.scene !== null && !document.hidden) {
+      setText(root, describe());
+    }
+  }, EVERY_MS);
+  return { describe };
+}
+
+/**
+ * @param {Store} store
+ * @param {Shown} shown
+ * @returns {Body[]} whoever is there
+ */
+function bodiesOf({ scene }, { vehicles, objects }) {
+  const driven = (scene?.vehicles ?? []).map(({ id }, i) => {
+    const row = vehicles.subarray(i * VEHICLE_WIDTH, (i + 1) * VEHICLE_WIDTH);
+    return { id, x: row[VEHICLE.x], y: row[VEHICLE.y], yaw: row[VEHICLE.yaw],
+      speed: row[VEHICLE.speed] };
+  });
+  const others = (scene?.objects ?? []).map(({ id, type }, i) => {
+    const [x, y, yaw, vx, vy] = objects.subarray(i * OBJECT_WIDTH, (i + 1) * OBJECT_WIDTH);
+    return { id: `${type} ${id}`, x, y, yaw, speed: Math.hypot(vx, vy) };
+  });
+  return [...driven, ...others].filter(({ x }) => Number.isFinite(x));
+}

@@ -1,0 +1,311 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The page on any screen and for anybody: sizes, fingers, colours, words, alarms, saved files."""
+
+from collections.abc import Iterator
+import csv
+from pathlib import Path
+import time
+from typing import Any
+
+from browser_support import Browser
+from crgame_ros.paths import scenarios_directory
+import pytest
+from world_support import RecordedRun, RunBackend, Served, served
+
+SIZES = ((1920, 1080), (1280, 720), (1200, 800), (390, 844), (640, 360))
+OVERRIDE = 'abc \u202etxet'
+# Of the elements that are to be seen: those cut off by the window, and the smallest letters.
+CUT_OFF = """
+const seen = (node) => node.checkVisibility({ visibilityProperty: true });
+return [...document.querySelectorAll(arguments[0])].filter(seen).filter((node) => {
+  const { left, top, right, bottom } = node.getBoundingClientRect();
+  return left < -0.5 || top < -0.5 || right > innerWidth + 0.5 || bottom > innerHeight + 0.5;
+}).map((node) => `${node.tagName} ${node.id} ${node.className} ${node.textContent}`);"""
+SMALLEST = """
+let least = [99, ''];
+for (const node of document.querySelectorAll('body *')) {
+  const own = [...node.childNodes].some((child) => child.nodeType === 3 && child.data.trim());
+  if (own && node.checkVisibility() && !node.closest('.unseen, svg, canvas, select')) {
+    const size = parseFloat(getComputedStyle(node).fontSize);
+    least = size < least[0] ? [size, `${node.className} ${node.textContent}`] : least;
+  }
+}
+return least;"""
+
+
+@pytest.fixture(scope='module')
+def run() -> RecordedRun:
+    """Give a game with traffic, whose events and title somebody else wrote."""
+    recorded = RecordedRun(scenarios_directory() / 'traffic.yaml', 14.0)
+    recorded.scene |= {'title': OVERRIDE, 'events': [
+        {'name': 'slow', 'label': '', 'when': None, 'kind': 'speed_limit', 'speed': 30 / 3.6,
+         'lanelets': []}]}
+    return recorded
+
+
+@pytest.fixture(scope='module')
+def server(run: RecordedRun, module_browser: Browser) -> Iterator[Served]:
+    """Serve the run to one page whose person drives hv0."""
+    with served(RunBackend(run, every=2)) as running:
+        module_browser.open(running.address)
+        module_browser.wait('window.crgame?.ready && crgame.world.shown && crgame.store.me.id')
+        # Hands can be on the controls of a page that has the focus.
+        module_browser.driver.find_element('css selector', '#world').click()
+        drive(running, module_browser)
+        yield running
+
+
+@pytest.fixture
+def page(server: Served, module_browser: Browser) -> Iterator[Browser]:
+    """Give the page in its usual size; it may not have complained afterwards."""
+    module_browser.resize(1280, 720)
+    yield module_browser
+    assert module_browser.console_errors() == []
+
+
+def drive(server: Served, browser: Browser, holder: str | None = None) -> None:
+    """Let the page, or somebody else, hold the seat of hv0."""
+    me = holder or browser.run('return crgame.store.me.id')
+    server.publish('seats', {'seats': {'hv0': {
+        'source': 'cockpit', 'driver': 'cockpit', 'holder': me, 'holder_name': 'Me'}}})
+    browser.wait('crgame.store.seats.hv0?.holder === arguments[0]', arguments=(me,))
+
+
+def alarm(kind: str, subject: str) -> dict[str, Any]:
+    return {'id': f'{kind}:{subject}', 'kind': kind, 'subject': subject, 'text': 'so',
+            'since_t': 1.0}
+
+
+@pytest.mark.parametrize('size', SIZES, ids=lambda size: f'{size[0]}x{size[1]}')
+def test_nothing_is_cut_off_and_the_road_is_free(
+        page: Browser, size: tuple[int, int]) -> None:
+    """Header, tabs, buttons of the view and instruments, on screens from phone to desk."""
+    page.resize(*size)
+    page.wait('innerWidth === arguments[0] && crgame.world.camera.width > 1', arguments=(size[0],))
+    time.sleep(0.2)
+    assert page.run(CUT_OFF, '#bar *, #tabs button, .world-toolbar button, .hud-board, .hud-board '
+                             '.hud-kmh, .hud-limit, .cap') == []
+    free = page.run("""
+        const stage = document.querySelector('#stage').getBoundingClientRect();
+        const area = (name) => {
+          const box = document.querySelector(name).getBoundingClientRect();
+          return box.width * box.height;
+        };
+        return 1 - (area('.hud-board') + area('.world-toolbar')) / (stage.width * stage.height);
+        """)
+    assert free > 0.7
+    size_px, where = page.run(SMALLEST)
+    assert size_px >= 12.0, where
+
+
+def test_fingers_drive(page: Browser) -> None:
+    """A finger on a key of the page is that key, two at once as well; R tapped is the gear."""
+    page.wait('crgame.driving.away === null', 'hands on the controls')
+    page.run("""
+        window.touch = (code, type, pointerId) => document.querySelector(`.cap-${code}`)
+          .dispatchEvent(new PointerEvent(type, { pointerId, bubbles: true, cancelable: true }));
+        Element.prototype.setPointerCapture = () => {};""")
+    try:
+        assert page.run("""touch('KeyW', 'pointerdown', 1); touch('KeyA', 'pointerdown', 2);
+            return crgame.driving.hands.keys;""") == [1, 0, 1, 0]
+        assert page.run("""touch('KeyW', 'pointerup', 1); return crgame.driving.hands.keys;
+            """) == [0, 0, 1, 0]
+        assert page.run("""touch('KeyA', 'pointercancel', 2);
+            touch('KeyR', 'pointerdown', 3); touch('KeyR', 'pointerup', 3);
+            return [crgame.driving.hands.keys, crgame.driving.hands.reverse];
+            """) == [[0, 0, 0, 0], 1]
+        page.driver.execute_cdp_cmd('Emulation.setTouchEmulationEnabled', {'enabled': True})
+        page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+            'features': [{'name': 'pointer', 'value': 'coarse'}]})
+        page.resize(390, 844)
+        boxes = page.run("""return ['KeyA', 'KeyD', 'KeyS', 'KeyW', 'KeyR'].map((code) => {
+            const box = document.querySelector(`.cap-${code}`).getBoundingClientRect();
+            return [box.left, box.right, box.width, box.height]; });""")
+        # What a finger can hit: 44 px, as the guidelines of the platforms have it.
+        assert min(min(box[2:]) for box in boxes[:4]) >= 44
+        assert boxes[1][1] < boxes[2][0]
+        assert page.run(CUT_OFF, '.cap') == []
+    finally:
+        page.driver.execute_cdp_cmd('Emulation.setTouchEmulationEnabled', {'enabled': False})
+        page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': []})
+
+
+def test_the_sign_shows_the_limit_that_an_event_has_set(server: Served, page: Browser) -> None:
+    page.wait('document.querySelector(".hud-limit[data-on]")?.textContent > 0')
+    usual = page.run('return document.querySelector(".hud-limit").textContent')
+    assert usual != '30'
+    server.publish('events', {'fired': [{'name': 'slow', 'n': 1, 'k': 0, 'by': 'trigger'}]})
+    page.wait('document.querySelector(".hud-limit").textContent === "30"')
+    server.publish('events', {'fired': []})
+    page.wait('document.querySelector(".hud-limit").textContent === arguments[0]',
+              arguments=(usual,))
+
+
+def test_alarms_of_others_frame_nobody_and_are_acknowledged(
+        server: Served, page: Browser) -> None:
+    """Mine frames my screen until I say that I know; that of an AV is a word in the header."""
+    framed = 'return !document.querySelector("#alarm-frame").hidden'
+    server.publish('alarms', {'active': [alarm('collision', 'av0')]})
+    page.wait('document.querySelector("#alarms [data-kind=collision]")')
+    assert page.run(framed) is False
+    server.publish('alarms', {'active': [alarm('collision', 'av0'), alarm('off_road', 'hv0')]})
+    page.wait('!document.querySelector("#alarm-frame").hidden')
+    page.run('document.querySelector("#alarms [data-kind=off_road]").click()')
+    assert page.run(framed) is False
+    assert page.run('return document.querySelector("#alarms [data-kind=off_road]").className'
+                    ).endswith('known')
+    # Nobody is late in a pause.
+    server.publish('alarms', {'active': [alarm('late', 'simulation')]})
+    page.wait('crgame.store.alarms[0].kind === "late"')
+    assert page.run('return document.querySelector("#alarms [data-kind=late]")') is None
+    server.publish('alarms', {'active': []})
+
+
+def test_what_is_around_is_said_in_words(page: Browser, run: RecordedRun) -> None:
+    page.wait('document.querySelector("#around").textContent.startsWith("You drive hv0")')
+    text = page.run('return crgame.around.describe()')
+    own, other = run.states[0, 0, :3], run.states[0, 1, :2]
+    away = round(float(((other - own[:2]) ** 2).sum() ** 0.5))
+    assert f'av0 {away} m ' in text or away > 100
+    assert page.run('return document.querySelector("#around").ariaLive') == 'off'
+    page.run('document.querySelector("#announce").click()')
+    assert page.run('return document.querySelector("#around").ariaLive') == 'polite'
+    page.run('document.querySelector("#announce").click()')
+
+
+def test_text_that_turns_others_around_is_isolated(page: Browser) -> None:
+    wanted = f'\u2068{OVERRIDE}\u2069'
+    title, tab, tip = page.run("""const node = document.querySelector('#title');
+        return [node.textContent, document.title, node.title];""")
+    assert title == wanted and tab.startswith(wanted) and tip.startswith(wanted)
+    # What does not shrink beside it gets its room.
+    assert page.run('const n = document.querySelector("#title");'
+                    'return n.scrollWidth <= n.clientWidth')
+
+
+def test_forced_colours_leave_the_map_its_own(page: Browser) -> None:
+    colours = """const { data } = document.querySelector('#world').getContext('2d')
+        .getImageData(0, 0, 600, 400);
+        const found = new Set();
+        for (let i = 0; i < data.length; i += 4) found.add(data.slice(i, i + 3).join());
+        return found.size;"""
+    page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+        'features': [{'name': 'forced-colors', 'value': 'active'}]})
+    try:
+        page.resize(1281, 720)
+        page.wait('crgame.world.camera.width > 1')
+        time.sleep(0.3)
+        assert page.run(colours) > 8
+    finally:
+        page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': []})
+
+
+def test_the_map_shows_that_it_has_the_focus(page: Browser) -> None:
+    assert page.run("""document.querySelector('#world').focus({ focusVisible: true });
+        const style = getComputedStyle(document.querySelector('#world'));
+        return [style.outlineStyle, parseFloat(style.outlineWidth) >= 2];""") == ['solid', True]
+    page.run('document.activeElement.blur()')
+
+
+@pytest.mark.parametrize('theme', ['light', 'dark'])
+def test_green_can_be_read(page: Browser, theme: str) -> None:
+    """Its contrast is that of WCAG, 4.5 to 1 at least, in words and marks."""
+    page.run('document.documentElement.dataset.theme = arguments[0]', theme)
+    ratio = page.run("""
+        const colour = (name) => {
+          const probe = document.body.appendChild(document.createElement('i'));
+          probe.style.color = `var(--${name})`;
+          const [r, g, b] = getComputedStyle(probe).color.match(/[\\d.]+/g).map((v) => v / 255)
+            .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+          probe.remove();
+          return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        };
+        const [high, low] = [colour(arguments[0]), colour('surface')].sort((a, b) => b - a);
+        return (high + 0.05) / (low + 0.05);""", 'ok')
+    page.run('delete document.documentElement.dataset.theme')
+    assert ratio >= 4.5
+
+
+def test_plots_map_and_tables_are_saved(
+        server: Served, page: Browser, tmp_path: Path) -> None:
+    """As the person's browser keeps them; Plotly's styles come from no inline sheet."""
+    page.driver.execute_cdp_cmd('Browser.setDownloadBehavior', {
+        'behavior': 'allow', 'downloadPath': str(tmp_path)})
+    server.control('start')
+    page.wait('crgame.store.latest.t > 1.5')
+    server.control('pause')
+    page.run('document.querySelector("#tab-history").click()')
+    page.wait('crgame.history.charts.length > 2', 'plots')
+    for form in ('csv', 'svg', 'png'):
+        page.run_async('await crgame.saving.savePlots("history", arguments[0]);', form)
+    page.run('document.querySelector("[data-action=save-map]").click()')
+    page.run('document.querySelector("#panel-timing [data-action=save-tables]").click()')
+    end = time.monotonic() + 20.0
+    while len(found := {path.name.split('_T-1_')[-1].split('_')[0] + path.suffix: path
+                        for path in tmp_path.glob('*.*[gv]')}) < 5:
+        assert time.monotonic() < end, found
+        time.sleep(0.1)
+    with found['history.csv'].open(newline='') as stream:
+        rows = list(csv.reader(stream))
+    assert rows[0] == ['quantity', 'unit', 'line', 'time_s', 'value']
+    assert {'Speed'} <= {row[0] for row in rows} and len(rows) > 50
+    assert all(float(row[3]) >= 0.0 for row in rows[1:])
+    assert found['history.svg'].read_text().count('<svg') > 2
+    for name in ('history.png', 'map.png'):
+        assert found[name].read_bytes().startswith(b'\x89PNG')
+    assert page.run('return document.querySelectorAll("style").length') == 0
+
+
+def test_the_last_seconds_are_shown_again_and_slower(
+        server: Served, page: Browser, run: RecordedRun) -> None:
+    """From the states that the page has kept, where the recording has them."""
+    page.run('crgame.lastSeconds.open()')
+    page.wait('crgame.lastSeconds.isOpen && crgame.world.shown.t > 0.3'
+              ' && crgame.world.shown.t < 1.2')
+    page.run("""const bar = document.querySelector('#last-seconds');
+        const slider = bar.querySelector('input');
+        slider.value = 1;
+        slider.dispatchEvent(new Event('input'));""")
+    page.wait('Math.abs(crgame.world.shown.t - 1) < 1e-6')
+    x, y = page.run('return [...crgame.world.shown.vehicles.subarray(0, 2)]')
+    assert [x, y] == pytest.approx(run.states[round(1.0 / run.dt_s), 0, :2].tolist(), abs=1e-6)
+    page.run("""const speed = document.querySelector('#last-seconds select');
+        speed.value = '0.1';
+        speed.dispatchEvent(new Event('change'));
+        document.querySelector('#last-seconds [data-action=play]').click();""")
+    before, began_ms = page.run('return [crgame.lastSeconds.t, performance.now()]')
+    time.sleep(1.0)
+    after, ended_ms = page.run('return [crgame.lastSeconds.t, performance.now()]')
+    assert 0.0 < after - before <= 0.1 * (ended_ms - began_ms) / 1000 + 0.02
+    page.run('document.querySelector("#last-seconds [data-action=end]").click()')
+    page.wait('crgame.world.shown.t === crgame.store.latest.t')
+    server.control('start')
+    page.wait('crgame.store.status.run === "running"')
+    assert page.run('crgame.lastSeconds.open(); return crgame.lastSeconds.isOpen') is False
+
+
+def test_r_held_begins_anew_and_tapped_does_not(server: Served, page: Browser) -> None:
+    epoch = page.run('return crgame.store.epoch')
+    press = "window.dispatchEvent(new KeyboardEvent(arguments[0], { code: 'KeyR' }));"
+    page.run(press, 'keydown')
+    page.run(press, 'keyup')
+    time.sleep(1.0)
+    assert page.run('return crgame.store.epoch') == epoch
+    page.run(press, 'keydown')
+    page.wait('!document.querySelector(".restart-hint").hidden')
+    page.wait('crgame.store.epoch > arguments[0]', arguments=(epoch,))
+    page.run(press, 'keyup')
+    assert page.run('return document.querySelector(".restart-hint").hidden')
