@@ -63,7 +63,7 @@ class KeyBindings:
 
     @property
     def lights(self) -> LightButtons:
-        """The keys of indicators and horn."""
+        """Give the keys of indicators and horn."""
         return LightButtons(self.left_indicator, self.right_indicator, self.hazard, self.horn)
 
     def held(self, pressed: Set[int], reverse: bool, lights: int = 0) -> KeyState:

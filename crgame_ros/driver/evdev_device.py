@@ -170,12 +170,12 @@ class EvdevDevice:
 
     @property
     def force_limits(self) -> ForceLimits | None:
-        """What may be asked of its motor; None without one, or where the map has none."""
+        """Tell what may be asked of its motor; None without one, or where the map has none."""
         return self.device_map.force if self._can_push and self.device_map else None
 
     @property
     def force_device(self) -> Any:
-        """What its motor is driven through (`ForceDevice`); None without one."""
+        """Give what its motor is driven through (`ForceDevice`); None without one."""
         return self._device if self._can_push else None
 
     def poll(self, now_s: float) -> bool:

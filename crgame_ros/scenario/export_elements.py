@@ -91,7 +91,8 @@ def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequ
     initial, series = _signal_series(signals)
     return (f'<dynamicObstacle id="{number}"><type>{kind}</type><shape>{_shape(shape)}</shape>\n'
             f'<initialState>{lines[0]}</initialState>\n{initial}'
-            f'<trajectory>\n<state>{trajectory}</state>\n</trajectory>{series}</dynamicObstacle>\n')
+            f'<trajectory>\n<state>{trajectory}</state>\n</trajectory>{series}'
+            '</dynamicObstacle>\n')
 
 
 def _signal_series(signals: Sequence[Sequence[bool]]) -> tuple[str, str]:

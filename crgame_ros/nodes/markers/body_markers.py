@@ -141,7 +141,7 @@ class Line(Item):
             self._marker.points = self._pool[:count]
 
 
-class Light(Item):
+class LightMarker(Item):
     """
     A traffic light: a ball in the colour of its state.
 

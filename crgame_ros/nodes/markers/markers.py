@@ -22,7 +22,14 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import JointSeries, vehicle_joint_names
 from crgame_ros.messages.request_layout import RequestLayout
 from crgame_ros.nodes.markers import marker_style as style
-from crgame_ros.nodes.markers.body_markers import Body, BRAKING, Item, LIFETIME_S, Light, Line
+from crgame_ros.nodes.markers.body_markers import (
+    Body,
+    BRAKING,
+    Item,
+    LIFETIME_S,
+    LightMarker,
+    Line,
+)
 from crgame_ros.nodes.markers.map_markers import light_positions, map_markers
 from crgame_ros.ros.ros_messages import set_time
 from crgame_ros.ros.scenario_documents import ScenarioSet
@@ -63,7 +70,7 @@ class SceneMarkers:
         self._bodies = [Body(self._header, number, item)
                         for number, item in enumerate(documents.objects)]
         self._vehicles = len(documents.driven)
-        self._lights = {number: Light(self._header, number, place) for number, place
+        self._lights = {number: LightMarker(self._header, number, place) for number, place
                         in light_positions(self._loaded.scenario.lanelet_network).items()}
         outlines = {
             item.id: outline(item.shape, CIRCLE_CORNERS, False) + (item.rear_to_center, 0.0)

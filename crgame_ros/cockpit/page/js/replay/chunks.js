@@ -4,7 +4,7 @@
 
 import { KIND } from '../frames.js';
 
-/** @import { ReplayInfo } from '../messages.js' */
+/** @import { ReplayInfo } from '../replay_messages.js' */
 
 // A little over what two seeks and the way between them need; 5 s each.
 const KEPT = 12;

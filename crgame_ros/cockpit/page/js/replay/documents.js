@@ -4,7 +4,8 @@
 
 import { countWhile } from '../search.js';
 
-/** @import { ReplayInfo, ReplayTracks, RunState, SeatsMessage, Status } from '../messages.js' */
+/** @import { RunState, SeatsMessage, Status } from '../messages.js' */
+/** @import { ReplayInfo, ReplayTracks } from '../replay_messages.js' */
 /** @import { StoreMessage } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 

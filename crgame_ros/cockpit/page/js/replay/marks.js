@@ -4,7 +4,7 @@
 
 import { element, svg } from '../dom.js';
 
-/** @import { ReplayMark } from '../messages.js' */
+/** @import { ReplayMark } from '../replay_messages.js' */
 
 // Shapes on a 12 x 12 grid and the name of each kind; the colours are in replay.css.
 /** @type {Record<string, [shape: string, word: string]|undefined>} */

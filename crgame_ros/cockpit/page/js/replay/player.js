@@ -7,7 +7,8 @@ import { ReplayDocuments } from './documents.js';
 import { ReplayFeed } from './replay_feed.js';
 import { Timeline } from './timeline.js';
 
-/** @import { ReplayInfo, ReplayMark, RunState } from '../messages.js' */
+/** @import { RunState } from '../messages.js' */
+/** @import { ReplayInfo, ReplayMark } from '../replay_messages.js' */
 /** @import { Store } from '../store.js' */
 /** @import { Now } from './documents.js' */
 

@@ -10,7 +10,7 @@ import { ask, Chunks, unpack } from './chunks.js';
 
 /** @import { StateFrame } from '../frames.js' */
 /** @import { History } from '../history.js' */
-/** @import { ReplayInfo } from '../messages.js' */
+/** @import { ReplayInfo } from '../replay_messages.js' */
 /** @import { Store } from '../store.js' */
 /** @import { Entry } from './chunks.js' */
 

@@ -27,7 +27,8 @@ export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
  * Where a camera is and looks. It is turned with the vehicle, by yaw and slope, then within it to
  * the left and upwards; never rolled.
  *
- * @typedef {Point & {yaw: number, slope: number, aside: number, pitch: number}} CameraPose [m, rad]
+ * @typedef {Point & {yaw: number, slope: number, aside: number, pitch: number}} CameraPose
+ *   [m, rad]
  */
 
 /**

@@ -1,6 +1,6 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Keeps the windows of one seat in step: all show the simulation time that the first one shows. */
+/** Keeps the windows of one seat in step: all show the simulation time of the first one. */
 
 /** @import { Store } from '../store.js' */
 
@@ -20,7 +20,8 @@ const SILENCE_MS = 400;
  */
 
 /**
- * @typedef {{info: object|null, t: number, seek: (t: number) => unknown, pause: () => void}} Player
+ * @typedef {{info: object|null, t: number, seek: (t: number) => unknown,
+ *   pause: () => void}} Player
  */
 
 /** Says, or hears, which time is shown. */

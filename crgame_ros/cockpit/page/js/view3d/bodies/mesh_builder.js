@@ -88,7 +88,8 @@ export class MeshBuilder {
       const u = radius * Math.cos(angle);
       const v = radius * Math.sin(angle);
       const along = side * 0.5 * length;
-      const [x, y, z] = axis === 'x' ? [along, u, v] : axis === 'y' ? [v, along, u] : [u, v, along];
+      const [x, y, z] = axis === 'x' ? [along, u, v]
+        : axis === 'y' ? [v, along, u] : [u, v, along];
       return [middle[0] + x, middle[1] + y, middle[2] + z];
     };
     const angles = Array.from({ length: count }, (_, i) => (2 * Math.PI * i) / count);
