@@ -284,7 +284,7 @@ async def test_an_upload_can_be_driven_with_its_own_choice_left_alone(tmp_path: 
         status, _ = await load(running, id=content['id'])
         assert status == 200
         game = load_game(running.backend.games[0])
-    assert [human.driver for human in game.humans] == ['auto']
+    assert [human.driver for human in game.humans] == ['cockpit']
     assert game.avs is not None and [av.planner for av in game.avs] == ['idm']
 
 
