@@ -23,6 +23,7 @@ from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import parse_message
 from crgame_ros.game.documents import objects_document
+from crgame_ros.game.seat_documents import seat_entry, SeatPerson, SeatTenant
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.nodes.cockpit.cockpit_backend import LiveBackend
 from crgame_ros.ros.ros_messages import StateMessage
@@ -86,10 +87,11 @@ class Graph:
             await self.say(f'/scenario/{name}', String(data=text))
         await self.until(lambda: self.scene.get('time', {}).get('epoch') == epoch, 'the scene')
 
-    async def seats(self, source: str, driver: str = SCRIPT) -> None:
-        """Say who drives hv0."""
+    async def seats(self, source: str, driver: str = SCRIPT, page: Client | None = None) -> None:
+        """Say who drives hv0; the person at a page if there is one."""
+        tenant = None if page is None else SeatTenant(SeatPerson(page.person))
         await self.say('/seats', String(data=json.dumps({
-            'hv0': {'source': source, 'driver': driver},
+            'hv0': seat_entry(source, driver, tenant),
             'av0': {'source': 'planner', 'driver': 'idm'}})))
         await self.until(lambda: self.seat().get('source') == source, f'/seats: {source}')
 

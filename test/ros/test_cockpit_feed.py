@@ -192,7 +192,7 @@ def test_an_order_is_repeated_until_it_is_answered(setup: Setup) -> None:
         # What was said before the order arrived takes nothing away; what follows from it ends it.
         await graph.seats('other')
         assert graph.seat()['holder'] == page.id
-        await graph.seats('cockpit')
+        await graph.seats('cockpit', page=page)
         await graph.pause(1.2)
         assert len(graph.orders()) <= 4
         assert graph.seat()['holder'] == page.id
