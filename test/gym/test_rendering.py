@@ -20,7 +20,7 @@ import time
 from typing import Any
 
 from aiohttp import ClientSession, WSMsgType
-from crgame_ros.cockpit.frames import FrameKind
+from crgame_ros.cockpit.frames import FrameKind, STATE_COLUMNS
 from crgame_ros.gym.driving_env import DrivingEnv
 from crgame_ros.gym.parallel_env import ParallelDrivingEnv
 from crgame_ros.gym.scene_painter import AGENT, HUMAN, ROAD
@@ -100,7 +100,7 @@ def test_the_page_shows_the_environment_and_steers_nothing() -> None:
         assert documents['status']['run'] == 'running'
         assert not documents['reply']['ok']
         assert 'agent drives' in documents['reply']['text']
-        vehicles = np.array(states[-1][6:]).reshape(2, 12)
+        vehicles = np.array(states[-1][6:]).reshape(2, STATE_COLUMNS)
         # 20 m/s, and where the engine had it at that step.
         assert vehicles[1, 3] == 20.0
         assert states[-1][2] <= env.agent.game.simulation.n
