@@ -22,6 +22,8 @@ import { standOf } from './vehicle_stand.js';
 
 const NEAR_M = 0.2;
 const FAR_M = 3000;
+// Farther away than this nobody is drawn, by a card and by the processor [m].
+const FARTHEST_M = { card: 600, processor: 250 };
 // In a mirror nobody can tell what is farther away [m].
 const FAR_IN_MIRROR_M = 300;
 
@@ -80,7 +82,8 @@ export class Picture {
     this.#camera.rotation.order = 'ZXY';
     const bodies = new three.Group();
     this.#scene.add(bodies);
-    this.#traffic = new Traffic(three, bodies, store);
+    this.#traffic = new Traffic(three, bodies, store,
+      software ? FARTHEST_M.processor : FARTHEST_M.card);
     this.#plans = new PlanRibbons(three, bodies, store);
     this.mirrors = new Mirrors(three, software);
     store.on('scene', (scene) => this.#load(scene));

@@ -16,8 +16,6 @@ import { Instances } from './instances.js';
 /** @import { Origin } from './local_origin.js' */
 /** @import { Three } from './road/road_world.js' */
 
-// Farther away than this nobody is drawn [m].
-const FARTHEST_M = 600;
 const LEFT = 1;
 const RIGHT = 2;
 // The column `lights` of a STATE frame, where there is one.
@@ -41,6 +39,7 @@ export class Traffic {
   /** Whether bodies have the colours of the map, which tell who drives. */
   byRole = false;
   #three;
+  #farthest_m;
   #group;
   /** @type {Thing[]} */
   #vehicles = [];
@@ -62,8 +61,10 @@ export class Traffic {
    * @param {Three} three
    * @param {Group} group gets everything
    * @param {Store} store whose scenario steps tell who brakes
+   * @param {number} farthest_m beyond which nobody is drawn
    */
-  constructor(three, group, store) {
+  constructor(three, group, store, farthest_m) {
+    this.#farthest_m = farthest_m;
     this.#three = three;
     this.#group = group;
     this.#matrix = new three.Matrix4();
@@ -209,7 +210,7 @@ export class Traffic {
     const px = x - this.#origin.x;
     const py = y - this.#origin.y;
     // A thing that is not there yet, or no more, has no place.
-    if (!(Math.hypot(px - eye.x, py - eye.y) < FARTHEST_M)) {
+    if (!(Math.hypot(px - eye.x, py - eye.y) < this.#farthest_m)) {
       return;
     }
     const { body, scale, look } = thing;
