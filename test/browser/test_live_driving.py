@@ -194,8 +194,8 @@ for (const name of ['blur', 'pagehide']) {
   window.addEventListener(name, note, { capture: true });
 }
 document.addEventListener('visibilitychange', note, { capture: true });
-new MutationObserver(note).observe(document.querySelector('dialog.confirm'),
-  { attributeFilter: ['open'] });
+new MutationObserver(() => document.querySelector('dialog[open]') && note())
+  .observe(document.body, { subtree: true, childList: true, attributeFilter: ['open'] });
 crgame.store.on('connection', (connected) => connected || note());
 if (!Object.hasOwn(crgame.connection, 'send')) {
   const { connection } = crgame;

@@ -98,7 +98,7 @@ def test_commands_of_humans_alone_leave_the_avs_to_their_plans(cut_in: LoadedSce
 def test_recorded_take_over_is_repeated_offline(cut_in: LoadedScenario) -> None:
     """Rows of commands take the AV over, rows of NaN leave it to its planner: same bits twice."""
     setup = support.setup_of(cut_in, avs=support.av_of('constant-velocity'))
-    rows = np.full((300, 4), np.nan)
+    rows = np.full((300, len(BRAKE)), np.nan)
     rows[80:200] = BRAKE
     first, second = (run_offline(setup, duration_s=3.0, drivers={'av0': ReplayDriver(rows)})
                      for _ in range(2))
