@@ -169,10 +169,8 @@ def _click_into_the_page(page: LivePage) -> None:
     page.run("document.querySelector('#other').remove();")
 
 
-def _claim_again(page: LivePage) -> None:
-    # The page is back before the server has noticed that it was gone, and the seat is free.
-    page.wait('crgame.store.seats.hv0.holder === null', 'the seat to be free')
-    page.claim('hv0')
+def _get_the_seat_back(page: LivePage) -> None:
+    page.wait('crgame.driving.seat === "hv0"', 'the seat that was kept')
 
 
 LEAVINGS = {
@@ -183,7 +181,7 @@ LEAVINGS = {
                            lambda page: page.click('dialog[open] button:not(.danger)')),
     'closed socket': Leaving('connection',
                              lambda page: page.run('crgame.connection.interrupt();'),
-                             _claim_again),
+                             _get_the_seat_back),
 }
 # Notes at which step the hands leave, and what the page says of its hands.
 WATCH = """
