@@ -102,6 +102,7 @@ def measure(folder: Path, game: Path, view: str, trials: int, seconds: float) ->
 def show(browser: Browser, view: str) -> None:
     """Open a view, and let it find its resolution."""
     if view != 'map':
+        browser.wait_for('return Boolean(window.crgame?.ready && crgame.view3d)')
         browser.driver.execute_script(
             f"crgame.view3d.viewpoint = '{view}'; crgame.view3d.show(true)")
         browser.wait_for('return crgame.view3d.on && crgame.view3d.stats.frames > 0')

@@ -37,7 +37,8 @@ def _check_loss(cycles: CycleTable, last_n: int) -> None:
     throttle, brake, steering = cycles.commands('hv0')[:, :3].T
     falling = int(np.flatnonzero(throttle < THROTTLE)[0])
     heard = int(np.flatnonzero(numbers == last_n)[0])
-    assert actual[falling] - actual[heard] > SILENCE_S
+    # The cycle may have begun a little before it was due: what it knows of time is a step long.
+    assert actual[falling] - actual[heard] > SILENCE_S - STEP_NS / 1e9
     # A command may take a while on a busy machine; it never counts for twice the silence more.
     assert actual[falling - 1] - actual[heard] < 3 * SILENCE_S
     assert np.all(throttle[heard:falling] == THROTTLE)
