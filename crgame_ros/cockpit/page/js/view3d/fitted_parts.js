@@ -15,8 +15,6 @@ import { Instances } from './instances.js';
 const BRAKE = 0xff2a16;
 const AMBER = 0xffa000;
 const WHITE = 0xffffff;
-// As indicators flash, in simulation time: all windows of one seat flash together.
-const FLASH_S = 0.7;
 const SHADOW_TEXELS = 32;
 const SHADOW_DARKNESS = 0.55;
 const SHADOW_ABOVE_M = 0.025;
@@ -37,7 +35,6 @@ export class FittedParts {
   #step;
   #pitch;
   #vector;
-  #flashes = false;
 
   /**
    * @param {Three} three
@@ -61,9 +58,8 @@ export class FittedParts {
     this.#shadows = new ShadowInstances(this.#three, this.#group, Math.max(count, 1));
   }
 
-  /** @param {number} t simulation time that is shown [s] */
-  clear(t) {
-    this.#flashes = (((t % FLASH_S) + FLASH_S) % FLASH_S) < FLASH_S / 2;
+  /** Nothing is shown until it is added anew. */
+  clear() {
     for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
       parts?.clear();
     }
@@ -134,7 +130,7 @@ export class FittedParts {
         this.#addLamp(place, (rear[0] - 0.035) * sx, side * rear[1] * sy, rear[2] * sz,
           width * sy, height * sz, BRAKE, own);
       }
-      if (this.#flashes && (side > 0 ? lit.left : lit.right)) {
+      if (side > 0 ? lit.left : lit.right) {
         this.#addLamp(place, (front[0] + 0.035) * sx, side * front[1] * 1.1 * sy, front[2] * sz,
           0.14, 0.1, AMBER, own);
         this.#addLamp(place, (rear[0] - 0.045) * sx, side * rear[1] * 1.1 * sy,

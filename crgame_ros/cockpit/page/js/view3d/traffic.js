@@ -3,6 +3,7 @@
 /** All vehicles and objects as bodies, where they are shown at this moment. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { shining } from '../lights.js';
 import { BrakeLights } from '../world/brake_lights.js';
 import { ofObject, ofVehicle } from './bodies/appearance.js';
 import { FittedParts } from './fitted_parts.js';
@@ -16,10 +17,6 @@ import { Instances } from './instances.js';
 /** @import { Origin } from './local_origin.js' */
 /** @import { Three } from './road/road_world.js' */
 
-const LEFT = 1;
-const RIGHT = 2;
-// The column `lights` of a STATE frame, where there is one.
-const LIGHTS = 12;
 
 /**
  * @typedef {object} Thing
@@ -55,7 +52,7 @@ export class Traffic {
   #origin = { x: 0, y: 0 };
   /** @type {Scene|null} */
   #scene = null;
-  #last_t = NaN;
+  #shown_t = NaN;
 
   /**
    * @param {Three} three
@@ -125,7 +122,7 @@ export class Traffic {
     for (const instances of this.#instances.values()) {
       instances.clear();
     }
-    this.#parts.clear(shown.t);
+    this.#parts.clear();
     for (let i = 0; i < this.#objects.length; i += 1) {
       const row = i * OBJECT_WIDTH;
       const [x, y, yaw, vx, vy] = shown.objects.subarray(row, row + 5);
@@ -145,7 +142,7 @@ export class Traffic {
         own: this.#vehicles[i].id === own, steering: shown.vehicles[row + VEHICLE.steering_angle],
         speed: shown.vehicles[row + VEHICLE.speed],
         brakes: this.#brakeLights.ofVehicle(shown.vehicles, row),
-        lights: VEHICLE_WIDTH > LIGHTS ? shown.vehicles[row + LIGHTS] || 0 : 0,
+        lights: shown.vehicles[row + VEHICLE.lights],
       });
     }
     for (const instances of this.#instances.values()) {
@@ -172,8 +169,8 @@ export class Traffic {
 
   /** @param {number} t simulation time that is shown [s] */
   #elapsed(t) {
-    const dt = t - this.#last_t;
-    this.#last_t = t;
+    const dt = t - this.#shown_t;
+    this.#shown_t = t;
     return Number.isFinite(dt) && Math.abs(dt) < 1 ? dt : 0;
   }
 
@@ -224,7 +221,7 @@ export class Traffic {
     }
     if (body.lamps !== null) {
       this.#parts.addLamps(matrix, body.lamps, scale, {
-        brakes, left: (lights & LEFT) !== 0, right: (lights & RIGHT) !== 0 }, own);
+        brakes, ...shining(lights, this.#shown_t) }, own);
     }
     this.#scaling.set(scale[0], scale[1], scale[2]);
     thing.instances.add(matrix.scale(this.#scaling), this.byRole ? thing.role : look.paint, own);
