@@ -62,7 +62,7 @@ TOOLS = (
     _Tool('evaluate', 'planners x scenarios x recorded humans x seeds, into tables',
           'crgame_ros.evaluation.evaluate_command'),
     _Tool('study', 'experiments with people: plan them, and find mistakes',
-          'crgame_ros.study.study_command'),
+          'crgame_ros.study.conduct.study_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',
           'crgame_ros.analysis.validate_command'),
     _Tool('new', 'a game file for any scenario, with seats for several people',

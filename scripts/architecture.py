@@ -43,9 +43,9 @@ FOLDERS = (
     'planner', 'perception', 'policy', 'traffic', 'simulation', 'recording',
     'analysis/criticality', 'analysis/behaviour', 'analysis/scores', 'analysis/tables',
     'analysis/pictures', 'analysis/report', 'analysis', 'evaluation/results',
-    'evaluation/summary', 'evaluation', 'study', 'cockpit', 'cockpit/runs', 'gym', 'ros',
-    'nodes/sim', 'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher',
-    'analysis/reproduction', 'python_interface', HIGHEST)
+    'evaluation/summary', 'evaluation', 'study', 'study/data', 'cockpit', 'cockpit/runs',
+    'study/desk', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers', 'nodes',
+    'launcher', 'study/conduct', 'analysis/reproduction', 'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].
 CELL, NAMES, TOP = 22, 150, 120
