@@ -46,7 +46,8 @@ class Participant:
         merge = {'name': 'merge', 'game': str(scenarios_directory() / 'merge.yaml')}
         study = read(StudyFile, {
             'name': 'demo', 'settings': settings,
-            'factors': [{'name': 'scene', 'levels': [{'name': 'cut-in', 'planner': 'idm'}, merge]}],
+            'factors': [{'name': 'scene', 'levels': [
+                {'name': 'cut-in', 'planner': 'idm'}, merge]}],
             'blocks': [{'name': 'main', 'order': 'given', 'repetitions': 2}]}, 'study')
         self.folder = folder
         self.session = ParticipantSession(study, folder, 'P01', 0)

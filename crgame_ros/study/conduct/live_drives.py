@@ -24,6 +24,7 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, run_folder
 from crgame_ros.study.conduct.director import Director
+from crgame_ros.study.conduct.disturbance import Disturbance
 from crgame_ros.study.conduct.drive_outcome import clean_s, outcome_of
 from crgame_ros.study.conduct.study_drive import settings_of, StudyDrive, write_drive
 from crgame_ros.study.conduct.study_graph import StudyGraph
@@ -35,6 +36,8 @@ LOOK_S = 0.02
 # A recording is closed within it, and a game loaded [s].
 CLOSES_S = 20.0
 LOADS_S = 60.0
+# Whose page is gone for so long has not driven the trial [s].
+LOST_S = 2.0
 # A graph that dies so often, in so short a time, is left alone [s].
 MAX_DEATHS, DEATHS_S = 3, 120.0
 
@@ -197,10 +200,13 @@ class LiveDrives:
         self._tell(DrivePhase.COUNTDOWN, item.id, attempt=attempt, drive=drive)
         await director.start()
         began_at_s = 0.0
+        disturbance = Disturbance(LOST_S)
         while director.status.run != 'ended':
             if director.status.run == 'running' and not began_at_s:
                 began_at_s = time.time()
                 self._tell(DrivePhase.DRIVING, item.id, attempt=attempt, drive=drive)
+            if began_at_s and self._abort is None:
+                self._abort = disturbance.look(director.status.seats_lost.get(drive.seat, False))
             if self._abort is not None or not self._is_due(item):
                 await self._break_off(item, self._abort)
                 return
