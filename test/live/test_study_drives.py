@@ -52,7 +52,8 @@ class Participant:
         self.folder = folder
         self.session = ParticipantSession(study, folder, 'P01', 0)
         self.loop = asyncio.new_event_loop()
-        self.drives = LiveDrives(self.session, folder, lambda: 'en', 8150, ['--countdown', '0.2'])
+        self.drives = LiveDrives(self.session, folder, lambda: 'en', 8150,
+                                 lambda: ['--countdown', '0.2'])
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._run(),))
         self._page: PageClient | None = None
         self.graphs: list[int] = []

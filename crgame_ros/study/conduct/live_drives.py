@@ -54,11 +54,11 @@ class LiveDrives:
     :param folder: of the participant.
     :param language: gives that of the participant.
     :param port: of the cockpit.
-    :param more: further arguments of the launcher.
+    :param more: gives further arguments of the launcher.
     """
 
     def __init__(self, session: ParticipantSession, folder: Path, language: Callable[[], str],
-                 port: int, more: Sequence[str] = ()) -> None:
+                 port: int, more: Callable[[], Sequence[str]] = tuple) -> None:
         self._session, self._folder, self._language = session, folder, language
         self._port, self._more = port, more
         self._graph: StudyGraph | None = None
@@ -106,8 +106,15 @@ class LiveDrives:
             self._director.tell(subject, text)
 
     async def run(self) -> None:
-        """Prepare and conduct drives until nothing is left to be driven."""
-        while (item := self._next()) is not None:
+        """Prepare and conduct drives until the session is over."""
+        while self._session.next_item is not None:
+            item = self._next()
+            if item is None:
+                # Recordings are finished while people answer what is left.
+                self._tell(DrivePhase.NONE)
+                await self.close()
+                await self._wait()
+                continue
             try:
                 await self._conduct(item)
             except _LostGraphError:
@@ -182,7 +189,7 @@ class LiveDrives:
         runs = self._folder / 'runs'
         number = 1 + max((int(path.name) for path in runs.glob('*') if path.name.isdecimal()),
                          default=0)
-        graph = self._graph = StudyGraph(drive.game, runs / str(number), self._port, self._more)
+        graph = self._graph = StudyGraph(drive.game, runs / str(number), self._port, self._more())
         director = self._director = Director(graph.domain_id)
         await self._until(lambda: bool(graph.cockpit) and director.game is not None, LOADS_S,
                           'the simulation does not start')
