@@ -15,7 +15,7 @@
 """The web server of the cockpit: routes, who is let in, headers, ports."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 import contextlib
 import errno
 from pathlib import Path
@@ -45,10 +45,11 @@ _STALL_CHECK_S = 0.5
 _JSON_BYTES = 256 * 1024
 
 _POLICY = 'Content-Security-Policy'
+_FRAMED_BY = 'frame-ancestors'
 _HEADERS = {
     _POLICY: (
         "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-        "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
+        f"connect-src 'self'; {_FRAMED_BY} 'none'; base-uri 'none'; form-action 'none'"),
     'X-Content-Type-Options': 'nosniff',
     'Referrer-Policy': 'no-referrer',
     'Cross-Origin-Resource-Policy': 'same-origin',
@@ -57,7 +58,7 @@ _HEADERS = {
 
 
 def create_app(backend: Backend, access: Access, library: Library | None, *,
-               page: Path = page_files.PAGE) -> web.Application:
+               page: Path = page_files.PAGE, framed_by: str = '') -> web.Application:
     """
     Make the server's application. It starts the backend, and stops it when it is cleaned up.
 
@@ -65,15 +66,16 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     :param access: who is let in.
     :param library: scenarios that can be chosen; None for none.
     :param page: the folder of the page.
+    :param framed_by: origin of the one page that may show this one within it; empty for none.
     :raises CrgameError: if the page or Plotly is not installed.
     """
-    hub = Hub(backend.mode)
+    hub = Hub(backend.mode, framed_by)
     keeper = Doorkeeper()
     sessions: set[Session] = set()
     app = web.Application(middlewares=[_guard(access, keeper)], client_max_size=_JSON_BYTES)
     app[HUB], app[KEEPER], app[ACCESS] = hub, keeper, access
     app.cleanup_ctx.append(_running(backend, hub))
-    app.on_response_prepare.append(_add_headers)
+    app.on_response_prepare.append(_headers(framed_by))
 
     async def connect(request: web.Request) -> web.WebSocketResponse:
         session = Session(hub, backend)
@@ -160,7 +162,8 @@ async def _answer(access: Access, request: web.Request,
             cookie = access.exchange(request.query['token'], cookie)
         except InputError as error:
             return web.Response(status=403, text=f'{error}\n')
-        answer = web.Response(status=303, headers={'Location': '/'})
+        rest = request.url.without_query_params('token').relative()
+        answer = web.Response(status=303, headers={'Location': str(rest)})
         answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
                           secure=access.tls is not None, max_age=COOKIE_S)
         return answer
@@ -186,13 +189,21 @@ def _refusal(access: Access, request: web.Request, port: int) -> str:
     return ''
 
 
-async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
-    own = response.headers.get(_POLICY)
-    response.headers.update(_HEADERS)
-    if own is not None:
-        response.headers[_POLICY] = own
-    static = request.path.startswith(('/static/', '/three/')) or request.path == page_files.PLOTLY
-    response.headers[hdrs.CACHE_CONTROL] = 'no-cache' if static else 'no-store'
+def _headers(framed_by: str) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
+    headers = dict(_HEADERS)
+    if framed_by:
+        headers[_POLICY] = _HEADERS[_POLICY].replace(
+            f"{_FRAMED_BY} 'none'", f'{_FRAMED_BY} {framed_by}')
+
+    async def add(request: web.Request, response: web.StreamResponse) -> None:
+        own = response.headers.get(_POLICY)
+        response.headers.update(headers)
+        if own is not None:
+            response.headers[_POLICY] = own
+        static = (request.path.startswith(('/static/', '/three/'))
+                  or request.path == page_files.PLOTLY)
+        response.headers[hdrs.CACHE_CONTROL] = 'no-cache' if static else 'no-store'
+    return add
 
 
 def _add_page(app: web.Application, table: Mapping[str, PageFile]) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 import shutil
 import struct
 
-from aiohttp import ClientSession, web, WSMsgType
+from aiohttp import ClientSession, web, WSMsgType, WSServerHandshakeError
 from cockpit_support import (
     close_code,
     cockpit,
@@ -105,6 +105,22 @@ async def test_every_answer_has_the_headers_that_protect_the_page() -> None:
                 kept[path] = answer.headers['Cache-Control']
     assert kept == {'/': 'no-store', '/static/js/main.js': 'no-cache', '/plotly.js': 'no-cache',
                     '/api/scenarios': 'no-store', '/nothing': 'no-store'}
+
+
+@in_loop
+async def test_one_origin_may_show_the_page_and_the_page_is_told_which() -> None:
+    async with cockpit(framed_by='http://127.0.0.1:8070') as running:
+        for path in ('/', '/static/js/main.js', '/nothing'):
+            async with running.http.get(f'{running.address}{path}') as answer:
+                policy = answer.headers['Content-Security-Policy']
+                assert 'frame-ancestors http://127.0.0.1:8070; base-uri' in policy
+                assert policy.startswith("default-src 'self';")
+        joined = await running.join()
+        assert (await next_text(joined, 'hello'))['framed_by'] == 'http://127.0.0.1:8070'
+        # To look is not to talk: its own scripts cannot.
+        with pytest.raises(WSServerHandshakeError):
+            await running.join(Origin='http://127.0.0.1:8070')
+        await joined.close()
 
 
 @in_loop

@@ -301,7 +301,7 @@ export {};
  * What the server sends and the store takes in.
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
- *   version: string, rights: Rights}} HelloMessage
+ *   version: string, rights: Rights, framed_by?: string}} HelloMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
  * @typedef {{type: 'signals', k: number, states: Record<string, string>}} SignalsMessage

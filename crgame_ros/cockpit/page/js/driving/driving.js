@@ -104,7 +104,7 @@ export class Driving {
     if (this.seat !== null && this.seat !== seat) {
       await this.release();
     }
-    return this.#connection.request({ type: 'claim', seat, device: this.#device });
+    return this.#connection.request({ type: 'claim', seat, device: this.device });
   }
 
   /**
@@ -121,16 +121,16 @@ export class Driving {
   }
 
   /** What the hands are on, as the recording names it. */
-  get #device() {
+  get device() {
     const active = this.gamepads?.active;
     return active ? shortName(active.id).slice(0, 60) : 'Keyboard';
   }
 
   /** @param {boolean} [anew] also if the server has heard it before */
   #tellDevice(anew = false) {
-    if (anew || this.#device !== this.#toldDevice) {
-      this.#toldDevice = this.#device;
-      this.#connection.send({ type: 'device', device: this.#device });
+    if (anew || this.device !== this.#toldDevice) {
+      this.#toldDevice = this.device;
+      this.#connection.send({ type: 'device', device: this.device });
     }
   }
 
