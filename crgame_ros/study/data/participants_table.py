@@ -62,6 +62,11 @@ class ParticipantsTable:
             'participants', 'somebody who has begun', ('participant',),
             (*_FIXED, *self._fields.values(), *answers))
 
+    @property
+    def fields(self) -> list[Column]:
+        """Give the columns of what is asked of each participant first."""
+        return list(self._fields.values())
+
     def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, Any]:
         """Give a participant's row."""
         runs = {Path(entry['run']).parts[:2] for entry in record.entries
