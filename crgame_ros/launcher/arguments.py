@@ -76,6 +76,7 @@ class RunRequest:
     :param namespace: of all nodes, topics and services.
     :param no_report: without the report, one HTML file, at the end of each run.
     :param drivers: driver sources of humans by their ids.
+    :param countdown_s: from when all drivers at pages are ready to the start [s]
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
@@ -100,6 +101,7 @@ class RunRequest:
     namespace: str = '/'
     no_report: bool = False
     drivers: tuple[tuple[str, str], ...] = ()
+    countdown_s: float = 3.0
 
 
 class _Parser(argparse.ArgumentParser):
@@ -146,6 +148,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--replay', type=Path, metavar='BAG',
         help='show a recording in the page instead of running a game; goes with --port, --listen '
         'and --token')
+    add('--countdown', type=_countdown, default=3.0, metavar='S', dest='countdown_s',
+        help='seconds from when all drivers at pages are ready to the start (default: 3)')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--namespace', type=_namespace, default='/', metavar='/NAME',
@@ -233,6 +237,13 @@ def _port(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 65535:
         raise argparse.ArgumentTypeError(f'{text} is no port from 1 to 65535')
     return int(text)
+
+
+def _countdown(text: str) -> float:
+    value = _number(text)
+    if not 0.0 <= value <= 60.0:
+        raise argparse.ArgumentTypeError(f'{text} is not within 0 to 60')
+    return value
 
 
 def _factor(text: str) -> float:
