@@ -85,7 +85,8 @@ setup(
     python_requires='>=3.11,<3.13',
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={PACKAGE: ['py.typed', 'cockpit/page/*', 'cockpit/page/**/*',
-                            'analysis/report/page/*', 'evaluation/summary/page/*']},
+                            'analysis/report/page/*', 'evaluation/summary/page/*',
+                            'study/data/page/*']},
     data_files=data_files(),
     zip_safe=False,
     # What is imported, at the versions of requirements.txt. Those that other packages need in turn

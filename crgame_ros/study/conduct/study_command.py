@@ -21,12 +21,15 @@ import sys
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory, scenarios_directory
+from crgame_ros.study.data.study_data_command import add_data_arguments
 
 DESCRIPTION = """\
 Plan an experiment with people: who drives which trials in which order, and what is asked.
 
   crgame study new my_study        # a commented study file, with its pages
   crgame study check my_study/study.yaml
+  crgame study data studies/my_study      # tables of what it has found so far
+  crgame study report studies/my_study    # the same for people, one HTML file
 
 docs/studies.md leads through an example."""
 
@@ -55,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     check.add_argument('--participants', type=int, metavar='N',
                        help='print the orders of so many (default: 4)', default=4)
     check.set_defaults(command=check_command)
+    add_data_arguments(what)
 
 
 def new_command(values: argparse.Namespace) -> int:
