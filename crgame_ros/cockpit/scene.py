@@ -78,7 +78,8 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'drivers': {human.id: human.driver for human in game.humans},
         'planners': {av.id: av.planner for av in game.avs},
         'occupancy': game.occupancy is not None,
-        'events': list(game.event_entries), 'sound': game.sound}
+        'events': list(game.event_entries), 'sound': game.sound,
+        'contact': game.drivability.contact}
     finite: Document = _finite(document)
     return finite
 
