@@ -97,6 +97,8 @@ def _input(message: Mapping[str, Any]) -> dict[str, Any]:
     hands: dict[str, Any] = {'seat': seat, 'reverse': reverse}
     if 'lights' in message:
         hands['lights'] = [_as_flag(each, 'lights') for each in _list(message, 'lights', 4)]
+    if 'put_back' in message:
+        hands['put_back'] = _flag(message, 'put_back')
     if given == ['keys']:
         keys = _list(message, 'keys', 4)
         return {**hands, 'keys': [_as_flag(key, 'keys') for key in keys]}

@@ -156,6 +156,7 @@ export {};
  * @property {GameEvent[]} events
  * @property {GameTask[]} [tasks]
  * @property {string} [language] of what drivers read
+ * @property {'through'|'stop'} contact what a contact does to a vehicle that a person drives
  * @property {'on'|'none'} sound whether pages may sound and gamepads rumble
  * @property {number} [again] counts how often a recording was played
  */
@@ -329,9 +330,9 @@ export {};
 /**
  * What the page sends.
  *
- * @typedef {{away: true}|{keys: number[], reverse: number, lights: number[]}
- *   |{axes: number[], reverse: number, lights: number[]}} Hands  `lights`: which of LIGHT_BUTTONS
- *   are held
+ * @typedef {{away: true}|({keys: number[]}|{axes: number[]}) & {reverse: number, lights: number[],
+ *   put_back: number}} Hands  `lights`: which of LIGHT_BUTTONS are held; `put_back`: whether the
+ *   vehicle is to be put back on its lane
  * @typedef {'start'|'pause'|'step'|'reset'|'stop'} RunAction
  * @typedef {{type: 'input', seat: string} & Hands} InputMessage
  * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
