@@ -15,6 +15,7 @@
 export {};
 
 /** @import { PeopleMessage, Rights, YouMessage } from './people_messages.js' */
+/** @import { Viewpoint } from './view3d/cameras.js' */
 
 /**
  * @typedef {object} Shape
@@ -334,7 +335,11 @@ export {};
  * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
  *   scans?: boolean}} LayersMessage
  * @typedef {{type: 'sound', on: number, volume: number, rumble: number}} SoundMessage
- * @typedef {InputMessage|LayersMessage|SoundMessage|{type: 'name', name: string}
+ * @typedef {{type: 'view', shown: Viewpoint|'map', inset: number, plans: number,
+ *   mirrors: number, bare: number, across_deg: number|null, screen_width_m: number|null,
+ *   eye_distance_m: number|null, width_px: number, height_px: number, ratio: number,
+ *   rate_hz: number|null, renderer: string, software: number}} ViewMessage
+ * @typedef {InputMessage|LayersMessage|SoundMessage|ViewMessage|{type: 'name', name: string}
  *   |{type: 'person', key: string, fresh: boolean}|{type: 'device', device: string}
  *   |{type: 'ping', t: number, round_trip_ms?: number}} TellingMessage
  * @typedef {{type: 'release'|'ask', seat: string}|{type: 'claim', seat: string, device: string}
