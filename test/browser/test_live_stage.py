@@ -21,7 +21,9 @@ import threading
 from typing import Any, NamedTuple
 
 from browser_support import Browser
-from live_browser_support import Graph, live_graph, SCENARIOS, THROTTLE
+from crgame_ros.messages.status_values import read_status
+from live_browser_support import Graph, live_graph, PATIENCE_S, SCENARIOS, THROTTLE
+from live_peer import Peer
 import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -118,6 +120,13 @@ def wait_for_state(browser: Browser, condition: str) -> dict[str, Any]:
     return state(browser)
 
 
+def seen(peer: Peer) -> dict[str, str]:
+    """Give what was recorded last of the picture in the seat."""
+    return next((read_status(status).values
+                 for message in reversed(peer.messages['/diagnostics'])
+                 for status in message.status if status.name == 'cockpit_node: hv0 view'), {})
+
+
 @contextmanager
 def within(browser: Browser) -> Iterator[None]:
     """Look into the frame."""
@@ -206,6 +215,13 @@ def test_a_new_visit_gets_the_seat_again_and_the_view_of_its_address(
     # Nobody can draw it who has not got the library: both are told alike.
     told = wait_for_state(browser, 's.seated && (s.view === "driver" || s.missing3d)')
     assert (told['view'] == 'map') is told['missing3d']
+    shown = {'shown': told['view'], 'bare': 'true', 'plans': 'false', 'inset': 'false',
+             'width_px': '900', 'height_px': '500'}
+    with Peer(graph.launcher.domain, '/diagnostics') as peer:
+        peer.wait_until(lambda: shown.items() <= seen(peer).items(),
+                        'what the page shows to be told', PATIENCE_S)
+        peer.wait_until(lambda: float(seen(peer)['rate_hz'] or 'nan') >= 0.0,
+                        'how often it is drawn', PATIENCE_S)
     with within(browser):
         assert browser.run("""return getComputedStyle(document.querySelector('#world')).display
             === (crgame.view3d.on ? 'none' : 'block')""")

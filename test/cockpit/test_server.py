@@ -35,6 +35,7 @@ from crgame_ros.cockpit import hub, page_files, server, session
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Sound
 from crgame_ros.cockpit.frames import FrameKind
+from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError, InputError
 import pytest
@@ -214,11 +215,16 @@ async def test_names_layers_and_sound_are_kept() -> None:
         socket = await running.join()
         await socket.send_json({'type': 'name', 'name': 'Ada'})
         await socket.send_json({'type': 'sound', 'on': 1, 'volume': 0.5, 'rumble': 0.25})
+        await socket.send_json({
+            'type': 'view', 'shown': 'chase', 'inset': 1, 'plans': 0, 'mirrors': 0, 'bare': 0,
+            'software': 1, 'width_px': 900, 'height_px': 500, 'ratio': 0.5, 'renderer': 'x'})
         await socket.send_json({'type': 'layers', 'predictions': True})
         client = running.hub.clients['c1']
         await wait_until(lambda: client.wants_predictions, 'the layers')
         assert client.name == 'Ada' and not running.backend.commands
         assert client.sound == Sound(True, 0.5, 0.25)
+        assert client.view == SeenView('chase', inset=True, software=True, width_px=900.0,
+                                       height_px=500.0, ratio=0.5, renderer='x')
         # What was not named stays; who wants more gets the newest of it, also in a pause.
         wanted = running.hub.send_frame
         wanted('seen:1', b'12345678', only_if=lambda other: other.perceives_as == 'av0')

@@ -34,12 +34,13 @@ const PARTS = [
   ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
   ['./view3d/view3d.js', 'createView3d', '#stage', 'view3d'],
+  ['./view_report.js', 'createViewReport', '#stage', 'viewReport'],
   ['./world/around.js', 'createAround', '#around', 'around'],
   ['./panels/save_panel.js', 'createSaving', '#panels', 'saving'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
 // Of somebody who only drives.
-const STAGE = ['person', 'driving', 'lobby', 'sound', 'view3d'];
+const STAGE = ['person', 'driving', 'lobby', 'sound', 'view3d', 'viewReport'];
 
 const bare = readStage(window.location.search) !== null;
 document.documentElement.classList.toggle('bare', bare);

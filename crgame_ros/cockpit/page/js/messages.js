@@ -16,6 +16,7 @@ export {};
 
 /** @import { PeopleMessage, Rights, YouMessage } from './people_messages.js' */
 /** @import { GameTask, TaskReportMessage, TasksMessage } from './tasks/task_messages.js' */
+/** @import { Viewpoint } from './view3d/cameras.js' */
 
 /**
  * @typedef {object} Shape
@@ -338,7 +339,12 @@ export {};
  * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
  *   scans?: boolean}} LayersMessage
  * @typedef {{type: 'sound', on: number, volume: number, rumble: number}} SoundMessage
- * @typedef {InputMessage|LayersMessage|SoundMessage|TaskReportMessage|{type: 'name', name: string}
+ * @typedef {{type: 'view', shown: Viewpoint|'map', inset: number, plans: number,
+ *   mirrors: number, bare: number, across_deg: number|null, screen_width_m: number|null,
+ *   eye_distance_m: number|null, width_px: number, height_px: number, ratio: number,
+ *   rate_hz: number|null, renderer: string, software: number}} ViewMessage
+ * @typedef {InputMessage|LayersMessage|SoundMessage|ViewMessage|TaskReportMessage
+ *   |{type: 'name', name: string}
  *   |{type: 'person', key: string, fresh: boolean}|{type: 'device', device: string}
  *   |{type: 'ping', t: number, round_trip_ms?: number}} TellingMessage
  * @typedef {{type: 'release'|'ask', seat: string}|{type: 'claim', seat: string, device: string}
