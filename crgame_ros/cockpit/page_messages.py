@@ -15,6 +15,7 @@
 """The messages of the page: JSON of strangers in, checked mappings or one clear error out."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 import json
 import math
 import re
@@ -23,6 +24,7 @@ import unicodedata
 
 from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.errors import InputError
+from crgame_ros.game.task_documents import LONGEST_MS, MAX_NUMBER, PageTimes
 
 MAX_BYTES = 64 * 1024
 MAX_NAME = 40
@@ -39,6 +41,8 @@ _VEHICLE = re.compile(r'(hv|av)[0-9]{1,3}')
 _AV = re.compile(r'av[0-9]{1,3}')
 _CLIENT = re.compile(r'c[0-9]{1,9}')
 _KEY = re.compile(r'[0-9a-f]{32}')
+_TASK = re.compile(r'[a-z0-9_-]{1,40}')
+_TASK_TIMES = tuple(field.name for field in fields(PageTimes))
 # Control and format characters, surrogates, private use, unassigned, line and paragraph breaks:
 # they hide or reorder what others read. Angle brackets and ampersands are for mark-up only.
 _HIDDEN = frozenset({'Cc', 'Cf', 'Cs', 'Co', 'Cn', 'Zl', 'Zp'})
@@ -202,11 +206,30 @@ def _ping(message: Mapping[str, Any]) -> dict[str, Any]:
     return {'t': _number(message.get('t'), 't'), 'round_trip_ms': delay_ms}
 
 
+def _task(message: Mapping[str, Any]) -> dict[str, Any]:
+    name, number = message.get('task'), message.get('number')
+    if not isinstance(name, str) or _TASK.fullmatch(name) is None:
+        raise _wrong('task', 'is no name of a task')
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= MAX_NUMBER:
+        raise _wrong('number', 'is no number of a stimulus')
+    if message.get('what') not in ('shown', 'answer'):
+        raise _wrong('what', 'is neither shown nor answer')
+    times: dict[str, float | None] = {}
+    for field in _TASK_TIMES:
+        value = message.get(field)
+        times[field] = None if value is None else _number(value, field)
+        if abs(times[field] or 0.0) > LONGEST_MS:
+            raise _wrong(field, f'is not from -{LONGEST_MS:g} to {LONGEST_MS:g}')
+    return {'seat': _matching(message, 'seat', _VEHICLE), 'task': name, 'number': number,
+            'what': message['what'], 'times': times}
+
+
 _READERS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
     'input': _input, 'claim': _claim, 'release': _seat, 'ask': _seat, 'hand_over': _hand_over,
     'answer': _answer, 'ready': _ready, 'person': _person, 'role': _role, 'device': _device,
     'control': _control, 'rate': _rate, 'planner': _planner, 'trigger': _trigger,
-    'name': _name, 'layers': _layers, 'sound': _sound, 'ping': _ping}
+    'name': _name, 'layers': _layers, 'sound': _sound, 'ping': _ping,
+    'task': _task}
 
 
 def _id(message: Mapping[str, Any]) -> int:

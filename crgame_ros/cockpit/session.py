@@ -166,13 +166,13 @@ class Session:
             case _ if refusal and self._backend.mode == 'live':
                 if 'id' in message:
                     self._reply(client, message, False, refusal)
-            case 'input':
+            case 'input' | 'task':
                 try:
                     await self._backend.command(client, message)
                 except CrgameError as error:
                     # Repeated every 50 ms, and sent for a while after a seat was lost: the seats
                     # say who holds them.
-                    _log.debug('input of %s: %s', client.id, error)
+                    _log.debug('%s of %s: %s', message['type'], client.id, error)
             case 'name':
                 client.name = message['name']
             case 'layers':

@@ -19,9 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.recording.recorded_drivers import read_drivers, RecordedDriver
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
+from crgame_ros.recording.recorded_tasks import read_task_entries
 from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
@@ -43,6 +45,7 @@ class RunRecord:
     :param fired: events that took effect, in order.
     :param orders: of the seats, in order; an offline run has none.
     :param drivers: who drove, in order; an offline run does not say it.
+    :param tasks: what happened in the game's tasks, in order.
     """
 
     log: RunLog
@@ -51,6 +54,7 @@ class RunRecord:
     fired: tuple[FiredEvent, ...]
     orders: tuple[SeatOrder, ...] = ()
     drivers: tuple[RecordedDriver, ...] = ()
+    tasks: tuple[TaskEntry, ...] = ()
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -78,16 +82,18 @@ def record_of_log(path: Path, log: RunLog) -> RunRecord:
     fired = read_run_events(path, log.game.epoch).fired
     orders = read_seat_orders(path, log.game.epoch)
     drivers = read_drivers(path, log.game.epoch)
+    tasks = read_task_entries(path, log.game.epoch) if log.game.tasks else ()
     if log.cycles is None:
         return RunRecord(log, np.empty(0, dtype=np.int64),
                          np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired, orders,
-                         drivers)
+                         drivers, tasks)
     ns = log.cycles.column('n').astype(np.int64)
-    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders, drivers)
+    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders, drivers,
+                     tasks)
 
 
 def run_record_of(result: OfflineResult) -> RunRecord:
     """Give the record of an offline run."""
     commands = np.concatenate((result.commands, result.av_commands), axis=1)[1:]
     return RunRecord(run_log_of(result), np.arange(1, len(result.commands)), commands,
-                     result.fired)
+                     result.fired, tasks=result.tasks)

@@ -12,6 +12,7 @@ const PARTS = [
   ['./panels/notices.js', 'createNotices', '#notices', 'notices'],
   ['./person.js', 'createPerson', 'body', 'person'],
   ['./driving/driving.js', 'createDriving', '#hud', 'driving'],
+  ['./tasks/tasks.js', 'createTasks', '#stage', 'tasks'],
   ['./lobby.js', 'createLobby', '#stage', 'lobby'],
   ['./people.js', 'createPeople', '#panel-drive', 'people'],
   ['./run_control.js', 'createRunControl', '#bar', 'runControl'],

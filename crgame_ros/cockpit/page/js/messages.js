@@ -15,6 +15,7 @@
 export {};
 
 /** @import { PeopleMessage, Rights, YouMessage } from './people_messages.js' */
+/** @import { GameTask, TaskReportMessage, TasksMessage } from './tasks/task_messages.js' */
 
 /**
  * @typedef {object} Shape
@@ -153,6 +154,8 @@ export {};
  * @property {Record<string, string>} planners
  * @property {boolean} occupancy whether there is a map of permanent obstacles
  * @property {GameEvent[]} events
+ * @property {GameTask[]} [tasks]
+ * @property {string} [language] of what drivers read
  * @property {'on'|'none'} sound whether pages may sound and gamepads rumble
  * @property {number} [again] counts how often a recording was played
  */
@@ -311,7 +314,7 @@ export {};
  * @typedef {{type: 'files'} & Files} FilesMessage
  * @typedef {{type: 'notice', level: NoticeLevel, text: string}} NoticeMessage
  * @typedef {HelloMessage|SceneMessage|SeatsMessage|SignalsMessage|EventsMessage|AlarmsMessage
- *   |StatusMessage|FilesMessage|NoticeMessage|YouMessage|PeopleMessage} StoreMessage
+ *   |StatusMessage|FilesMessage|NoticeMessage|YouMessage|PeopleMessage|TasksMessage} StoreMessage
  */
 
 /**
@@ -334,7 +337,7 @@ export {};
  * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
  *   scans?: boolean}} LayersMessage
  * @typedef {{type: 'sound', on: number, volume: number, rumble: number}} SoundMessage
- * @typedef {InputMessage|LayersMessage|SoundMessage|{type: 'name', name: string}
+ * @typedef {InputMessage|LayersMessage|SoundMessage|TaskReportMessage|{type: 'name', name: string}
  *   |{type: 'person', key: string, fresh: boolean}|{type: 'device', device: string}
  *   |{type: 'ping', t: number, round_trip_ms?: number}} TellingMessage
  * @typedef {{type: 'release'|'ask', seat: string}|{type: 'claim', seat: string, device: string}

@@ -18,6 +18,7 @@ import { SampleRing } from './samples.js';
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
 /** @import { PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
+/** @import { TasksMessage } from './tasks/task_messages.js' */
 
 // What the last 10 s can be shown from once more: at 100 Hz, and scenario steps at up to 25 Hz.
 const RAW_SAMPLES = 1020;
@@ -44,6 +45,7 @@ const LATE_S = 0.1;
  * @property {SeatsMessage} seats
  * @property {SignalsMessage} signals
  * @property {EventsMessage} events
+ * @property {TasksMessage} tasks
  * @property {StatusMessage} status
  * @property {AlarmsMessage} alarms
  * @property {FilesMessage} files
@@ -71,6 +73,8 @@ export class Store {
   signals = { k: 0, states: {} };
   /** @type {FiredEvent[]} */
   fired = [];
+  /** @type {Omit<TasksMessage, 'type'>} */
+  tasks = { running: [], open: [] };
   /** @type {Status|null} */
   status = null;
   /** @type {Alarm[]} */
@@ -175,6 +179,7 @@ export class Store {
       case 'seats': this.seats = message.seats; break;
       case 'signals': this.signals = message; break;
       case 'events': this.fired = message.fired; break;
+      case 'tasks': this.tasks = message; break;
       case 'alarms': this.alarms = message.active; break;
       case 'status':
         this.status = message;
