@@ -107,7 +107,8 @@ def _events(record: ParticipantRecord,
     for row in rows:
         attempt = ends.get((row['item'], row['attempt']))
         onset = row['wall_s'] - record.begun_at
-        kind, duration, name, value = row['kind'], 0.0, row['name'], row['text']
+        kind, name, value = row['kind'], row['name'], row['text']
+        duration: float | None = row['duration_s'] or 0.0
         if kind in ('trial_finished', 'trial_aborted') and attempt is not None:
             # It is told where it began.
             continue

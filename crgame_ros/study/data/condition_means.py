@@ -76,9 +76,9 @@ def condition_means(values: Mapping[tuple[str, str], float],
                       for person in people], dtype=np.float64).reshape(len(people),
                                                                        len(conditions))
     table[~np.isfinite(table)] = math.nan
-    whole = ~np.isnan(table).any(axis=1)
+    whole = np.asarray(~np.isnan(table).any(axis=1))
     within = len(conditions) > 1 and int(whole.sum()) >= 2
-    used = tuple(person for person, has in zip(people, whole, strict=True) if has) \
+    used = tuple(person for person, has in zip(people, whole.tolist(), strict=True) if has) \
         if within else ()
     halves = within_halves(table[whole]) if within else [
         _half(column[~np.isnan(column)]) for column in table.T]

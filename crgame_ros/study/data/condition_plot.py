@@ -43,8 +43,8 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
         return _TOP + (high - value) / (high - low) * _PLOT
 
     wide = (WIDTH - _LEFT) / len(conditions)
-    marks = [f'<line class="grid" x1="{_LEFT}" x2="{WIDTH}" y1="{y(tick):.1f}" y2="{y(tick):.1f}"/>'
-             f'<text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
+    marks = [f'<line class="grid" x1="{_LEFT}" x2="{WIDTH}" y1="{y(tick):.1f}" '
+             f'y2="{y(tick):.1f}"/><text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
              f'{format(tick, "g").replace("-", "−")}</text>' for tick in ticks]
     for place, each in enumerate(conditions):
         middle = _LEFT + wide * (place + 0.5)
@@ -61,9 +61,11 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
             f'aria-label="{plain(f"{words}; {told}")}">{"".join(marks)}</svg>')
 
 
-def _points(each: ConditionMean, middle: float, wide: float, y: Callable[[float], float]) -> list[str]:
+def _points(each: ConditionMean, middle: float, wide: float,
+            y: Callable[[float], float]) -> list[str]:
     """Draw the participants; those of about equal height beside each other."""
-    marks, taken = [], []
+    marks: list[str] = []
+    taken: list[float] = []
     far = min(_SPREAD, 0.2 * wide)
     for person, value in sorted(each.points.items(), key=lambda item: item[1]):
         height = y(value)

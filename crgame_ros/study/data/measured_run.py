@@ -18,16 +18,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import hashlib
 import json
+import math
 import os
 from pathlib import Path
 import shutil
 from typing import Any
 
-from crgame_ros import __version__
+from crgame_ros.analysis.behaviour.task_events import task_events
 from crgame_ros.analysis.tables.recorded_run import tabulated_runs
-from crgame_ros.analysis.tables.run_tables import TABLES, tables_of
+from crgame_ros.analysis.tables.run_tables import tables_of
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.recording.run_folder import bags_of
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -43,7 +45,8 @@ class MeasuredRun:
 
     :param key: of everything that they depend on.
     :param folder: in which they are.
-    :param summary: what else is told of it: humans, planners, seed, drivers with input delays.
+    :param summary: what else is told of it: humans, planners, seed, drivers with input delays,
+        the events of tasks.
     """
 
     key: str
@@ -123,14 +126,21 @@ def _summary(run: TabulatedRun) -> dict[str, Any]:
         'benchmark_id': game.benchmark_id, 'seed': game.seed, 'epoch': game.epoch,
         'humans': {item.id: item.driver for item in game.humans},
         'planners': {item.id: item.planner for item in game.avs},
-        'input_delay_ms': {item.spell.seat: item.input_delay_ms for item in run.record.drivers}}
+        'input_delay_ms': {item.spell.seat: item.input_delay_ms for item in run.record.drivers},
+        'tasks': [{
+            'kind': str(each.kind), 'what': each.what, 'name': each.name, 'seat': each.seat,
+            'outcome': each.outcome, 'onset_s': each.onset_s,
+            'duration_s': _known(each.duration_s),
+            'response_time_s': _known(each.response_time_s)} for each in task_events(run.record)]}
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _key(run: Path, name: str) -> str:
-    """Hash what a run's tables depend on: the recording, this program, the tables' columns."""
-    digest = hashlib.sha256(f'{__version__}\n{name}\n'.encode())
-    for table in TABLES:
-        digest.update(table.schema.serialize().to_pybytes())
+    """Hash what a run's tables depend on: the recording, and the code that measures it."""
+    digest = hashlib.sha256(f'{engine_digest()}\n{name}\n'.encode())
     for bag in bags_of(run):
         for file in sorted(bag.iterdir()):
             digest.update(f'{bag.name}/{file.name}\n'.encode())

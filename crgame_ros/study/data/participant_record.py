@@ -193,9 +193,6 @@ class ParticipantRecord:
                 yield _ended(openly, 'finished' if kind == SessionEvent.FINISHED else 'aborted',
                              entry, folder)
                 openly = None
-            elif openly is not None and kind == SessionEvent.SKIPPED:
-                yield _ended(openly, 'lost', None, None)
-                openly = None
         if openly is not None:
             yield openly
 

@@ -23,8 +23,8 @@ from typing import Any
 
 from crgame_ros.analysis.report.report_file import software
 from crgame_ros.schema.writing import write
+from crgame_ros.study.data.conducted_study import STUDY
 from crgame_ros.study.data.study_data import StudyData
-from crgame_ros.study.data.study_folder import STUDY
 from crgame_ros.study.data.timing_quality import BOUNDS
 from crgame_ros.study.trial_plan import conditions_of
 

@@ -19,6 +19,7 @@ import fcntl
 from pathlib import Path
 
 from crgame_ros.recording.finish import finish_run
+from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK
 from crgame_ros.study.session_journal import JOURNAL
 
@@ -51,7 +52,9 @@ def finished_recording(folder: Path, participant: Path, say: Callable[[str], obj
     if (folder / FINISHED_MARK).exists():
         return ''
     if session_goes_on(participant):
-        return 'the recording is not finished yet'
+        # What is derived from a closed recording is written later; measures need none of it.
+        closed = (bags_of(folder)[-1] / METADATA_FILE).is_file()
+        return '' if closed else 'the recording is not finished yet'
     say(f'{folder}: finishing what a killed process has left')
     finish_run(folder, lambda line: say(line) if line.startswith('error') else None)
     return ''

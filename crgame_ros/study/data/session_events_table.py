@@ -38,10 +38,15 @@ EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
         Column('item', TEXT, '', 'of the session', empty='it is of none'),
         Column('trial', INTEGER, '1', 'during which, or of which, it was', empty='of none'),
         Column('attempt', INTEGER, '1', 'at the trial', empty='of none'),
-        Column('name', TEXT, '', 'of a marker, a game event or an outcome', empty='it has none'),
-        Column('text', TEXT, '', 'a reason, a note, or what else was told',
+        Column('name', TEXT, '', 'of a marker, a game event, a task or an outcome',
+               empty='it has none'),
+        Column('text', TEXT, '', 'a reason, a note, outcome of a task, or what else was told',
                empty='nothing was'),
         Column('time_s', NUMBER, 's', "when, on the run's clock", empty='no run went on'),
+        Column('duration_s', NUMBER, 's', 'how long what a task did lasted',
+               empty='it is no event of a task'),
+        Column('response_time_s', NUMBER, 's', 'of an event of a task, as task_events has it',
+               empty='there was no response, or it is no event of a task'),
         Column('wall_s', NUMBER, 's', 'when', variant=f'{WALL}; of events of a run it is when '
                "the trial's drive began plus the run's clock, without pauses",
                empty='only the clock of the run is known'),
@@ -106,15 +111,26 @@ def _kind(kind: str, item: SessionItem | None) -> str:
 
 def _of_run(attempt: TrialAttempt, run: MeasuredRun,
             record: ParticipantRecord) -> Iterator[dict[str, Any]]:
-    told = attempt.says('start_at')
-    start_s = float(told) if isinstance(told, int | float) else attempt.started_at
+    start_s = drive_start_s(attempt)
     folder = None if attempt.folder is None else attempt.folder.relative_to(
         record.folder).as_posix()
+    of_trial = {'item': attempt.item, 'trial': attempt.trial.number, 'attempt': attempt.attempt,
+                'recording': folder}
     for event in run.table('events').to_pylist():
-        yield {'kind': GAME_EVENT, 'item': attempt.item, 'trial': attempt.trial.number,
-               'attempt': attempt.attempt, 'name': event['name'], 'text': event['label'],
-               'time_s': event['time_s'], 'wall_s': start_s + event['time_s'],
-               'recording': folder}
+        yield of_trial | {'kind': GAME_EVENT, 'name': event['name'], 'text': event['label'],
+                          'time_s': event['time_s'], 'wall_s': start_s + event['time_s']}
+    for task in run.summary['tasks']:
+        yield of_trial | {'kind': f'{task["kind"]}_{task["what"]}', 'name': task['name'],
+                          'text': task['outcome'], 'time_s': task['onset_s'],
+                          'duration_s': task['duration_s'],
+                          'response_time_s': task['response_time_s'],
+                          'wall_s': start_s + task['onset_s']}
+
+
+def drive_start_s(attempt: TrialAttempt) -> float:
+    """Give when the run's clock began [s since 1970]."""
+    told = attempt.says('start_at')
+    return float(told) if isinstance(told, int | float) and told else attempt.started_at
 
 
 def _text(entry: Mapping[str, Any], key: str) -> str | None:

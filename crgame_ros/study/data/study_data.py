@@ -22,12 +22,12 @@ from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.errors import CrgameError
 from crgame_ros.study.data.answers_table import answer_rows, ANSWERS
 from crgame_ros.study.data.asked_questions import AskedQuestions, trials_by_number
+from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.measured_run import MeasuredRun, MeasuredRuns
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.participants_table import ParticipantsTable
 from crgame_ros.study.data.run_finishing import finished_recording
 from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
-from crgame_ros.study.data.study_folder import StudyFolder
 from crgame_ros.study.data.study_row_table import table_of_rows
 from crgame_ros.study.data.trials_table import TrialsTable
 import pyarrow as pa
@@ -66,7 +66,7 @@ class StudyData:
     :param tables: by name: trials, participants, answers, events.
     """
 
-    folder: StudyFolder
+    folder: ConductedStudy
     asked: AskedQuestions
     trials_table: TrialsTable
     people_table: ParticipantsTable
@@ -87,7 +87,7 @@ class StudyData:
                 for each in self.trials if each.row['problem']]
 
 
-def read_study_data(folder: StudyFolder, say: Callable[[str], object],
+def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
                     progress: Callable[[str, float], object] = lambda _what, _share: None,
                     ) -> StudyData:
     """
@@ -127,7 +127,7 @@ def _answers(data: StudyData) -> Iterator[dict[str, Any]]:
         yield from answer_rows(record, data.asked)
 
 
-def _run(folder: StudyFolder, record: ParticipantRecord, attempt: TrialAttempt,
+def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttempt,
          runs: MeasuredRuns, say: Callable[[str], object],
          progress: Callable[[str, float], object]) -> tuple[MeasuredRun | None, str]:
     """Measure a trial's run; or say why it cannot be."""

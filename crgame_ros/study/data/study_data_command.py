@@ -58,9 +58,9 @@ def data_command(values: argparse.Namespace) -> int:
 
     :raises InputError: if the folder holds no study, or cannot be written.
     """
+    from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
-    from crgame_ros.study.data.study_folder import StudyFolder
-    folder = StudyFolder(values.folder)
+    folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
         data = _read(folder)
         rows = write_study_data(data)
@@ -81,10 +81,10 @@ def report_command(values: argparse.Namespace) -> int:
     :raises InputError: if the folder holds no study, or the file cannot be written.
     """
     from crgame_ros.analysis.report.report_file import check_report_path
+    from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_data_folder import only_writer
-    from crgame_ros.study.data.study_folder import StudyFolder
     from crgame_ros.study.data.study_report import write_study_report
-    folder = StudyFolder(values.folder)
+    folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
         out = values.out or folder.data / 'report.html'
         check_report_path(out)
@@ -99,10 +99,10 @@ def rerun_command(values: argparse.Namespace) -> int:
 
     :raises InputError: if nothing can be repeated, or a planner is none.
     """
+    from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_data_folder import only_writer
-    from crgame_ros.study.data.study_folder import StudyFolder
     from crgame_ros.study.data.study_rerun import rerun_study
-    folder = StudyFolder(values.folder)
+    folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
         data = _read(folder)
         out = values.out or folder.data / 'rerun'

@@ -31,10 +31,10 @@ from crgame_ros.analysis.tables.runs_table import RUNS
 from crgame_ros.analysis.tables.vehicles_table import VEHICLES
 from crgame_ros.errors import InputError
 from crgame_ros.study.data.asked_questions import AskedQuestions
+from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.measured_run import MeasuredRun
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.study_column import flag_column, unlike, with_unit
-from crgame_ros.study.data.study_folder import StudyFolder
 from crgame_ros.study.data.timing_quality import timing_faults
 from crgame_ros.study.trial_plan import PlannedTrial
 
@@ -53,12 +53,15 @@ _DRIVE = (
     Column('attempt', INTEGER, '1', 'which attempt counts, from 1 on', variant='the last that '
            'finished'),
     flag_column('to_repeat', 'whether it is to be driven again and has not been yet'),
-    Column('game', TEXT, '', 'name of the game file'),
+    Column('game', TEXT, '', 'name of the game file, or of the scenario where there is none'),
     Column('vehicle', TEXT, '', 'id of the vehicle that the participant drove'),
     Column('av_planner', TEXT, '', 'planner of the AVs, with + between them if they differ',
            empty=UNMEASURED),
     Column('random_seed', INTEGER, '1', 'of everything random'),
     Column('outcome', TEXT, '', 'how the drive ended', empty='nobody told'),
+    Column('own_contacts', INTEGER, '1', "how often the participant's vehicle touched something",
+           empty='nobody told'),
+    Column('own_departures', INTEGER, '1', 'how often it left the road', empty='nobody told'),
     Column('started', TEXT, '', 'when it was started, ISO 8601, UTC'),
     Column('started_s', NUMBER, 's', 'when it was started', variant=WALL),
     Column('ended_s', NUMBER, 's', 'when its end was noted', variant=WALL),
@@ -108,7 +111,7 @@ class TrialsTable:
     :ivar factors: the columns of the factors, by their names.
     """
 
-    def __init__(self, folder: StudyFolder, asked: AskedQuestions) -> None:
+    def __init__(self, folder: ConductedStudy, asked: AskedQuestions) -> None:
         self._folder, self._asked = folder, asked
         study = folder.study
         self._measures = measure_columns()
@@ -152,9 +155,12 @@ class TrialsTable:
     def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, Any]:
         settings, folder = attempt.trial.condition.settings, attempt.folder
         end_s = attempt.says('end_time_s')
+        place = settings.game or settings.scenario or ''
         row = {'attempt': attempt.attempt, 'to_repeat': attempt.item in record.to_repeat,
-               'game': Path(settings.game or '').name, 'random_seed': settings.seed,
+               'game': Path(place).name, 'random_seed': settings.seed,
                'vehicle': settings.seat, 'outcome': attempt.says('outcome'),
+               'own_contacts': _count(attempt.says('contacts')),
+               'own_departures': _count(attempt.says('departures')),
                'started': utc(attempt.started_at), 'started_s': attempt.started_at,
                'ended_s': attempt.ended_at,
                'run_end_s': end_s if isinstance(end_s, int | float) else None}
@@ -194,6 +200,10 @@ def utc(at_s: float) -> str:
     """Write a time as ISO 8601 does, to the millisecond."""
     return datetime.fromtimestamp(at_s, UTC).isoformat(timespec='milliseconds').replace(
         '+00:00', 'Z')
+
+
+def _count(value: Any) -> int | None:
+    return value if isinstance(value, int) else None
 
 
 def _identity(record: ParticipantRecord, trial: PlannedTrial) -> Mapping[str, Any]:

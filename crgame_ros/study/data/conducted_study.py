@@ -17,16 +17,14 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.errors import InputError
 from crgame_ros.study.data.participant_record import ParticipantRecord, read_participant
 from crgame_ros.study.study_file import load_study, StudyFile
-from crgame_ros.yaml_text import read_yaml
 
 STUDY, PARTICIPANTS, DATA = 'study', 'participants', 'data'
-_REMEDY = 'name the folder that `crgame study run` has made'
 
 
-class StudyFolder:
+class ConductedStudy:
     """
     A study's folder, as `crgame study run` makes it.
 
@@ -37,10 +35,10 @@ class StudyFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if not (path / STUDY).is_dir():
+        self.study_path = path / STUDY / 'study.yaml'
+        if not self.study_path.is_file():
             raise InputError('holds no study' if path.exists() else 'there is no such folder',
-                             str(path), _REMEDY)
-        self.study_path = _study_file(path / STUDY)
+                             str(path), 'name the folder that `crgame study run` has made')
         self.study: StudyFile = load_study(self.study_path)
 
     @property
@@ -65,19 +63,3 @@ class StudyFolder:
         for path in sorted(folder.iterdir()) if folder.is_dir() else ():
             if path.is_dir() and (found := read_participant(self.study, path)) is not None:
                 yield found
-
-
-def _study_file(folder: Path) -> Path:
-    """Find the study among the files that were copied with it."""
-    found = [path for path in sorted(folder.glob('*.y*ml')) if _is_study(path)]
-    if len(found) != 1:
-        raise InputError(f'holds {len(found)} study files instead of one', str(folder), _REMEDY)
-    return found[0]
-
-
-def _is_study(path: Path) -> bool:
-    try:
-        values = read_yaml(path, 'study')
-    except CrgameError:
-        return False
-    return isinstance(values, dict) and {'name', 'blocks'} <= values.keys()
