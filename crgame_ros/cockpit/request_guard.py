@@ -31,10 +31,11 @@ ACCESS = web.AppKey('access', Access)
 COOKIE_S = 12 * 3600
 
 _POLICY = 'Content-Security-Policy'
+_FRAMED_BY = 'frame-ancestors'
 _HEADERS = {
     _POLICY: (
         "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-        "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
+        f"connect-src 'self'; {_FRAMED_BY} 'none'; base-uri 'none'; form-action 'none'"),
     'X-Content-Type-Options': 'nosniff',
     'Referrer-Policy': 'no-referrer',
     'Cross-Origin-Resource-Policy': 'same-origin',
@@ -63,16 +64,23 @@ def guard(access: Access, keeper: Doorkeeper,
 
 
 def header_writer(is_static: Callable[[str], bool], frames: Callable[[web.Request], str] | None
-                  = None) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
+                  = None, framed_by: str = ''
+                  ) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
     """
     Give what writes the headers of every answer.
 
     :param is_static: whether the answer to a path stays the same while its tag does.
     :param frames: addresses of pages that a page may show inside itself; None for none.
+    :param framed_by: origin of the one page that may show this one within it; empty for none.
     """
+    headers = dict(_HEADERS)
+    if framed_by:
+        headers[_POLICY] = _HEADERS[_POLICY].replace(
+            f"{_FRAMED_BY} 'none'", f'{_FRAMED_BY} {framed_by}')
+
     async def write(request: web.Request, response: web.StreamResponse) -> None:
         own = response.headers.get(_POLICY)
-        response.headers.update(_HEADERS)
+        response.headers.update(headers)
         if own is not None:
             response.headers[_POLICY] = own
         elif frames is not None:
@@ -109,7 +117,8 @@ async def _answer(access: Access, request: web.Request,
             cookie = access.exchange(request.query['token'], cookie)
         except InputError as error:
             return web.Response(status=403, text=f'{error}\n')
-        answer = web.Response(status=303, headers={'Location': '/'})
+        rest = request.url.without_query_params('token').relative()
+        answer = web.Response(status=303, headers={'Location': str(rest)})
         answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
                           secure=access.tls is not None, max_age=COOKIE_S)
         return answer

@@ -41,7 +41,7 @@ _JSON_BYTES = 256 * 1024
 
 
 def create_app(backend: Backend, access: Access, library: Library | None, *,
-               page: Path = page_files.PAGE) -> web.Application:
+               page: Path = page_files.PAGE, framed_by: str = '') -> web.Application:
     """
     Make the server's application. It starts the backend, and stops it when it is cleaned up.
 
@@ -49,15 +49,16 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     :param access: who is let in.
     :param library: scenarios that can be chosen; None for none.
     :param page: the folder of the page.
+    :param framed_by: origin of the one page that may show this one within it; empty for none.
     :raises CrgameError: if the page or Plotly is not installed.
     """
-    hub = Hub(backend.mode)
+    hub = Hub(backend.mode, framed_by)
     keeper = Doorkeeper()
     sessions: set[Session] = set()
     app = web.Application(middlewares=[guard(access, keeper)], client_max_size=_JSON_BYTES)
     app[HUB], app[KEEPER], app[ACCESS] = hub, keeper, access
     app.cleanup_ctx.append(_running(backend, hub))
-    app.on_response_prepare.append(header_writer(_is_static))
+    app.on_response_prepare.append(header_writer(_is_static, framed_by=framed_by))
 
     async def connect(request: web.Request) -> web.WebSocketResponse:
         session = Session(hub, backend)

@@ -198,9 +198,13 @@ class ParticipantSession:
             self._add(SessionEvent.FINISHED, item=item.id, answers={}, drives=len(drives))
         return over
 
-    def abort(self, reason: str) -> None:
-        """Say that the present attempt of the next item counts for nothing; it comes again."""
-        self._add(SessionEvent.ABORTED, item=self._now().id, reason=reason)
+    def abort(self, reason: str, item: str = '') -> None:
+        """
+        Say that the present attempt at an item counts for nothing; it comes again.
+
+        :param item: that is left; the next one where empty.
+        """
+        self._add(SessionEvent.ABORTED, item=item or self._now().id, reason=reason)
 
     def skip(self, reason: str) -> None:
         """Leave the next item out, for a reason."""

@@ -15,6 +15,7 @@
 """What a trial is like: settings that cascade from the study to its blocks, levels and trials."""
 
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.game.events import EventList
@@ -31,6 +32,8 @@ class TrialSettings:
     Settings of trials; what is left out stays as it is further out.
 
     :param game: game file.
+    :param scenario: CommonRoad file instead of the game's; without a game anybody drives near its
+        first AV.
     :param seat: the vehicle that the participant drives; the game's first human by default.
     :param planner: of all AVs, instead of the game's.
     :param options: of that planner.
@@ -49,6 +52,7 @@ class TrialSettings:
     FORM: ClassVar[Form] = Form(_SEE)
 
     game: Annotated[str, Named(), Wording(r'[\s\S]+', 'name a game file')] | None = None
+    scenario: Path | None = None
     seat: str | None = None
     planner: Annotated[str, Named(), Wording(r'[\s\S]+', 'name a planner')] | None = None
     options: dict[str, Any] | None = None

@@ -18,6 +18,7 @@ import { SampleRing } from './samples.js';
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
 /** @import { PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
+/** @import { TasksMessage } from './tasks/task_messages.js' */
 
 // What the last 10 s can be shown from once more: at 100 Hz, and scenario steps at up to 25 Hz.
 const RAW_SAMPLES = 1020;
@@ -44,6 +45,7 @@ const LATE_S = 0.1;
  * @property {SeatsMessage} seats
  * @property {SignalsMessage} signals
  * @property {EventsMessage} events
+ * @property {TasksMessage} tasks
  * @property {StatusMessage} status
  * @property {AlarmsMessage} alarms
  * @property {FilesMessage} files
@@ -71,6 +73,8 @@ export class Store {
   signals = { k: 0, states: {} };
   /** @type {FiredEvent[]} */
   fired = [];
+  /** @type {Omit<TasksMessage, 'type'>} */
+  tasks = { running: [], open: [] };
   /** @type {Status|null} */
   status = null;
   /** @type {Alarm[]} */
@@ -84,6 +88,8 @@ export class Store {
   /** @type {HelloMessage['mode']|null} */
   mode = null;
   version = '';
+  /** Origin of the one page that may show this one within it; empty for none. */
+  framedBy = '';
   connected = false;
   round_trip_ms = NaN;
 
@@ -155,6 +161,7 @@ export class Store {
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
         this.version = message.version;
+        this.framedBy = message.framed_by ?? '';
         this.rights = message.rights ?? this.rights;
         this.#fresh = true;
         break;
@@ -175,6 +182,7 @@ export class Store {
       case 'seats': this.seats = message.seats; break;
       case 'signals': this.signals = message; break;
       case 'events': this.fired = message.fired; break;
+      case 'tasks': this.tasks = message; break;
       case 'alarms': this.alarms = message.active; break;
       case 'status':
         this.status = message;
