@@ -21,11 +21,9 @@ end of the first drawn frame that shows a state at least as late as that odometr
 """
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 import json
 from pathlib import Path
-import random
-import socket
 import statistics
 import tempfile
 import threading
@@ -34,161 +32,39 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from crgame_ros.paths import scenarios_directory
+from driven_page import Browser, DrivenPage, free_port, LOGGER, report
 from live_graph import LiveGraph, RemoteControl
-import numpy as np
-from odometry_probe import OdometryProbe
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 import websocket
-
-FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
-         '--disable-background-networking', '--disable-component-update', '--disable-sync',
-         '--window-size=1280,720')
-LOGGER = """
-window.keyTimes = []; window.frameTimes = [];
-addEventListener('keydown', e => keyTimes.push(performance.timeOrigin + e.timeStamp), true);
-(function log() {
-  const shown = window.crgame.world.shown;
-  if (shown) frameTimes.push([performance.timeOrigin + performance.now(), shown.t]);
-  if (frameTimes.length > 2000) frameTimes.splice(0, 1000);
-  requestAnimationFrame(log);
-})();
-"""
-KEYS = {1.0: ('KeyA', 'a', 65), -1.0: ('KeyD', 'd', 68)}
-
-
-class Browser:
-    """
-    A real Chromium that looks at the page.
-
-    :param page: its address.
-    """
-
-    def __init__(self, page: str) -> None:
-        options = webdriver.ChromeOptions()
-        for flag in FLAGS:
-            options.add_argument(flag)
-        options.binary_location = '/usr/bin/chromium'
-        self.driver = webdriver.Chrome(options=options,
-                                       service=Service('/usr/bin/chromedriver'))
-        self.driver.get(page)
-        self.wait_for('return !!(window.crgame && crgame.store.scene && crgame.world.shown)')
-
-    def wait_for(self, script: str, limit_s: float = 30.0) -> None:
-        """Wait until a script gives something true."""
-        until_s = time.monotonic() + limit_s
-        while not self.driver.execute_script(script):
-            if time.monotonic() > until_s:
-                raise SystemExit(f'the page did not come so far: {script}')
-            time.sleep(0.05)
-
-    def drive(self, seat: str) -> None:
-        """Take a seat."""
-        self.driver.execute_script(
-            f"crgame.connection.request({{type: 'claim', seat: '{seat}'}})")
-        self.wait_for(f"return crgame.store.seats.seats?.{seat}?.source === 'cockpit'"
-                      f" || crgame.store.seats.{seat}?.source === 'cockpit'")
-
-    def key(self, direction: float, down: bool) -> None:
-        """Press or release a steering key."""
-        code, key, number = KEYS[direction]
-        self.driver.execute_cdp_cmd('Input.dispatchKeyEvent', {
-            'type': 'keyDown' if down else 'keyUp', 'code': code, 'key': key,
-            'windowsVirtualKeyCode': number})
-
-    def close(self) -> None:
-        """End the browser."""
-        self.driver.quit()
-
-
-def measure_keys(browser: Browser, probe: OdometryProbe, trials: int,
-                 offset_s: float) -> tuple[list[float], list[float]]:
-    """Press steering keys at random times; give latencies to odometry and to the picture [ms]."""
-    draw = random.Random(7)
-    odometry, picture = [], []
-    for trial in range(trials):
-        direction = 1.0 if trial % 2 else -1.0
-        browser.driver.execute_script('keyTimes.length = 0; frameTimes.length = 0;')
-        probe.listen(0.3 + 0.2 * draw.random())
-        browser.key(direction, True)
-        found = probe.wait_for_turn(direction)
-        probe.listen(0.15)
-        browser.key(direction, False)
-        keys = browser.driver.execute_script('return keyTimes')
-        frames = browser.driver.execute_script('return frameTimes')
-        if found is None or not keys:
-            print(f'trial {trial}: nothing came', flush=True)
-            continue
-        stamp, arrived_s = found
-        odometry.append(arrived_s * 1e3 - keys[0])
-        shown = [at for at, t in frames if at > keys[0] and t >= stamp * 1e-9 - offset_s - 1e-6]
-        if shown:
-            picture.append(shown[0] - keys[0])
-    return odometry, picture
 
 
 def latency_run(folder: Path, trials: int) -> None:
     """Measure from the key to odometry and picture."""
-    graph = LiveGraph(folder / 'keys', [
-        str(scenarios_directory() / 'cut_in.yaml'), '--driver', 'idle', '--duration', '100000',
-        '--port', str(free_port())], headless=False)
-    control = RemoteControl()
-    browser = None
-    try:
-        control.wait_until_running()
-        control.deafen()
-        browser = Browser(graph.page())
-        browser.drive('hv0')
-        browser.driver.execute_script(LOGGER)
-        offset_s = browser.driver.execute_script(
-            'return crgame.store.scene.time.clock_offset_s')
-        probe = OdometryProbe()
-        probe.listen(1.0)
-        odometry, picture = measure_keys(browser, probe, trials, offset_s)
-        probe.close()
-        report('key to odometry [ms]', odometry, 'p50 <= 15, p99 <= 30')
-        report('key to picture [ms]', picture, 'p50 <= 50')
-    finally:
-        if browser is not None:
-            browser.close()
-        control.close()
-        graph.kill()
-
-
-def report(name: str, values: Sequence[float], wanted: str) -> None:
-    """Print quantiles of a series."""
-    p50, p99 = np.percentile(values, (50, 99))
-    print(f'{name:34} p50 {p50:7.2f}  p99 {p99:7.2f}  worst {max(values):7.2f}  '
-          f'n {len(values):4}  wanted: {wanted}', flush=True)
+    with DrivenPage(folder / 'keys', [str(scenarios_directory() / 'cut_in.yaml')]) as page:
+        page.sit_down(LOGGER)
+        odometry, picture = page.measure_keys(trials)
+    report('key to odometry [ms]', odometry, 'p50 <= 15, p99 <= 30')
+    report('key to picture [ms]', picture, 'p50 <= 50')
 
 
 def script_run(folder: Path, scenario: Path, seconds: float) -> None:
     """Measure the script time of a frame, following a vehicle and with the whole map in view."""
-    graph = LiveGraph(folder / 'script', [
-        '--scenario', str(scenario), '--driver', 'idle', '--duration', '100000', '--port',
-        str(free_port())], headless=False)
-    browser = None
-    try:
-        browser = Browser(graph.page())
-        size = browser.driver.execute_script(
+    with DrivenPage(folder / 'script', ['--scenario', str(scenario)]) as page:
+        driver = page.browser.driver
+        size = driver.execute_script(
             'return [crgame.store.scene.lanelets.length, crgame.store.scene.objects.length]')
         for view, script in (('following', 'crgame.world.follow(crgame.store.scene.vehicles[0].id'
                               ', true)'), ('whole map', 'crgame.world.fit()')):
-            browser.driver.execute_script(script)
+            driver.execute_script(script)
             time.sleep(2.0)
-            before = browser.driver.execute_script('return crgame.world.stats.frames')
+            before = driver.execute_script('return crgame.world.stats.frames')
             time.sleep(seconds)
-            stats = browser.driver.execute_script(
+            stats = driver.execute_script(
                 'return [crgame.world.stats.frames, Array.from(crgame.world.stats.frame_ms)]')
             count = min(stats[0] - before, len(stats[1]))
             times = [value for value in stats[1] if value > 0.0][-count:]
             report(f'script a frame, {view} [ms]', times, '<= 8')
             print(f'{"":34} {(stats[0] - before) / seconds:.1f} frames/s; {scenario.stem}: '
                   f'{size[0]} lanelets, {size[1]} objects', flush=True)
-    finally:
-        if browser is not None:
-            browser.close()
-        graph.kill()
 
 
 class Listener:
@@ -258,13 +134,6 @@ def timing_run(folder: Path, runs: int, seconds: float) -> None:
             values = [float(item[key]) for item in rows[watched]]
             cells += f'{statistics.median(values):12.4f}{max(values):12.4f}'
         print(f'{key:28}{cells}', flush=True)
-
-
-def free_port() -> int:
-    """Find a port that nobody uses now."""
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return int(probe.getsockname()[1])
 
 
 def main() -> None:

@@ -26,11 +26,8 @@ import statistics
 import tempfile
 import time
 
-from cockpit import Browser, free_port, LOGGER, measure_keys, report
 from crgame_ros.paths import scenarios_directory
-from live_graph import LiveGraph, RemoteControl
-from odometry_probe import OdometryProbe
-import psutil
+from driven_page import Browser, DrivenPage, LOGGER, report
 
 THROTTLE = {'code': 'KeyW', 'key': 'w', 'windowsVirtualKeyCode': 87}
 SOUND = {'code': 'KeyM', 'key': 'm', 'windowsVirtualKeyCode': 77}
@@ -49,32 +46,23 @@ def turn(browser: Browser, sound: bool) -> None:
     browser.wait_for(f'return crgame.sound.on === {str(sound).lower()}')
 
 
-def processor_s(browser: Browser) -> float:
-    """Give the processor time that the browser's processes have used so far [s]."""
-    driver = psutil.Process(browser.driver.service.process.pid)
-    times = [process.cpu_times() for process in driver.children(recursive=True)]
-    return sum(item.user + item.system for item in times)
-
-
 class Blocks:
     """
     Drives from the same start, one after the other.
 
-    :param browser: whose page drives.
-    :param control: of the simulation.
+    :param page: where somebody has a seat.
     :param trials: keys in each block.
     """
 
-    def __init__(self, browser: Browser, control: RemoteControl, trials: int) -> None:
-        self._browser, self._control, self._trials = browser, control, trials
-        self._probe = OdometryProbe()
+    def __init__(self, page: DrivenPage, trials: int) -> None:
+        self._page, self._trials = page, trials
         self.picture_ms: dict[bool, list[float]] = {False: [], True: []}
         self.processor: dict[bool, list[float]] = {False: [], True: []}
 
     def drive(self, sound: bool) -> None:
         """Drive one block."""
-        browser = self._browser
-        self._control.call('reset')
+        browser = self._page.browser
+        self._page.control.call('reset')
         turn(browser, sound)
         press(browser, 'keyDown', THROTTLE)
         # A loaded machine takes a while to begin anew.
@@ -82,17 +70,12 @@ class Blocks:
         browser.wait_for('const { run, t } = crgame.store.status;'
                          "const heard = crgame.sound.heard?.own.id ?? '';"
                          f"return run === 'running' && t > 1 && heard === '{wanted}'")
-        offset_s = browser.driver.execute_script('return crgame.store.scene.time.clock_offset_s')
-        before_s, used_s = time.monotonic(), processor_s(browser)
-        _, picture_ms = measure_keys(browser, self._probe, self._trials, offset_s)
-        used_s = processor_s(browser) - used_s
+        before_s, used_s = time.monotonic(), browser.processor_s()
+        _, picture_ms = self._page.measure_keys(self._trials)
+        used_s = browser.processor_s() - used_s
         self.processor[sound].append(100.0 * used_s / (time.monotonic() - before_s))
         self.picture_ms[sound] += picture_ms
         press(browser, 'keyUp', THROTTLE)
-
-    def close(self) -> None:
-        """Leave the graph."""
-        self._probe.close()
 
 
 def main() -> None:
@@ -101,30 +84,15 @@ def main() -> None:
     parser.add_argument('--rounds', type=int, default=6, help='blocks of each kind')
     parser.add_argument('--trials', type=int, default=20, help='keys in each block')
     values = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        graph = LiveGraph(Path(name) / 'sound', [
-            str(scenarios_directory() / 'cut_in.yaml'), '--driver', 'idle', '--duration',
-            '100000', '--port', str(free_port())], headless=False)
-        control = RemoteControl()
-        browser = None
-        try:
-            control.wait_until_running()
-            control.deafen()
-            browser = Browser(graph.page())
-            browser.wait_for('return crgame.ready')
-            browser.drive('hv0')
-            browser.driver.execute_script(LOGGER)
-            blocks = Blocks(browser, control, values.trials)
-            for number in range(values.rounds):
-                # Who goes first changes: neither has the warmer browser.
-                for sound in (number % 2 == 1, number % 2 == 0):
-                    blocks.drive(sound)
-            blocks.close()
-        finally:
-            if browser is not None:
-                browser.close()
-            control.close()
-            graph.kill()
+    game = str(scenarios_directory() / 'cut_in.yaml')
+    with tempfile.TemporaryDirectory() as name, DrivenPage(Path(name) / 'sound', [game]) as page:
+        page.browser.wait_for('return crgame.ready')
+        page.sit_down(LOGGER)
+        blocks = Blocks(page, values.trials)
+        for number in range(values.rounds):
+            # Who goes first changes: neither has the warmer browser.
+            for sound in (number % 2 == 1, number % 2 == 0):
+                blocks.drive(sound)
     for sound in (False, True):
         words = 'with sound' if sound else 'without sound'
         report(f'key to picture, {words} [ms]', blocks.picture_ms[sound], 'p50 <= 50')

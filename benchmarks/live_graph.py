@@ -37,10 +37,11 @@ class LiveGraph:
     :param folder: folder of the run.
     :param arguments: further arguments of the launcher.
     :param headless: without the cockpit.
+    :param source: the checkout whose program runs; None for the working directory's.
     """
 
-    def __init__(self, folder: Path, arguments: Sequence[str], *,
-                 headless: bool = True) -> None:
+    def __init__(self, folder: Path, arguments: Sequence[str], *, headless: bool = True,
+                 source: Path | None = None) -> None:
         prepare_environment()
         self.folder = folder
         self.domain = free_domain_id()
@@ -53,7 +54,7 @@ class LiveGraph:
         self._process = subprocess.Popen(
             [sys.executable, '-m', 'crgame_ros.launcher.main', '--out', str(folder),
              *(['--headless'] if headless else []), *arguments], stdout=self._stream,
-            stderr=subprocess.STDOUT, env=environment, start_new_session=True)
+            stderr=subprocess.STDOUT, env=environment, cwd=source, start_new_session=True)
 
     @property
     def running(self) -> bool:

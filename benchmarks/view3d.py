@@ -15,23 +15,23 @@
 """
 The 3D view beside the map: how often and how fast it is drawn, key to picture, and table I.
 
-Each view has a live run of its own in a real browser, in turns. What rendered it is stated: a
-browser without a graphics card draws on the processor that the simulation needs, too. Needs what
-benchmarks/cockpit.py needs, and three.js (`crgame cockpit-3d`).
+Each view has a live run of its own in a real browser, in turns, and so has each version where
+`--against` names another one. What rendered it is stated: a browser without a graphics card draws
+on the processor that the simulation needs, too. Needs what benchmarks/cockpit.py needs, and
+three.js (`crgame cockpit-3d`).
 """
 
 import argparse
-import json
+import os
 from pathlib import Path
+import statistics
 import tempfile
 import time
 from typing import Any
 
-from cockpit import Browser, free_port, measure_keys, report
 from crgame_ros.paths import scenarios_directory
-from live_graph import LiveGraph, RemoteControl
+from driven_page import Browser, DrivenPage, report
 import numpy as np
-from odometry_probe import OdometryProbe
 
 VIEWS = ('map', 'driver', 'chase', 'bird')
 # What was drawn, in each animation frame: when, and the simulation time that it shows.
@@ -57,46 +57,24 @@ TABLE = ('mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio', 'busy
          'busy_p99_ms')
 
 
-def measure(folder: Path, game: Path, view: str, trials: int, seconds: float) -> dict[str, Any]:
+def measure(folder: Path, game: Path, view: str, trials: int, seconds: float,
+            source: Path | None) -> dict[str, Any]:
     """Run the game once with a view open; print what it took and give its table I."""
-    graph = LiveGraph(folder / view, [
-        str(game), '--driver', 'idle', '--duration', '100000', '--port', str(free_port())],
-        headless=False)
-    control = RemoteControl()
-    browser = None
-    try:
-        control.wait_until_running()
-        browser = Browser(graph.page())
-        show(browser, view)
+    with DrivenPage(folder, [str(game)], source) as page:
+        show(page.browser, view)
         # Before somebody holds the seat: a seat's holder would have to press start after it.
-        control.call('reset')
-        control.wait_until_running()
-        control.deafen()
-        browser.drive('hv0')
-        browser.driver.execute_script(LOGGER)
+        page.control.call('reset')
+        page.control.wait_until_running()
+        page.sit_down(LOGGER)
+        used_s = page.browser.processor_s()
         time.sleep(seconds)
-        tell(browser, view)
+        tell(page.browser, view, page.browser.processor_s() - used_s)
         if trials > 0:
-            offset_s = browser.driver.execute_script(
-                'return crgame.store.scene.time.clock_offset_s')
-            probe = OdometryProbe()
-            probe.listen(1.0)
-            _, picture = measure_keys(browser, probe, trials, offset_s)
-            probe.close()
+            _, picture = page.measure_keys(trials)
             if not picture:
                 raise SystemExit(f'{view}: no key came to a picture')
             report(f'{view}: key to picture [ms]', picture, 'p50 <= 50')
-        browser.close()
-        browser = None
-        graph.stop()
-        files = sorted((folder / view).glob('timing*.json'))
-        result: dict[str, Any] = json.loads(files[-1].read_text())
-        return result
-    finally:
-        if browser is not None:
-            browser.close()
-        control.close()
-        graph.kill()
+        return page.stop()
 
 
 def show(browser: Browser, view: str) -> None:
@@ -109,8 +87,8 @@ def show(browser: Browser, view: str) -> None:
     time.sleep(5.0)
 
 
-def tell(browser: Browser, view: str) -> None:
-    """Print what was drawn since the logger began."""
+def tell(browser: Browser, view: str, used_s: float) -> None:
+    """Print what was drawn since the logger began, and what processor time that took [s]."""
     frames, scripts, stats, objects = browser.driver.execute_script(
         'return [frameTimes, scriptTimes, crgame.view3d.stats,'
         ' crgame.store.scene.vehicles.length + crgame.store.scene.objects.length]')
@@ -118,7 +96,9 @@ def tell(browser: Browser, view: str) -> None:
     report(f'{view}: from picture to picture [ms]', list(np.diff(times)), 'p50 <= 50')
     report(f'{view}: script of a picture [ms]', scripts, '<= 8')
     rate = (len(times) - 1) / max(times[-1] - times[0], 1.0) * 1e3
-    line = f'{rate:.1f} pictures/s, {objects} vehicles and objects'
+    used = 1e3 * used_s
+    line = (f'{rate:.1f} pictures/s; the browser uses {used / (times[-1] - times[0]):.2f} cores, '
+            f'{used / len(times):.1f} ms a picture; {objects} vehicles and objects')
     if view != 'map':
         cost = 'not measured' if stats['cost_ms'] is None else f'{stats["cost_ms"]:.1f} ms'
         line += (f'; {stats["draw_calls"]} draw calls, {stats["triangles"]} triangles, '
@@ -134,16 +114,29 @@ def main() -> None:
     parser.add_argument('--views', nargs='+', choices=VIEWS, default=['map', 'driver'])
     parser.add_argument('--trials', type=int, default=40, help='key presses in each view')
     parser.add_argument('--seconds', type=float, default=20.0, help='of drawing in each view')
+    parser.add_argument('--against', type=Path, metavar='CHECKOUT',
+                        help='another version of this repository, in turns with this one')
+    parser.add_argument('--rounds', type=int, default=1, help='of all views')
     values = parser.parse_args()
-    tables = {}
+    versions = {'': None} if values.against is None else {'other ': values.against, '': None}
+    tables: dict[str, list[dict[str, Any]]] = {}
     with tempfile.TemporaryDirectory() as name:
-        for view in values.views:
-            print(f'{view}: {values.seconds:.0f} s, then {values.trials} keys …', flush=True)
-            tables[view] = measure(Path(name), values.game, view, values.trials, values.seconds)
-    print(f'\n{"":28}' + ''.join(f'{view:>12}' for view in values.views))
+        for number in range(values.rounds):
+            for view in values.views:
+                for words, source in versions.items():
+                    load = ' '.join(f'{value:.1f}' for value in os.getloadavg()[:2])
+                    print(f'{words}{view}: {values.seconds:.0f} s, then {values.trials} keys; '
+                          f'load {load} …', flush=True)
+                    tables.setdefault(words + view, []).append(measure(
+                        Path(name) / f'{words.strip()}{view}{number}', values.game, view,
+                        values.trials, values.seconds, source))
+    print(f'\nmedian (worst) of {values.rounds}')
     for key in TABLE:
-        print(f'{key:28}' + ''.join(f'{float(tables[view][key]):12.4f}'
-                                    for view in values.views), flush=True)
+        cells = []
+        for words, rows in tables.items():
+            column = [float(row[key]) for row in rows]
+            cells.append(f'{words} {statistics.median(column):.4f} ({max(column):.4f})')
+        print(f'{key:28}' + '  '.join(cells), flush=True)
 
 
 if __name__ == '__main__':

@@ -23,6 +23,7 @@ from typing import Any
 import unicodedata
 
 from crgame_ros.cockpit.rights import ROLES
+from crgame_ros.cockpit.seen_view import SHOWN
 from crgame_ros.errors import InputError
 from crgame_ros.game.task_documents import LONGEST_MS, MAX_NUMBER, PageTimes
 
@@ -30,7 +31,12 @@ MAX_BYTES = 64 * 1024
 MAX_NAME = 40
 MAX_EVENT = 100
 MAX_DEVICE = 60
+MAX_RENDERER = 160
 MAX_DELAY_MS = 60_000.0
+# The most that the numbers of a view can be.
+_VIEW_NUMBERS = {'width_px': 1e5, 'height_px': 1e5, 'ratio': 100.0}
+_VIEW_MEASURES = {'across_deg': 180.0, 'screen_width_m': 20.0, 'eye_distance_m': 20.0,
+                  'rate_hz': 1000.0}
 REAL_TIME_FACTORS = (0.1, 10.0)
 ACTIONS = ('start', 'pause', 'step', 'reset', 'stop')
 # Rounding of a calibrated axis in the page.
@@ -97,6 +103,8 @@ def _input(message: Mapping[str, Any]) -> dict[str, Any]:
     hands: dict[str, Any] = {'seat': seat, 'reverse': reverse}
     if 'lights' in message:
         hands['lights'] = [_as_flag(each, 'lights') for each in _list(message, 'lights', 4)]
+    if 'put_back' in message:
+        hands['put_back'] = _flag(message, 'put_back')
     if given == ['keys']:
         keys = _list(message, 'keys', 4)
         return {**hands, 'keys': [_as_flag(key, 'keys') for key in keys]}
@@ -196,6 +204,19 @@ def _sound(message: Mapping[str, Any]) -> dict[str, Any]:
             'rumble': _share(message, 'rumble')}
 
 
+def _view(message: Mapping[str, Any]) -> dict[str, Any]:
+    """Read what is shown; what nobody knows is left out."""
+    if message.get('shown') not in SHOWN:
+        raise _wrong('shown', f'is none of {", ".join(SHOWN)}')
+    flags = {field: _flag(message, field)
+             for field in ('inset', 'plans', 'mirrors', 'bare', 'software')}
+    numbers = {field: _within(message, field, most) for field, most in _VIEW_NUMBERS.items()}
+    measures = {field: _within(message, field, most) for field, most in _VIEW_MEASURES.items()
+                if message.get(field) is not None}
+    return {'shown': message['shown'], 'renderer': _words(message, 'renderer', MAX_RENDERER),
+            **flags, **numbers, **measures}
+
+
 def _ping(message: Mapping[str, Any]) -> dict[str, Any]:
     delay_ms = message.get('round_trip_ms')
     if delay_ms is None:
@@ -228,7 +249,7 @@ _READERS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
     'input': _input, 'claim': _claim, 'release': _seat, 'ask': _seat, 'hand_over': _hand_over,
     'answer': _answer, 'ready': _ready, 'person': _person, 'role': _role, 'device': _device,
     'control': _control, 'rate': _rate, 'planner': _planner, 'trigger': _trigger,
-    'name': _name, 'layers': _layers, 'sound': _sound, 'ping': _ping,
+    'name': _name, 'layers': _layers, 'sound': _sound, 'view': _view, 'ping': _ping,
     'task': _task}
 
 
@@ -265,6 +286,13 @@ def _share(message: Mapping[str, Any], field: str) -> float:
     return number
 
 
+def _within(message: Mapping[str, Any], field: str, most: float) -> float:
+    number = _number(message.get(field), field)
+    if not 0.0 <= number <= most:
+        raise _wrong(field, f'is not from 0 to {most:g}')
+    return number
+
+
 def _axis(value: Any, low: float) -> float:
     number = _number(value, 'axes')
     if not low - _AXIS_TOLERANCE <= number <= 1.0 + _AXIS_TOLERANCE:
@@ -272,12 +300,12 @@ def _axis(value: Any, low: float) -> float:
     return min(max(number, low), 1.0)
 
 
-def _words(message: Mapping[str, Any], field: str) -> str:
+def _words(message: Mapping[str, Any], field: str, length: int = MAX_DEVICE) -> str:
     """Read a text for others to read; empty where there is none."""
     value = message.get(field, '')
     if not isinstance(value, str):
         raise _wrong(field, 'is no text')
-    return clean_text(value, MAX_DEVICE)
+    return clean_text(value, length)
 
 
 def _flag(message: Mapping[str, Any], field: str) -> bool:

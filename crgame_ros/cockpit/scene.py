@@ -80,6 +80,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'planners': {av.id: av.planner for av in game.avs},
         'occupancy': game.occupancy is not None,
         'events': list(game.event_entries), 'sound': game.sound,
+        'contact': game.drivability.contact,
         'tasks': [_task(task) for task in game.tasks], 'language': game.language}
     finite: Document = _finite(document)
     return finite

@@ -28,6 +28,7 @@ from crgame_ros.cockpit.client import Client, Sound, TokenBucket
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.request_rights import browser_of, granted
 from crgame_ros.cockpit.rights import refusal_of
+from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.errors import CrgameError, InputError
 
 MESSAGES_PER_S = 400.0
@@ -182,6 +183,9 @@ class Session:
                 self._hub.send_wanted(client)
             case 'sound':
                 client.sound = Sound(message['on'], message['volume'], message['rumble'])
+            case 'view':
+                client.view = SeenView(**{key: value for key, value in message.items()
+                                          if key != 'type'})
             case 'person':
                 self._hub.identify(client, message['key'], fresh=message['fresh'])
                 self._backend.joined(client)

@@ -216,7 +216,8 @@ class ScriptedDriver(DriverSource):
         if isinstance(self.timeline, JoyTimeline):
             raw = self.timeline.raw_at(self._time_s)
             held = self.timeline.held.keys_at(self._time_s)
-            return normalize(raw, SCRIPTED_LAYOUT, held.reverse, held.lights)
+            return normalize(raw, SCRIPTED_LAYOUT, held.reverse, held.lights)._replace(
+                put_back=held.put_back)
         for earlier in range(self._cycles.cycle + 1, n):
             self._cycles.command(earlier, self.timeline.keys_at(earlier * dt_s), dt_s)
         return self._cycles.command(n, self.timeline.keys_at(self._time_s), dt_s)
@@ -228,7 +229,7 @@ class ScriptedDriver(DriverSource):
             held = self.timeline.held.keys_at(self._time_s)
             return JoyState(tuple(raw.axes.values()), (
                 int(held.reverse), int(held.left_indicator), int(held.right_indicator),
-                int(held.horn)))
+                int(held.horn), int(held.put_back)))
         return JoyState((), tuple(map(int, self.timeline.keys_at(self._time_s))))
 
     def reset(self) -> None:

@@ -250,7 +250,7 @@ def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
         content = json.loads(text)
         return int(content['epoch']), tuple(
             FiredEvent(str(item['name']), int(item['n']), int(item['k']),
-                       'trigger' if item['by'] == 'trigger' else 'condition')
+                       item['by'] if item['by'] in ('trigger', 'driver') else 'condition')
             for item in content['fired'])
     except MALFORMED as error:
         raise InputError(f'is no list of events ({type(error).__name__}: {error})',

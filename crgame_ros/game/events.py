@@ -294,13 +294,17 @@ class EventSpec:
 EventList = Annotated[tuple[EventSpec, ...], Listed(0, MAX_EVENTS, 'event', 'name')]
 
 
+# No event of a game has a space in its name.
+PUT_BACK = 'put back'
+
+
 @dataclass(frozen=True)
 class FiredEvent:
     """
     An event that took effect.
 
-    :param name: of the event.
-    :param n: simulation step, a tick of the scenario.
+    :param name: of the event; `put back hv0` where a driver had the vehicle put back on its lane.
+    :param n: simulation step; of an event of the game a tick of the scenario.
     :param k: scenario time step.
     :param by: what made it fire.
     """
@@ -308,4 +312,14 @@ class FiredEvent:
     name: str
     n: int
     k: int
-    by: Literal['trigger', 'condition']
+    by: Literal['trigger', 'condition', 'driver']
+
+    @classmethod
+    def put_back(cls, vehicle_id: str, n: int, k: int) -> 'FiredEvent':
+        """Tell that a vehicle stands on its lane at n, and was elsewhere before."""
+        return cls(f'{PUT_BACK} {vehicle_id}', n, k, 'driver')
+
+    @property
+    def vehicle(self) -> str | None:
+        """Name the vehicle that was put back; None of an event of the game."""
+        return self.name.removeprefix(f'{PUT_BACK} ') if self.by == 'driver' else None

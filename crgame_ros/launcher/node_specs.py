@@ -116,6 +116,7 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
             'token': str(request.token).lower(),
             'open_cockpit': str(request.open_cockpit).lower(),
             'certificate': _path(request.certificate), 'key': _path(request.key),
+            'framed_by': f'"{request.framed_by}"',
             'private': f'"{plan.private}"', 'seats': f'[{seats}]',
             'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
             'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"',

@@ -39,9 +39,9 @@ class RunRecord:
     :param log: how everybody moved, at the scenario's steps.
     :param ns: (R) simulation steps n of which is known what led to them, rising; where a recorder
         missed some they are not consecutive.
-    :param commands: (R, V, 5) throttle, brake, steering, reverse and lights that the step from
-        n - 1 to n consumed, of the driven vehicles in the log's order; NaN of an AV that
-        follows its plan.
+    :param commands: (R, V, 6) throttle, brake, steering, reverse, lights and put_back that the
+        step from n - 1 to n consumed, of the driven vehicles in the log's order; NaN of an AV
+        that follows its plan.
     :param fired: events that took effect, in order.
     :param orders: of the seats, in order; an offline run has none.
     :param drivers: who drove, in order; an offline run does not say it.
@@ -60,6 +60,28 @@ class RunRecord:
     def times_s(self) -> NDArray[np.float64]:
         """Give the simulated time of the commands since the run's start (R) [s]."""
         return np.asarray(self.ns * self.log.game.scheduler.dt_s)
+
+    @property
+    def put_back(self) -> dict[str, tuple[int, ...]]:
+        """Give the last steps k before vehicles were put back on their lane, by vehicle."""
+        scheduler = self.log.game.scheduler
+        found: dict[str, tuple[int, ...]] = {}
+        for event in self.fired:
+            if event.vehicle is not None:
+                k = scheduler.k0 + (event.n - 1) // scheduler.steps_per_tick
+                found[event.vehicle] = (*found.get(event.vehicle, ()), k)
+        return found
+
+    def ways(self) -> NDArray[np.float64]:
+        """Give how far each driven vehicle has come (V) [m], but for where it was put back."""
+        log = self.log
+        steps = np.hypot(*np.moveaxis(np.diff(log.vehicle_states[..., :2], axis=0), -1, 0))
+        for vehicle, ks in self.put_back.items():
+            column = [item.id for item in log.vehicles].index(vehicle)
+            for row in np.searchsorted(log.ks, ks).tolist():
+                # Its own time may be a step behind; it stands before and after.
+                steps[row:row + 2, column] = 0.0
+        return np.asarray(steps.sum(axis=0))
 
 
 def read_run_record(path: Path, epoch: int | None = None,

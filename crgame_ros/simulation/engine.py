@@ -19,7 +19,7 @@ from dataclasses import replace
 import hashlib
 from itertools import chain
 from struct import Struct
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
@@ -37,6 +37,7 @@ from crgame_ros.simulation.av_models import (
 )
 from crgame_ros.simulation.contact_stop import at_rest, ContactStop
 from crgame_ros.simulation.plan_requests import PlanRequests
+from crgame_ros.simulation.put_back import PutBack
 from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.run_tasks import RunTasks
@@ -60,7 +61,7 @@ class StepResult(NamedTuple):
     :param tick: True where k has just advanced; only then are objects and requests given.
     :param requests: the plan requests to send, by AV id.
     :param objects: poses of everything that is no driven vehicle.
-    :param fired: the events that took effect at this tick.
+    :param fired: the events that took effect in this step.
     :param agents_k: tick whose agents the objects show, less than k if traffic is late; None
         without agents.
     :param tasks: what has happened in the game's tasks since the step before.
@@ -123,8 +124,10 @@ class Simulation:
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
         self._driven = (*self.humans, *self.avs)
-        self._contact_stop = ContactStop(setup) \
-            if setup.game.drivability.contact == 'stop' else None
+        stops = setup.game.drivability.contact == 'stop'
+        self._contact_stop = ContactStop(setup) if stops else None
+        self._put_back = PutBack(setup)
+        self._put_back_events: tuple[FiredEvent, ...] = ()
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
         self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
@@ -211,7 +214,8 @@ class Simulation:
     @property
     def fired(self) -> tuple[FiredEvent, ...]:
         """All events that have taken effect so far."""
-        return () if self._events is None else self._events.fired
+        of_game = () if self._events is None else self._events.fired
+        return tuple(sorted((*self._put_back_events, *of_game), key=lambda event: event.n))
 
     def step(self, dt_eff_s: float, commands: Sequence[DriverCommand | None]) -> StepResult:
         """
@@ -253,16 +257,31 @@ class Simulation:
             contacts.set_objects(self._world.objects)
         for index in contacts.stopped(since_tick * self.scheduler.dt_s, before, self.states):
             driven = self._driven[index]
-            if isinstance(driven, HumanVehicle) or (
-                    isinstance(driven, AutonomousVehicle) and driven.driven):
+            if _has_driver(driven):
                 driven.stand(at_rest(before[index], driven.state))
+                self._put_back.note(index, driven.state)
+        for index, command in enumerate(self.commands):
+            if command is not None and command.put_back:
+                self._put_on_lane(index, since_tick * self.scheduler.dt_s)
+
+    def _put_on_lane(self, index: int, since_tick_s: float) -> None:
+        """Put a vehicle back that a contact has stopped, if there is room."""
+        driven = self._driven[index]
+        if not _has_driver(driven):
+            return
+        place = self._put_back.place(index, since_tick_s, self.states, self._world.objects)
+        if place is not None:
+            driven.stand(place)
+            self._put_back_events += (FiredEvent.put_back(
+                self.setup.vehicle_ids[index], self.n, self.scheduler.k(self.n)),)
 
     def conclude(self) -> StepResult:
         """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
         result = self._result()
         self._add_to_hash()
-        return result
+        put_back = tuple(event for event in self._put_back_events if event.n == self.n)
+        return result._replace(fired=(*put_back, *result.fired)) if put_back else result
 
     def _result(self) -> StepResult:
         k = self.scheduler.k(self.n)
@@ -326,6 +345,13 @@ class Simulation:
     def state_hash(self) -> str:
         """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""
         return self._hash.hexdigest()
+
+
+def _has_driver(driven: HumanVehicle | TracedVehicle | AutonomousVehicle
+                ) -> TypeGuard[HumanVehicle | AutonomousVehicle]:
+    """Tell whether a person drives a vehicle now; traces go on, and so do plans."""
+    return isinstance(driven, HumanVehicle) or (
+        isinstance(driven, AutonomousVehicle) and driven.driven)
 
 
 def _road_limit(setup: Setup, av: AvSetup) -> RoadLimit | None:

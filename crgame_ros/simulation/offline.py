@@ -78,8 +78,8 @@ class OfflineResult:
     :param vehicle_states: (n + 1, V, 8) states of humans, then AVs, at every step.
     :param object_poses: (ticks, M, 3) centre poses at every tick.
     :param object_velocities: (ticks, M, 3) their derivatives.
-    :param commands: (n + 1, H, 5) throttle, brake, steering, reverse and lights; row i was
-        consumed by the step that led to state i, row 0 by none.
+    :param commands: (n + 1, H, 6) throttle, brake, steering, reverse, lights and put_back; row i
+        was consumed by the step that led to state i, row 0 by none.
     :param intervals_s: (n + 1, V) interval over which each vehicle was moved in that step: Delta
         t_eff where somebody drives it, else the nominal step [s]
     :param planners: what each AV's planner did.
@@ -87,7 +87,7 @@ class OfflineResult:
     :param fired: events that took effect, in order.
     :param stop: the human's violation that ended the run, where the game has it so; its n is that
         of the last state.
-    :param av_commands: (n + 1, A, 5) the same commands of those who took over an AV; NaN while it
+    :param av_commands: (n + 1, A, 6) the same commands of those who took over an AV; NaN while it
         followed its plan.
     :param tasks: what happened in the game's tasks, in order.
     """

@@ -233,6 +233,53 @@ def test_the_map_rests_while_it_is_covered_and_few_calls_draw_the_view(page: Bro
     assert page.run_async('return await crgame.view3d.show(true)')
 
 
+def test_what_a_camera_cannot_see_is_left_out_and_nothing_else(page: Browser) -> None:
+    """The same pixels as with everything handed over, of a fraction of the triangles."""
+    found = page.run_async("""
+        const { Frustum } = await import('/three/three.module.js');
+        const { picture } = crgame.view3d;
+        const size = [picture.stats.width, picture.stats.height];
+        picture.sharp = true;
+        picture.resize(320, 180);
+        const context = document.querySelector('#view3d').getContext('webgl2');
+        const shown = crgame.store.displayed(performance.now());
+        const draw = (viewpoint, aside) => {
+          const triangles = [];
+          // Each mirror once.
+          for (let i = 0; i < 3; i += 1) {
+            picture.draw(shown, 0, { viewpoint, index: 0, aside, height: 0.8, mirrors: true,
+              plans: false });
+            triangles.push(picture.stats.triangles);
+          }
+          const { drawingBufferWidth: width, drawingBufferHeight: height } = context;
+          const pixels = new Uint8Array(4 * width * height);
+          context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, pixels);
+          return { pixels, triangles: Math.max(...triangles) };
+        };
+        const views = [['driver', 0], ['driver', 1.2], ['driver', Math.PI], ['chase', 0],
+          ['bird', 0]];
+        const chosen = views.map((view) => draw(...view));
+        const { setFromProjectionMatrix: original } = Frustum.prototype;
+        Frustum.prototype.setFromProjectionMatrix = function everything(...given) {
+          original.apply(this, given);
+          this.planes.forEach((plane) => { plane.constant = 1e9; });
+          return this;
+        };
+        const all = views.map((view) => draw(...view));
+        Frustum.prototype.setFromProjectionMatrix = original;
+        picture.sharp = false;
+        picture.resize(...size);
+        return chosen.map(({ pixels, triangles }, i) => ({
+          share: triangles / all[i].triangles,
+          other: pixels.filter((value, k) => Math.abs(value - all[i].pixels[k]) > 2).length,
+          colors: new Set(pixels.filter((_, k) => k % 4 === 1)).size,
+        }));""")
+    for view in found:
+        assert view['other'] == 0
+        assert view['share'] < 0.7
+        assert view['colors'] > 10
+
+
 def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
     """The page says so; when the context is back, pictures are what they were."""
     page.run("""

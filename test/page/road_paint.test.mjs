@@ -198,10 +198,27 @@ test('400 lanelets take few meshes and few triangles', () => {
   // A polygon of n points has n - 2 triangles, however it is cut.
   const triangulate = (ring) => new Array(3 * (ring.length / 2 - 2)).fill(0);
   const roads = buildRoads(scene, { x: 500, y: 500 }, index, FLAT, triangulate);
-  const land = buildLand(scene, { x: 500, y: 500 }).parts;
-  // With sky, five kinds beside the road, signs, lights and obstacles: 13 more.
-  assert.ok(roads.length + 13 <= 60, `${roads.length} chunks`);
-  const triangles = roads.reduce((sum, parts) => sum + parts.triangles, land.triangles);
+  const land = buildLand(scene, { x: 500, y: 500 }).tiles;
+  // With sky, five kinds beside the road, two of them plain, too, signs, lights, obstacles: 15.
+  assert.ok(roads.length + land.length + 15 <= 60, `${roads.length}, ${land.length} chunks`);
+  const triangles = [...roads, ...land].reduce((sum, parts) => sum + parts.triangles, 0);
   // Trees and the like take 70,000 at most.
   assert.ok(triangles + 70_000 <= 150_000, `${triangles} triangles`);
+});
+
+test('tiles of the land leave no gap and lie on no other', () => {
+  const { tiles } = buildLand(town(), { x: 500, y: 500 });
+  const areas = tiles.flatMap(({ positions, indices }) => Array.from(
+    { length: indices.length / 3 }, (_, i) => {
+      const [[ax, ay], [bx, by], [cx, cy]] = [0, 1, 2].map(
+        (k) => positions.slice(3 * indices[3 * i + k], 3 * indices[3 * i + k] + 2));
+      return ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2;
+    }));
+  // Each is seen from above, and together they are the square around the map.
+  assert.ok(areas.every((area) => area > 0));
+  const xs = tiles.flatMap(({ positions }) => positions.filter((_, i) => i % 3 === 0));
+  const edge = Math.max(...xs) - Math.min(...xs);
+  assert.ok(edge >= 1000 + 2 * 1200);
+  const sum = areas.reduce((total, area) => total + area, 0);
+  assert.ok(Math.abs(sum / edge ** 2 - 1) < 1e-9, `${sum} of ${edge ** 2}`);
 });

@@ -11,9 +11,11 @@ const { acrossAngle, heightAngle, readSeat, trueAngle } = await import(
   `${VIEW}/field_of_view.js`);
 const { localOrigin } = await import(`${VIEW}/local_origin.js`);
 const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirror_optics.js`);
-const { isSoftware, Quality } = await import(`${VIEW}/quality.js`);
+const { DETAILS, isSoftware, Quality } = await import(`${VIEW}/quality.js`);
+const { isWithin } = await import(`${VIEW}/seen_instances.js`);
 const { readViewWindow } = await import(`${VIEW}/view_window.js`);
 const { MeshBuilder } = await import(`${VIEW}/bodies/mesh_builder.js`);
+const { plainBody } = await import(`${VIEW}/bodies/plain_bodies.js`);
 const { ofObject, ofVehicle } = await import(`${VIEW}/bodies/appearance.js`);
 
 const DEGREE = Math.PI / 180;
@@ -130,6 +132,87 @@ test('the quality finds a ratio whose pictures cost what they may', () => {
   assert.ok(isSoftware('ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (Subzero)))'));
   assert.ok(isSoftware('llvmpipe (LLVM 15.0.7, 256 bits)'));
   assert.ok(!isSoftware('ANGLE (NVIDIA Corporation, NVIDIA GeForce RTX 3060/PCIe/SSE2)'));
+});
+
+test('detail is left out where pictures are too dear, and comes back where they are not', () => {
+  for (const software of [true, false]) {
+    const quality = new Quality(software, 1);
+    let now_ms = 0;
+    const settle = (cost_ms) => {
+      for (let i = 0; i < 400; i += 1) {
+        quality.take(cost_ms, now_ms);
+        now_ms += 500;
+      }
+    };
+    settle(100);
+    assert.equal(quality.detail, DETAILS[DETAILS.length - 1]);
+    assert.ok(quality.ratio <= 0.25);
+    settle(1);
+    assert.equal(quality.detail, DETAILS[0]);
+    assert.equal(quality.ratio, 1);
+    settle(100);
+    quality.sharp = true;
+    assert.equal(quality.detail, DETAILS[0]);
+  }
+});
+
+test('a quality that was too dear is tried again ever more rarely', () => {
+  const quality = new Quality(true, 1);
+  const cost = () => (quality.ratio > 0.45 ? 40 : 5);
+  const tries = [];
+  for (let now_ms = 0; now_ms < 600_000; now_ms += 500) {
+    const before = quality.ratio;
+    quality.take(cost(), now_ms);
+    if (quality.ratio > before) {
+      tries.push(now_ms);
+    }
+  }
+  assert.ok(tries.length >= 3 && tries.length <= 6, `${tries}`);
+  for (let i = 2; i < tries.length; i += 1) {
+    assert.ok(tries[i] - tries[i - 1] > 1.8 * (tries[i - 1] - tries[i - 2]), `${tries}`);
+  }
+});
+
+test('pictures of a processor come less often when each takes long, yet 20 times a second', () => {
+  const quality = new Quality(true, 1);
+  quality.take(5, 0);
+  assert.equal(quality.period_ms, 33);
+  quality.take(20, 100);
+  assert.equal(quality.period_ms, 40);
+  quality.take(500, 200);
+  assert.equal(quality.period_ms, 50);
+});
+
+test('a ball is within planes while any part of it is', () => {
+  // A cube from -1 to 1.
+  const planes = new Float64Array([1, 0, 0, 1, -1, 0, 0, 1, 0, 1, 0, 1, 0, -1, 0, 1, 0, 0, 1, 1,
+    0, 0, -1, 1]);
+  assert.ok(isWithin(planes, 0, 0, 0, 0));
+  assert.ok(isWithin(planes, 1.4, 0, 0, 0.5));
+  assert.ok(!isWithin(planes, 1.6, 0, 0, 0.5));
+  assert.ok(!isWithin(planes, 0, 0, -1.6, 0.5));
+});
+
+test('plain bodies are as large as the others, of few triangles', () => {
+  const rectangle = (length, width) => ({ kind: 'rectangle', length, width, vertices: [] });
+  for (const [type, length] of [['car', 4.5], ['car', 6], ['truck', 12], ['bus', 12]]) {
+    const look = ofObject({ id: '7', type, role: 'recorded', shape: rectangle(length, 2) });
+    const body = look.build();
+    const plain = plainBody(look.key, body);
+    assert.ok(plain.triangles < 100 && plain.triangles < 0.6 * body.mesh.triangles, look.key);
+    const most = [0, 0, 0];
+    for (const painted of [true, false]) {
+      plain.arrays(painted).positions.forEach((value, i) => {
+        most[i % 3] = Math.max(most[i % 3], Math.abs(value));
+      });
+    }
+    near(2 * most[0], body.length, 0.15, look.key);
+    near(2 * most[1], body.width, 0.1, look.key);
+    near(most[2], body.height, 0.1, look.key);
+  }
+  const walker = ofObject({ id: '8', type: 'pedestrian', role: 'recorded',
+    shape: rectangle(0.5, 0.5) });
+  assert.equal(plainBody(walker.key, walker.build()), null);
 });
 
 test('an address says what a window shows', () => {

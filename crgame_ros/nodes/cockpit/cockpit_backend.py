@@ -26,9 +26,9 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.task_documents import PageTimes, TaskReport
 from crgame_ros.nodes.cockpit.cockpit_feed import CockpitFeed
 from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.nodes.cockpit.page_report import PageReport
 from crgame_ros.nodes.cockpit.people_feed import PeopleFeed
 from crgame_ros.nodes.cockpit.seat_desk import SeatDesk
-from crgame_ros.nodes.cockpit.sound_report import SoundReport
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.spinning import attempt
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -64,7 +64,7 @@ class LiveBackend:
         self._runs = runs
         self._endpoints = Endpoints(node)
         self._orders = CockpitOrders(node, self._endpoints)
-        self._sound_report = SoundReport(self._endpoints.diagnostics)
+        self._page_report = PageReport(self._endpoints.diagnostics)
         self._seat_slot = self._endpoints.polled('/seats')
         self._served_s = 0.0
         self._lost: dict[str, bool] = {}
@@ -123,7 +123,7 @@ class LiveBackend:
         self._desk.serve()
         self._people.tell(time.monotonic())
         if self._feed.scenario is not None:
-            self._sound_report.tell(
+            self._page_report.tell(
                 self._desk.table.held.values(), self._hub.clients,
                 self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 

@@ -333,9 +333,6 @@ class LiveRun:
 
     def _at_tick(self, result: StepResult) -> None:
         """Do what is due with the scenario's time."""
-        for event in result.fired:
-            self._node.get_logger().info(
-                f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
         if result.agents_k is not None and result.agents_k < result.k:
             self._diagnostics.late_traffic(result.n, result.k, result.agents_k)
         order = self._inputs.frame_skip_order()

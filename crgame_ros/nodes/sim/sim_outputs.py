@@ -202,6 +202,9 @@ class SimOutputs:
         if result.fired:
             # It may change the planner that the request is for.
             self.publish_events(simulation.fired)
+            for event in result.fired:
+                self._node.get_logger().info(
+                    f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
         for av_id, request in result.requests.items():
             self._publish_request(av_id, request)
         if result.tasks:

@@ -88,6 +88,8 @@ export class Store {
   /** @type {HelloMessage['mode']|null} */
   mode = null;
   version = '';
+  /** Origin of the one page that may show this one within it; empty for none. */
+  framedBy = '';
   connected = false;
   round_trip_ms = NaN;
 
@@ -159,6 +161,7 @@ export class Store {
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
         this.version = message.version;
+        this.framedBy = message.framed_by ?? '';
         this.rights = message.rights ?? this.rights;
         this.#fresh = true;
         break;

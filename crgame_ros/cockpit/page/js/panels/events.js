@@ -13,7 +13,7 @@ import { icon } from './icons.js';
 /** @import { Store } from '../store.js' */
 
 /** @type {Record<string, string>} */
-const BY = { trigger: 'by button', condition: 'by its condition' };
+const BY = { trigger: 'by button', condition: 'by its condition', driver: 'by its driver' };
 
 /**
  * Make the panel.

@@ -30,7 +30,7 @@ const FINAL_NAMES = { final_error_ms: 'Lag at the end' };
  * @typedef {{phase: 'driver', seat: string, run: RunState, holder: string|null,
  *   holderName: string, me: string}} Awaiting
  * @typedef {{phase: 'ready'|'none', run: RunState, mine: string|null}} Ready
- * @typedef {{phase: 'mishap', run: RunState, text: string}} Mishap
+ * @typedef {{phase: 'mishap', run: RunState, text: string, stopped: boolean}} Mishap
  * @typedef {{phase: 'none', run?: undefined}|{phase: 'closed'}|Over|Awaiting|Ready|Mishap} Facts
  */
 
@@ -48,6 +48,7 @@ class Outcome {
   #scores = new Map();
   #told = 0;
   #mishapTimer = 0;
+  #fired = 0;
 
   /**
    * @param {HTMLElement} root
@@ -68,6 +69,15 @@ class Outcome {
     }
     store.on('epoch', () => {
       this.#told = 0;
+    });
+    store.on('events', ({ fired }) => {
+      // Back on the lane: the notice of the contact has served.
+      const mine = window.crgame.driving?.seat;
+      if (mine && fired.some(({ name, by }) => by === 'driver' && name.endsWith(` ${mine}`))
+          && fired.length > this.#fired) {
+        this.#dismiss();
+      }
+      this.#fired = fired.length;
     });
     this.#show();
   }
@@ -125,7 +135,9 @@ class Outcome {
     const mine = Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null;
     const mishaps = mine === null || !connected ? [] : mishapsOf(status, mine);
     if (mishaps.length > this.#told) {
-      return { phase: 'mishap', run: status.run, text: mishaps[mishaps.length - 1].text };
+      const { text, touched } = mishaps[mishaps.length - 1];
+      return { phase: 'mishap', run: status.run, text,
+        stopped: touched && scene.contact === 'stop' };
     }
     if (!connected || status.n !== 0 || !['waiting', 'paused'].includes(status.run)) {
       return { phase: 'none' };
@@ -192,12 +204,15 @@ class Outcome {
    * @param {Mishap} facts
    * @returns {Node[]}
    */
-  #mishap({ run, text }) {
+  #mishap({ run, text, stopped }) {
     clearTimeout(this.#mishapTimer);
     if (run === 'running') {
       this.#mishapTimer = setTimeout(() => this.#dismiss(), MISHAP_MS);
     }
     return [icon('warn'), element('span', { role: 'status', text }),
+      ...(stopped && run === 'running' ? [this.#button('put_back', 'Put back on the lane',
+        () => window.crgame.driving?.putBack(), 'At rest, where its lane is free (Backspace)',
+        'drive-button primary')] : []),
       this.#button('look', run === 'running' ? 'Pause and look again' : 'Look again',
         () => this.#lookAgain(run), 'The last 10 s once more', 'drive-button'),
       this.#button('again', 'Begin anew', () => this.#order('reset'),
@@ -342,10 +357,10 @@ class Outcome {
 function mishapsOf({ contacts = [], departures = [] }, mine) {
   return [
     ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map((item) => ({
-      t: item.t, text: `You touched ${item.vehicle === mine ? item.with : item.vehicle} at `
+      t: item.t, touched: true, text: `You touched ${item.vehicle === mine ? item.with : item.vehicle} at `
         + `${clockTime(item.t)}.` })),
     ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
-      t, text: `You left the road at ${clockTime(t)}.` })),
+      t, touched: false, text: `You left the road at ${clockTime(t)}.` })),
   ].sort((a, b) => a.t - b.t);
 }
 

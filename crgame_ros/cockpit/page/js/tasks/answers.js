@@ -72,9 +72,9 @@ export class Answers {
   #key(event) {
     const free = !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
       && !document.querySelector('dialog[open]');
-    if (event.code === ANSWER_KEY && free && this.#wanted()) {
+    if (event.key === ANSWER_KEY && free && this.#wanted()) {
       event.preventDefault();
-      event.stopImmediatePropagation();
+      event.stopPropagation();
       if (!event.repeat) {
         this.#take(event.timeStamp);
       }

@@ -11,7 +11,7 @@
  * @property {'detection_response'|'take_over'|'secondary_task'} kind
  * @property {string} label
  * @property {string} seat the vehicle whose driver it is for
- * @property {number|null} shown_s longest time that a light is on, or a request shown after its lead
+ * @property {number|null} shown_s longest time that a light is on, or a request after its lead
  * @property {number|null} latest_s until when a stimulus can be answered
  * @property {number|null} lead_s of a request
  * @property {boolean} show whether the driver reads the label

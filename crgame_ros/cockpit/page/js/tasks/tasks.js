@@ -1,6 +1,6 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The tasks of the driver at this page: shows them, and times the answers by this page's clock. */
+/** The tasks of the driver at this page: what is seen of them, and answers timed by its clock. */
 
 import { Answers, ANSWER_KEY } from './answers.js';
 import { inPicture, Prompt } from './prompt.js';
@@ -96,8 +96,9 @@ export class Tasks {
    */
   #mayTake(seat) {
     const { seats, me, rights } = this.#store;
-    return rights.drives && !seats[seat]?.holder && (rights.seat === '' || rights.seat === seat)
-      && seats[seat] !== undefined && me.id !== '';
+    const sits = Object.values(seats).some(({ holder }) => holder === me.id);
+    return !sits && rights.drives && me.id !== '' && seats[seat] !== undefined
+      && !seats[seat].holder && (rights.seat === '' || rights.seat === seat);
   }
 
   #begin() {

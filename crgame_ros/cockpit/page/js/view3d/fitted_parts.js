@@ -4,10 +4,12 @@
 
 import { MeshBuilder } from './bodies/mesh_builder.js';
 import { Instances } from './instances.js';
+import { SeenInstances } from './seen_instances.js';
 
-/** @import { Group, Matrix4 } from 'three' */
+/** @import { Group, Matrix4, MeshBasicMaterial } from 'three' */
 /** @import { Body } from './bodies/motor_vehicles.js' */
 /** @import { Three } from './road/road_world.js' */
+/** @import { Part, Sight } from './seen_instances.js' */
 
 /** @typedef {[x: number, y: number, z: number]} Scale */
 /** @typedef {{brakes: boolean, left: boolean, right: boolean}} Lit */
@@ -20,6 +22,8 @@ const SHADOW_DARKNESS = 0.55;
 const SHADOW_ABOVE_M = 0.025;
 const SHADOW_BEYOND_M = 0.35;
 const PER_VEHICLE = 4;
+// Nobody counts a small wheel's corners.
+const PLAIN_WHEELS_SOONER = 0.35;
 
 /** Instances of the parts; see Instances for what is own. */
 export class FittedParts {
@@ -27,10 +31,13 @@ export class FittedParts {
   #group;
   /** @type {Instances|null} */
   #wheels = null;
-  /** @type {LampInstances|null} */
+  /** @type {SeenInstances|null} */
   #lamps = null;
-  /** @type {ShadowInstances|null} */
+  /** @type {SeenInstances|null} */
   #shadows = null;
+  /** @type {MeshBasicMaterial[]} */
+  #materials = [];
+  #color;
   #matrix;
   #step;
   #pitch;
@@ -43,6 +50,7 @@ export class FittedParts {
   constructor(three, group) {
     this.#three = three;
     this.#group = group;
+    this.#color = new three.Color();
     this.#matrix = new three.Matrix4();
     this.#step = new three.Matrix4();
     this.#pitch = new three.Matrix4();
@@ -53,9 +61,16 @@ export class FittedParts {
   load(count) {
     this.dispose();
     const most = Math.max(PER_VEHICLE * count, 1);
-    this.#wheels = new Instances(this.#three, this.#group, wheel(), most);
-    this.#lamps = new LampInstances(this.#three, this.#group, 2 * most);
-    this.#shadows = new ShadowInstances(this.#three, this.#group, Math.max(count, 1));
+    this.#wheels = new Instances(this.#three, this.#group, wheel(), most, plainWheel(),
+      PLAIN_WHEELS_SOONER);
+    const [lamp, shadow] = [lampPart(this.#three), shadowPart(this.#three)];
+    this.#materials = [lamp, shadow].map(({ material }) => /** @type {MeshBasicMaterial} */ (
+      material));
+    this.#lamps = new SeenInstances(this.#three, { near: [lamp] }, 2 * most);
+    this.#shadows = new SeenInstances(this.#three, { near: [shadow] }, Math.max(count, 1));
+    // After the road and its markings.
+    this.#shadows.meshes[0].renderOrder = 5;
+    this.#group.add(...this.#lamps.meshes, ...this.#shadows.meshes);
   }
 
   /** Nothing is shown until it is added anew. */
@@ -65,17 +80,10 @@ export class FittedParts {
     }
   }
 
-  /** What was added is shown. */
-  commit() {
+  /** @param {Sight} sight of the camera that draws next */
+  see(sight) {
     for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
-      parts?.commit();
-    }
-  }
-
-  /** @param {boolean} shown whether those of the own vehicle are drawn */
-  showOwn(shown) {
-    for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
-      parts?.showOwn(shown);
+      parts?.see(sight);
     }
   }
 
@@ -84,6 +92,11 @@ export class FittedParts {
     for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
       parts?.dispose();
     }
+    this.#materials.forEach((material) => {
+      material.map?.dispose();
+      material.dispose();
+    });
+    this.#materials = [];
   }
 
   /**
@@ -149,7 +162,7 @@ export class FittedParts {
     this.#matrix.copy(place)
       .multiply(this.#step.makeTranslation(0, 0, SHADOW_ABOVE_M))
       .scale(this.#vector.set(length + SHADOW_BEYOND_M, width + SHADOW_BEYOND_M, 1));
-    this.#shadows?.add(this.#matrix, own);
+    this.#shadows?.add(this.#matrix, null, own);
   }
 
   /**
@@ -165,115 +178,28 @@ export class FittedParts {
   #addLamp(place, x, y, z, width, height, color, own) {
     this.#matrix.copy(place).multiply(this.#step.makeTranslation(x, y, z))
       .scale(this.#vector.set(0.03, width, height));
-    this.#lamps?.add(this.#matrix, color, own);
+    this.#lamps?.add(this.#matrix, this.#color.setHex(color), own);
   }
 }
 
-/** Things of one mesh, each with its matrix, those of the own vehicle last. */
-class PlainInstances {
-  #count = 0;
-  #shared = 0;
-
-  /**
-   * @param {Group} group
-   * @param {import('three').InstancedMesh} mesh
-   */
-  constructor(group, mesh) {
-    this.mesh = mesh;
-    mesh.frustumCulled = false;
-    mesh.count = 0;
-    group.add(mesh);
-  }
-
-  clear() {
-    this.#count = 0;
-    this.#shared = 0;
-  }
-
-  /**
-   * @param {Matrix4} matrix
-   * @param {boolean} own
-   * @returns {number} its index
-   */
-  put(matrix, own) {
-    this.mesh.setMatrixAt(this.#count, matrix);
-    this.#shared += own ? 0 : 1;
-    this.#count += 1;
-    return this.#count - 1;
-  }
-
-  commit() {
-    this.mesh.count = this.#count;
-    this.mesh.instanceMatrix.needsUpdate = true;
-    if (this.mesh.instanceColor !== null) {
-      this.mesh.instanceColor.needsUpdate = true;
-    }
-  }
-
-  /** @param {boolean} shown */
-  showOwn(shown) {
-    this.mesh.count = shown ? this.#count : this.#shared;
-  }
-
-  dispose() {
-    this.mesh.removeFromParent();
-    this.mesh.geometry.dispose();
-    this.mesh.dispose();
-    const material = /** @type {import('three').MeshBasicMaterial} */ (this.mesh.material);
-    material.map?.dispose();
-    material.dispose();
-  }
+/**
+ * @param {Three} three
+ * @returns {Part} lamps that shine, whatever the light
+ */
+function lampPart(three) {
+  return { geometry: new three.BoxGeometry(1, 1, 1), tinted: true,
+    material: new three.MeshBasicMaterial({ toneMapped: false }) };
 }
 
-/** Lamps that shine, whatever the light. */
-class LampInstances extends PlainInstances {
-  #color;
-
-  /**
-   * @param {Three} three
-   * @param {Group} group
-   * @param {number} most
-   */
-  constructor(three, group, most) {
-    super(group, new three.InstancedMesh(new three.BoxGeometry(1, 1, 1),
-      new three.MeshBasicMaterial({ toneMapped: false }), most));
-    this.#color = new three.Color();
-    this.mesh.setColorAt(0, this.#color);
-  }
-
-  /**
-   * @param {Matrix4} matrix
-   * @param {number} color
-   * @param {boolean} own
-   */
-  add(matrix, color, own) {
-    this.mesh.setColorAt(this.put(matrix, own), this.#color.setHex(color));
-  }
-}
-
-/** Shadows as dark, soft patches on the road. */
-class ShadowInstances extends PlainInstances {
-  /**
-   * @param {Three} three
-   * @param {Group} group
-   * @param {number} most
-   */
-  constructor(three, group, most) {
-    super(group, new three.InstancedMesh(new three.PlaneGeometry(1, 1),
-      new three.MeshBasicMaterial({ color: 0, map: softPatch(three), transparent: true,
-        depthWrite: false, polygonOffset: true, polygonOffsetFactor: -2,
-        polygonOffsetUnits: -2 }), most));
-    // After the road and its markings.
-    this.mesh.renderOrder = 5;
-  }
-
-  /**
-   * @param {Matrix4} matrix
-   * @param {boolean} own
-   */
-  add(matrix, own) {
-    this.put(matrix, own);
-  }
+/**
+ * @param {Three} three
+ * @returns {Part} shadows as dark, soft patches on the road
+ */
+function shadowPart(three) {
+  return { geometry: new three.PlaneGeometry(1, 1), tinted: false,
+    material: new three.MeshBasicMaterial({ color: 0, map: softPatch(three), transparent: true,
+      depthWrite: false, polygonOffset: true, polygonOffsetFactor: -2,
+      polygonOffsetUnits: -2 }) };
 }
 
 /** @param {Three} three */
@@ -301,4 +227,11 @@ function wheel() {
     mesh.box([-x, -0.525, -z], [x, 0.525, z], [0.62, 0.63, 0.66]);
   }
   return mesh;
+}
+
+/** The same with few corners, for wheels that are small in the picture. */
+function plainWheel() {
+  return new MeshBuilder()
+    .cylinder([0, 0, 0], 'y', 1, 1, [0.05, 0.05, 0.055], [0.05, 0.05, 0.055], 8)
+    .cylinder([0, 0, 0], 'y', 1.02, 0.66, [0.38, 0.39, 0.41], [0.38, 0.39, 0.41], 6);
 }

@@ -11,6 +11,7 @@ import { PlanRibbons } from './plan_ribbons.js';
 import { isSoftware, Quality } from './quality.js';
 import { createRoadWorld } from './road/road_world.js';
 import { roleColor } from './role_color.js';
+import { sightOf } from './seen_instances.js';
 import { Traffic } from './traffic.js';
 import { standOf } from './vehicle_stand.js';
 
@@ -22,10 +23,10 @@ import { standOf } from './vehicle_stand.js';
 
 const NEAR_M = 0.2;
 const FAR_M = 3000;
-// Farther away than this nobody is drawn, by a card and by the processor [m].
-const FARTHEST_M = { card: 600, processor: 250 };
 // In a mirror nobody can tell what is farther away [m].
 const FAR_IN_MIRROR_M = 300;
+// It has few pixels, too: there things are plain from this share of the distance on.
+const PLAIN_IN_MIRROR = 0.5;
 
 /**
  * What is to be drawn.
@@ -82,8 +83,7 @@ export class Picture {
     this.#camera.rotation.order = 'ZXY';
     const bodies = new three.Group();
     this.#scene.add(bodies);
-    this.#traffic = new Traffic(three, bodies, store,
-      software ? FARTHEST_M.processor : FARTHEST_M.card);
+    this.#traffic = new Traffic(three, bodies, store);
     this.#plans = new PlanRibbons(three, bodies, store);
     this.mirrors = new Mirrors(three, software);
     store.on('scene', (scene) => this.#load(scene));
@@ -102,6 +102,7 @@ export class Picture {
   set sharp(sharp) {
     if (sharp !== this.#quality.sharp) {
       this.#quality.sharp = sharp;
+      this.#choose();
       this.resize(this.#size.width, this.#size.height);
     }
   }
@@ -162,8 +163,7 @@ export class Picture {
     this.#traffic.update(shown, vehicle.id, road.heightAt, eye);
     this.#plans.update(looks.plans, shown, this.#origin, road.heightAt);
     const measures = this.#cost.begin();
-    // A processor that draws has a mirror for every other picture only.
-    if (inside && looks.mirrors && !(this.stats.software && this.stats.frames % 2 === 1)) {
+    if (inside && looks.mirrors && this.stats.frames % this.#quality.detail.mirrorEvery === 0) {
       this.#drawMirror(stand, vehicle);
     }
     this.#drawMain(stand, vehicle, inside);
@@ -214,11 +214,31 @@ export class Picture {
     if (this.#cabin !== null) {
       this.#cabin.mesh.visible = false;
     }
-    this.#traffic.showOwn(true);
     this.mirrors.fit(vehicle.driver_place, FAR_IN_MIRROR_M);
     this.mirrors.drawNext(this.#renderer, this.#scene, (camera, { point, aside, pitch }) => {
       this.#aim(camera, mountedAt(stand, point, aside, pitch));
+      this.#see(camera, PLAIN_IN_MIRROR, true);
     });
+  }
+
+  /**
+   * Hand over what a camera sees.
+   *
+   * @param {PerspectiveCamera} camera
+   * @param {number} sooner share of the distance at which things are plain
+   * @param {boolean} own whether the own vehicle is drawn
+   */
+  #see(camera, sooner, own) {
+    const sight = sightOf(this.#three, camera, sooner * this.#quality.detail.plain_m, own);
+    this.#road?.see(sight);
+    this.#traffic.see(sight);
+  }
+
+  /** Draw with the detail that is chosen. */
+  #choose() {
+    const { farthest_m, wheels_m, fine } = this.#quality.detail;
+    this.#traffic.limits = { farthest_m, wheels_m };
+    this.#road?.setFine(fine);
   }
 
   /**
@@ -240,7 +260,7 @@ export class Picture {
       mesh.position.set(stand.x - this.#origin.x, stand.y - this.#origin.y, stand.z);
       mesh.rotation.set(0, -stand.slope, stand.yaw, 'ZYX');
     }
-    this.#traffic.showOwn(!inside);
+    this.#see(this.#camera, 1, !inside);
     this.#renderer.render(this.#scene, this.#camera);
   }
 
@@ -257,6 +277,7 @@ export class Picture {
     if (measures) {
       this.stats.cost_ms = this.#cost.end();
       if (this.#quality.take(this.stats.cost_ms, now_ms)) {
+        this.#choose();
         this.resize(this.#size.width, this.#size.height);
       }
     }
@@ -276,6 +297,7 @@ export class Picture {
       this.#road.setEnvironment(scene.environment);
     }
     this.#document = scene;
+    this.#choose();
     this.#traffic.load(scene, this.#origin, roleColor(this.#three));
   }
 }

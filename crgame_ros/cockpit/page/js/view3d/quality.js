@@ -1,18 +1,50 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How fine and how often pictures are drawn, so that the simulation keeps its share. */
+/**
+ * How good pictures are, so that drawing keeps up: by what they are measured to take, on any
+ * machine. What draws is known by name only to begin with a good guess.
+ */
 
-// What a picture may take [ms], and how often there is one at most [ms]: pictures that the
-// processor draws are taken from the simulation on the same machine.
-const HARDWARE = { budget_ms: 9, period_ms: 0, start: 1 };
-const SOFTWARE = { budget_ms: 12, period_ms: 30, start: 0.5 };
-const COARSEST = 0.25;
+/**
+ * What is left out of a picture.
+ *
+ * @typedef {object} Detail
+ * @property {number} plain_m beyond it vehicles and trees have few triangles
+ * @property {number} farthest_m beyond it no vehicle is drawn
+ * @property {number} wheels_m beyond it wheels are discs on the flanks
+ * @property {boolean} fine whether the sky has a sun and a glow, and surfaces are as sharp in
+ *   the distance as can be
+ * @property {number} mirrorEvery a mirror is drawn with each picture, or with each second one
+ */
+
+/** From all that there is to what is told from each other no more. @type {Detail[]} */
+export const DETAILS = [
+  { plain_m: Infinity, farthest_m: 600, wheels_m: 600, fine: true, mirrorEvery: 1 },
+  { plain_m: 60, farthest_m: 400, wheels_m: 90, fine: false, mirrorEvery: 2 },
+  { plain_m: 30, farthest_m: 250, wheels_m: 50, fine: false, mirrorEvery: 3 },
+];
+
+/**
+ * Pixels of a picture to those that it could have, in each direction, and its detail: from the
+ * best to the cheapest.
+ *
+ * @type {[share: number, detail: number][]}
+ */
+const RUNGS = [[1, 0], [0.85, 0], [0.7, 0], [0.7, 1], [0.6, 1], [0.5, 1], [0.42, 1], [0.42, 2],
+  [0.35, 2], [0.3, 2], [0.25, 2]];
+// What a picture may take [ms], how often there is one at most [ms], and the rung to begin with:
+// pictures that the processor draws are taken from the simulation on the same machine.
+const HARDWARE = { budget_ms: 9, period_ms: 0, start: 0 };
+const SOFTWARE = { budget_ms: 13, period_ms: 33, start: 5 };
 const FINEST = 2;
 const TOO_MUCH = 1.2;
-const PLENTY = 0.55;
+const PLENTY = 0.8;
 const EVERY_MS = 800;
-const STEP_UP = 1.12;
-const MOST_DOWN = 0.7;
+// A rung that was too dear is tried again after so long, then after twice as long, and so on.
+const AGAIN_MS = 20_000;
+// Of the time, no more goes to pictures.
+const MOST_SHARE = 0.5;
+const SLOWEST_MS = 50;
 
 /** Names of renderers that are the processor itself. */
 const SOFTWARE_NAMES = /swiftshader|llvmpipe|softpipe|software|basic render/i;
@@ -27,12 +59,15 @@ export function isSoftware(name) {
   return SOFTWARE_NAMES.test(name);
 }
 
-/** Chooses the ratio of a picture's pixels to CSS pixels. */
+/** Chooses the ratio of a picture's pixels to CSS pixels, and what is left out. */
 export class Quality {
   #limits;
   #finest;
   #changed_ms = -Infinity;
-  #chosen;
+  #rung;
+  #cost_ms = 0;
+  /** By rung: not before that time again, and how long it was refused. */
+  #refused = RUNGS.map(() => ({ until_ms: -Infinity, for_ms: AGAIN_MS }));
   /** Whether nothing is saved, whatever a picture takes. */
   sharp = false;
 
@@ -43,17 +78,24 @@ export class Quality {
   constructor(software, deviceRatio) {
     this.#limits = software ? SOFTWARE : HARDWARE;
     this.#finest = Math.min(deviceRatio, FINEST);
-    this.#chosen = this.#limits.start * this.#finest;
+    this.#rung = this.#limits.start;
   }
 
   /** Pixels to a CSS pixel. */
   get ratio() {
-    return this.sharp ? this.#finest : this.#chosen;
+    return this.sharp ? this.#finest : RUNGS[this.#rung][0] * this.#finest;
+  }
+
+  /** What pictures leave out. */
+  get detail() {
+    return DETAILS[this.sharp ? 0 : RUNGS[this.#rung][1]];
   }
 
   /** Least time from picture to picture [ms]. */
   get period_ms() {
-    return this.#limits.period_ms;
+    const { period_ms } = this.#limits;
+    return period_ms === 0 ? 0
+      : Math.min(Math.max(this.#cost_ms / MOST_SHARE, period_ms), SLOWEST_MS);
   }
 
   /**
@@ -61,22 +103,25 @@ export class Quality {
    *
    * @param {number} cost_ms until it was done
    * @param {number} now_ms
-   * @returns {boolean} whether the ratio is another one now
+   * @returns {boolean} whether ratio or detail are others now
    */
   take(cost_ms, now_ms) {
-    const { budget_ms } = this.#limits;
-    const share = cost_ms / budget_ms;
-    if (this.sharp || now_ms - this.#changed_ms < EVERY_MS
-        || (share < TOO_MUCH && share > PLENTY)) {
+    this.#cost_ms = cost_ms;
+    if (this.sharp || now_ms - this.#changed_ms < EVERY_MS) {
       return false;
     }
-    // What a picture takes grows with its pixels, the square of the ratio.
-    const factor = share > 1 ? Math.max(1 / Math.sqrt(share), MOST_DOWN) : STEP_UP;
-    const ratio = Math.min(Math.max(this.#chosen * factor, COARSEST), this.#finest);
-    if (ratio === this.#chosen) {
+    const share = cost_ms / this.#limits.budget_ms;
+    if (share > TOO_MUCH && this.#rung < RUNGS.length - 1) {
+      const refused = this.#refused[this.#rung];
+      refused.until_ms = now_ms + refused.for_ms;
+      refused.for_ms *= 2;
+      this.#rung += 1;
+    } else if (share < PLENTY && this.#rung > 0
+        && this.#refused[this.#rung - 1].until_ms <= now_ms) {
+      this.#rung -= 1;
+    } else {
       return false;
     }
-    this.#chosen = ratio;
     this.#changed_ms = now_ms;
     return true;
   }

@@ -6,6 +6,7 @@ import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { shining } from '../lights.js';
 import { BrakeLights } from '../world/brake_lights.js';
 import { ofObject, ofVehicle } from './bodies/appearance.js';
+import { plainBody } from './bodies/plain_bodies.js';
 import { FittedParts } from './fitted_parts.js';
 import { Instances } from './instances.js';
 
@@ -16,7 +17,7 @@ import { Instances } from './instances.js';
 /** @import { Body } from './bodies/motor_vehicles.js' */
 /** @import { Origin } from './local_origin.js' */
 /** @import { Three } from './road/road_world.js' */
-
+/** @import { Sight } from './seen_instances.js' */
 
 /**
  * @typedef {object} Thing
@@ -36,7 +37,8 @@ export class Traffic {
   /** Whether bodies have the colours of the map, which tell who drives. */
   byRole = false;
   #three;
-  #farthest_m;
+  /** Beyond that nobody is drawn, and no wheel turns [m]. */
+  limits = { farthest_m: 0, wheels_m: 0 };
   #group;
   /** @type {Thing[]} */
   #vehicles = [];
@@ -58,10 +60,8 @@ export class Traffic {
    * @param {Three} three
    * @param {Group} group gets everything
    * @param {Store} store whose scenario steps tell who brakes
-   * @param {number} farthest_m beyond which nobody is drawn
    */
-  constructor(three, group, store, farthest_m) {
-    this.#farthest_m = farthest_m;
+  constructor(three, group, store) {
     this.#three = three;
     this.#group = group;
     this.#matrix = new three.Matrix4();
@@ -91,7 +91,8 @@ export class Traffic {
     for (const [key, { look, count }] of kinds) {
       const body = look.build();
       bodies.set(key, body);
-      this.#instances.set(key, new Instances(this.#three, this.#group, body.mesh, count));
+      this.#instances.set(key, new Instances(this.#three, this.#group, body.mesh, count,
+        plainBody(look.key, body)));
     }
     const things = looks.map((look, i) => {
       const vehicle = scene.vehicles[i];
@@ -130,9 +131,7 @@ export class Traffic {
         speed: vx * Math.cos(yaw) + vy * Math.sin(yaw), brakes: this.#brakeLights.ofObject(i),
         lights: 0 });
     }
-    const order = this.#vehicles.map((_, i) => i)
-      .sort((a, b) => Number(this.#vehicles[a].id === own) - Number(this.#vehicles[b].id === own));
-    for (const i of order) {
+    for (let i = 0; i < this.#vehicles.length; i += 1) {
       const row = i * VEHICLE_WIDTH;
       const yaw = shown.vehicles[row + VEHICLE.yaw];
       const ahead = scene.vehicles[i].rear_to_center;
@@ -145,18 +144,14 @@ export class Traffic {
         lights: shown.vehicles[row + VEHICLE.lights],
       });
     }
-    for (const instances of this.#instances.values()) {
-      instances.commit();
-    }
-    this.#parts.commit();
   }
 
-  /** @param {boolean} shown whether the own vehicle is drawn */
-  showOwn(shown) {
+  /** @param {Sight} sight of the camera that draws next */
+  see(sight) {
     for (const instances of this.#instances.values()) {
-      instances.showOwn(shown);
+      instances.see(sight);
     }
-    this.#parts.showOwn(shown);
+    this.#parts.see(sight);
   }
 
   /**
@@ -207,7 +202,8 @@ export class Traffic {
     const px = x - this.#origin.x;
     const py = y - this.#origin.y;
     // A thing that is not there yet, or no more, has no place.
-    if (!(Math.hypot(px - eye.x, py - eye.y) < this.#farthest_m)) {
+    const distance = Math.hypot(px - eye.x, py - eye.y);
+    if (!(distance < this.limits.farthest_m)) {
       return;
     }
     const { body, scale, look } = thing;
@@ -216,7 +212,7 @@ export class Traffic {
     const matrix = this.#matrix.identity().makeRotationZ(yaw)
       .multiply(this.#parts.pitched(pose.slope)).setPosition(px, py, pose.z);
     this.#parts.addShadow(matrix, body.length * scale[0], body.width * scale[1], own);
-    if (body.wheels !== null) {
+    if (body.wheels !== null && distance < this.limits.wheels_m) {
       this.#parts.addWheels(matrix, body.wheels, scale, steering || 0, thing.rolled, own);
     }
     if (body.lamps !== null) {

@@ -89,6 +89,11 @@ export class World {
     return this.#navigation.followed;
   }
 
+  /** Whether what AVs plan is drawn. */
+  get showsPlans() {
+    return this.#painter.plans.on;
+  }
+
   /**
    * Keep the camera on a vehicle or object.
    *

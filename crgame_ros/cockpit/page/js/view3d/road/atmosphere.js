@@ -2,11 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Light and air: the sky, the sun, and the fog in which everything fades. */
 
-import { extinction, fogAsAirDoes } from './fog.js';
+import { airFog, extinction, fogAsAirDoes } from './fog.js';
 
-/** @import { Group } from 'three' */
+/** @import { BufferGeometry, Group, Mesh, ShaderMaterial } from 'three' */
 /** @import { Environment } from '../../messages.js' */
 /** @typedef {typeof import('../three.js')} Three */
+/** @typedef {Mesh<BufferGeometry, ShaderMaterial>} Sky */
 
 // The sky is seen through a layer of haze of this height [m].
 const HAZE_M = 250;
@@ -33,28 +34,51 @@ const LIGHTS = {
     sun_from: [-0.9, 0.35, 0.09], ground: 0x4c4a48, sky_light: 0.95 },
 };
 
-const SKY_VERTEX = `
-varying vec3 vToward;
-void main() {
-  vToward = position;
-  // As far as can be, whatever the camera's place and range.
-  gl_Position = (projectionMatrix * mat4(mat3(viewMatrix)) * vec4(position, 1.0)).xyww;
-}`;
-const SKY_FRAGMENT = `
+const SKY_TONE = `
 uniform vec3 zenith, horizon, fogTone, sunTone, sunFrom;
 uniform float haze;
-varying vec3 vToward;
-void main() {
-  vec3 toward = normalize(vToward);
+vec3 skyTone(vec3 toward) {
   float up = max(toward.z, 0.0);
   vec3 tone = mix(horizon, zenith, pow(up, 0.55));
   float near = max(dot(toward, sunFrom), 0.0);
   tone += sunTone * (0.16 * pow(near, 12.0) + 4.0 * smoothstep(0.99955, 0.9998, near));
-  tone = mix(fogTone, tone, exp(-haze / max(up, 0.004)));
-  gl_FragColor = vec4(tone, 1.0);
+  return mix(fogTone, tone, exp(-haze / max(up, 0.004)));
+}`;
+// As far as can be, whatever the camera's place and range.
+const SKY_PLACE = `
+  gl_Position = (projectionMatrix * mat4(mat3(viewMatrix)) * vec4(position, 1.0)).xyww;`;
+const SKY_VERTEX = `
+varying vec3 vToward;
+void main() {
+  vToward = position;
+  ${SKY_PLACE}
+}`;
+const SKY_FRAGMENT = `
+${SKY_TONE}
+varying vec3 vToward;
+void main() {
+  gl_FragColor = vec4(skyTone(normalize(vToward)), 1.0);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
 }`;
+// The same at corners, and evenly between them: a fifth of the time where a processor draws.
+const PLAIN_VERTEX = `
+${SKY_TONE}
+varying vec3 vTone;
+void main() {
+  vTone = skyTone(position);
+  ${SKY_PLACE}
+}`;
+const PLAIN_FRAGMENT = `
+varying vec3 vTone;
+void main() {
+  gl_FragColor = vec4(vTone, 1.0);
+  #include <tonemapping_fragment>
+  #include <colorspace_fragment>
+}`;
+// Where the plain sky has corners: near the horizon it changes most [deg].
+const RINGS_DEG = [-90, -1, 0, 0.4, 0.9, 1.8, 3.2, 5.5, 9, 14, 22, 34, 50, 70, 90];
+const AROUND = 24;
 
 /** The sky of a scene, its lights, and the fog for the scene of three.js. */
 export class Atmosphere {
@@ -62,6 +86,7 @@ export class Atmosphere {
   group;
   #three;
   #sky;
+  #plainSky;
   #sun;
   #ambient;
 
@@ -70,23 +95,36 @@ export class Atmosphere {
     fogAsAirDoes(three);
     this.#three = three;
     /** Every material that is drawn fades into it. */
-    this.fog = new three.FogExp2(0xffffff, 0);
+    this.fog = airFog(three);
     this.group = new three.Group();
     const color = () => ({ value: new three.Color() });
-    this.#sky = new three.Mesh(new three.IcosahedronGeometry(1, 3), new three.ShaderMaterial({
-      vertexShader: SKY_VERTEX, fragmentShader: SKY_FRAGMENT, side: three.BackSide,
-      depthWrite: false, uniforms: { zenith: color(), horizon: color(), fogTone: color(),
-        sunTone: color(), sunFrom: { value: new three.Vector3() }, haze: { value: 0 } } }));
-    this.#sky.frustumCulled = false;
-    // Behind all else: nothing that is hidden by roads is computed.
-    this.#sky.renderOrder = 1000;
+    const uniforms = { zenith: color(), horizon: color(), fogTone: color(), sunTone: color(),
+      sunFrom: { value: new three.Vector3() }, haze: { value: 0 } };
+    /** @type {(geometry: BufferGeometry, vertexShader: string, fragmentShader: string) => Sky} */
+    const sky = (geometry, vertexShader, fragmentShader) => {
+      const mesh = new three.Mesh(geometry, new three.ShaderMaterial({ vertexShader,
+        fragmentShader, side: three.DoubleSide, depthWrite: false, uniforms }));
+      mesh.frustumCulled = false;
+      // Behind all else: nothing that is hidden by roads is computed.
+      mesh.renderOrder = 1000;
+      return mesh;
+    };
+    this.#sky = sky(new three.IcosahedronGeometry(1, 3), SKY_VERTEX, SKY_FRAGMENT);
+    this.#plainSky = sky(ringed(three), PLAIN_VERTEX, PLAIN_FRAGMENT);
+    this.setFine(true);
     this.#sun = new three.DirectionalLight();
     this.#ambient = new three.HemisphereLight();
-    this.group.add(this.#sky, this.#sun, this.#sun.target, this.#ambient);
+    this.group.add(this.#sky, this.#plainSky, this.#sun, this.#sun.target, this.#ambient);
   }
 
   get triangles() {
     return this.#sky.geometry.attributes.position.count / 3;
+  }
+
+  /** @param {boolean} fine whether each pixel of the sky is computed, with the sun in it */
+  setFine(fine) {
+    this.#sky.visible = fine;
+    this.#plainSky.visible = !fine;
   }
 
   /**
@@ -120,8 +158,35 @@ export class Atmosphere {
 
   /** Free what the graphics card holds. */
   dispose() {
-    this.#sky.geometry.dispose();
-    this.#sky.material.dispose();
+    for (const { geometry, material } of [this.#sky, this.#plainSky]) {
+      geometry.dispose();
+      material.dispose();
+    }
     this.#sun.dispose();
   }
+}
+
+/**
+ * @param {Three} three
+ * @returns {BufferGeometry} a ball of radius 1 around the upward axis
+ */
+function ringed(three) {
+  const positions = [];
+  const indices = [];
+  for (const [ring, height] of RINGS_DEG.entries()) {
+    for (let i = 0; i <= AROUND; i += 1) {
+      const [up, around] = [height * Math.PI / 180, 2 * Math.PI * i / AROUND];
+      positions.push(Math.cos(up) * Math.cos(around), Math.cos(up) * Math.sin(around),
+        Math.sin(up));
+      const last = ring * (AROUND + 1) + i;
+      if (ring > 0 && i > 0) {
+        const below = last - AROUND - 1;
+        indices.push(below - 1, below, last, below - 1, last, last - 1);
+      }
+    }
+  }
+  const geometry = new three.BufferGeometry();
+  geometry.setAttribute('position', new three.Float32BufferAttribute(positions, 3));
+  geometry.setIndex(indices);
+  return geometry;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** How fog takes contrast away (Koschmieder), as a number and as three.js draws it. */
 
+/** @import { FogExp2 } from 'three' */
 /** @typedef {typeof import('../three.js')} Three */
 
 /**
@@ -27,11 +28,16 @@ export function contrastLeft(distance, visibility) {
 
 // three.js fogs by exp(-(density * depth)^2), along the view's axis and between colours as they
 // are encoded for the screen; air does by exp(-density * distance), between lights.
+// Light is fogged before it is encoded: encoding is the dearest part of a pixel that a processor
+// draws, and is done once.
 const DECLARED = `#ifdef USE_FOG
   varying vec3 vFromEye;
 #endif`;
 const VERTEX = `#ifdef USE_FOG
   vFromEye = mvPosition.xyz;
+#endif`;
+const ENCODING = `#ifndef USE_FOG
+  gl_FragColor = linearToOutputTexel( gl_FragColor );
 #endif`;
 const UNIFORMS = `#ifdef USE_FOG
   uniform vec3 fogColor;
@@ -50,14 +56,8 @@ const FRAGMENT = `#ifdef USE_FOG
   #else
     float fogFactor = smoothstep( fogNear, fogFar, fogDepth );
   #endif
-  // A mirror's picture is not encoded, the screen's is.
-  if ( linearToOutputTexel( vec4( 0.5 ) ).r > 0.6 ) {
-    vec3 seenLight = mix( sRGBTransferEOTF( vec4( gl_FragColor.rgb, 1.0 ) ).rgb,
-      sRGBTransferEOTF( vec4( fogColor, 1.0 ) ).rgb, fogFactor );
-    gl_FragColor.rgb = sRGBTransferOETF( vec4( seenLight, 1.0 ) ).rgb;
-  } else {
-    gl_FragColor.rgb = mix( gl_FragColor.rgb, fogColor, fogFactor );
-  }
+  gl_FragColor.rgb = mix( gl_FragColor.rgb, fogColor, fogFactor );
+  gl_FragColor = linearToOutputTexel( gl_FragColor );
 #endif`;
 
 /**
@@ -70,4 +70,20 @@ export function fogAsAirDoes(three) {
   three.ShaderChunk.fog_vertex = VERTEX;
   three.ShaderChunk.fog_pars_fragment = UNIFORMS;
   three.ShaderChunk.fog_fragment = FRAGMENT;
+  three.ShaderChunk.colorspace_fragment = ENCODING;
+}
+
+/**
+ * Make the fog of a scene: materials get its light, where the library would give them the colour
+ * as encoded for the screen.
+ *
+ * @param {Three} three the library
+ * @returns {FogExp2} of no density
+ */
+export function airFog(three) {
+  const fog = new three.FogExp2(0xffffff, 0);
+  fog.color.getRGB = function getLight(target) {
+    return Object.assign(target, { r: this.r, g: this.g, b: this.b });
+  };
+  return fog;
 }

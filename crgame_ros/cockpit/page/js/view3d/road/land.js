@@ -13,6 +13,8 @@ import { randomFrom } from './random.js';
 const MARGIN_M = 1200;
 const MOST_CELLS = 72;
 const LEAST_CELL_M = 15;
+// Tiles along an edge.
+const TILES = 4;
 const BELOW_M = 0.04;
 // Below roads on hills, which the land's triangles follow by halves only [m].
 const UNDER_HILLS_M = 0.4;
@@ -24,11 +26,11 @@ const FIELD = [140, 138, 94];
 const RANK = -2;
 
 /**
- * Build the land of a scene.
+ * Build the land of a scene, in tiles of which a picture draws those that are in it.
  *
  * @param {Scene} scene the scene document
  * @param {Origin} origin
- * @returns {{parts: MeshParts, heightAt: Heights}} the latter of points within it, [m]
+ * @returns {{tiles: MeshParts[], heightAt: Heights}} the latter of points within it, [m]
  */
 export function buildLand(scene, origin) {
   const [xmin, ymin, xmax, ymax] = scene.bounds;
@@ -39,26 +41,54 @@ export function buildLand(scene, origin) {
   const y0 = (ymin + ymax - count * cell) / 2;
   const heights = landHeights(scene, x0, y0, cell, count);
   const random = randomFrom(scene.id);
-  const parts = new MeshParts(origin);
-  for (let row = 0; row <= count; row += 1) {
-    for (let column = 0; column <= count; column += 1) {
-      const share = random();
-      const color = /** @type {Rgb} */ (MEADOW.map(
-        (value, i) => value + 0.55 * share * (FIELD[i] - value)));
-      parts.vertex(x0 + column * cell, y0 + row * cell,
-        heights === null ? -BELOW_M : heights[row * (count + 1) + column], color, RANK);
-      if (row > 0 && column > 0) {
-        const last = row * (count + 1) + column;
-        const below = last - count - 1;
-        parts.indices.push(below - 1, below, last, below - 1, last, last - 1);
-      }
+  const shares = Float64Array.from({ length: (count + 1) ** 2 }, random);
+  /** @type {Corner} */
+  const corner = (parts, row, column) => {
+    const at = row * (count + 1) + column;
+    const color = /** @type {Rgb} */ (MEADOW.map(
+      (value, i) => value + 0.55 * shares[at] * (FIELD[i] - value)));
+    return parts.vertex(x0 + column * cell, y0 + row * cell,
+      heights === null ? -BELOW_M : heights[at], color, RANK);
+  };
+  const tiles = [];
+  const edge = Math.ceil(count / TILES);
+  for (let row = 0; row < count; row += edge) {
+    for (let column = 0; column < count; column += edge) {
+      tiles.push(buildTile(new MeshParts(origin), corner, [row, Math.min(row + edge, count)],
+        [column, Math.min(column + edge, count)]));
     }
   }
-  return { parts, heightAt: (x, y) => {
+  return { tiles, heightAt: (x, y) => {
     const column = Math.min(Math.max(Math.round((x - x0) / cell), 0), count);
     const row = Math.min(Math.max(Math.round((y - y0) / cell), 0), count);
     return heights === null ? 0 : heights[row * (count + 1) + column];
   } };
+}
+
+/**
+ * @typedef {(parts: MeshParts, row: number, column: number) => number} Corner adds one of the
+ *   land's corners, and gives its index
+ */
+
+/**
+ * @param {MeshParts} parts empty
+ * @param {Corner} corner
+ * @param {[number, number]} rows of corners, the first and the last
+ * @param {[number, number]} columns
+ * @returns {MeshParts} the same
+ */
+function buildTile(parts, corner, rows, columns) {
+  const width = columns[1] - columns[0] + 1;
+  for (let row = rows[0]; row <= rows[1]; row += 1) {
+    for (let column = columns[0]; column <= columns[1]; column += 1) {
+      const last = corner(parts, row, column);
+      if (row > rows[0] && column > columns[0]) {
+        const below = last - width;
+        parts.indices.push(below - 1, below, last, below - 1, last, last - 1);
+      }
+    }
+  }
+  return parts;
 }
 
 /**

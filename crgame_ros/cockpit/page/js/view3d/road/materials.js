@@ -15,6 +15,9 @@ export const GRAIN_M = 6;
 // 100 m, seen from a car, 3 mm of height.
 const RANK_DEPTH = 4e-6;
 
+/** Of the grain where it is fine; it is what a processor takes longest for. */
+export const GRAIN_ANISOTROPY = 8;
+
 /**
  * Grain as of asphalt: by its passing one sees speed.
  *
@@ -36,7 +39,7 @@ export function grainTexture(three) {
   texture.magFilter = three.LinearFilter;
   texture.minFilter = three.LinearMipmapLinearFilter;
   texture.generateMipmaps = true;
-  texture.anisotropy = 8;
+  texture.anisotropy = GRAIN_ANISOTROPY;
   texture.needsUpdate = true;
   return texture;
 }

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Things that there are hundreds of, drawn at once: always those that are nearest to the eye. */
 
-/** @import { BufferGeometry, InstancedMesh, Material } from 'three' */
+import { SeenInstances } from '../seen_instances.js';
+
+/** @import { BufferGeometry, Material } from 'three' */
+/** @import { Sight } from '../seen_instances.js' */
 /** @typedef {typeof import('../three.js')} Three */
 
 const CELL_M = 100;
@@ -19,15 +22,15 @@ const MOVED_M = 40;
  * @property {number} color as on the screen; multiplies the shape's own
  */
 
-/** Draws instances of one shape in one call. */
+/** Draws instances of one shape in one call, or in two where those far away are plainer. */
 export class NearInstances {
-  /** @type {InstancedMesh} */
-  mesh;
   /** @type {Map<string, Instance[]>} */
   #cells = new Map();
   #three;
   #reach;
   #most;
+  #seen;
+  #shape;
   #at = { x: Infinity, y: Infinity };
 
   /**
@@ -37,15 +40,15 @@ export class NearInstances {
    * @param {Instance[]} instances
    * @param {number} most are drawn at a time
    * @param {number} reach within which they are drawn [m]
+   * @param {BufferGeometry|null} [plain] the shape of those far away; null: the same
    */
-  constructor(three, shape, material, instances, most, reach) {
+  constructor(three, shape, material, instances, most, reach, plain = null) {
     this.#three = three;
     this.#reach = reach;
     this.#most = Math.min(most, instances.length);
-    this.mesh = new three.InstancedMesh(shape, material, Math.max(this.#most, 1));
-    this.mesh.count = 0;
-    // Its bounds would be those of instances that come and go.
-    this.mesh.frustumCulled = false;
+    this.#shape = shape;
+    this.#seen = new SeenInstances(three, { near: [{ geometry: shape, material, tinted: true }],
+      far: plain === null ? [] : [{ geometry: plain, material, tinted: true }] }, this.#most);
     for (const instance of instances) {
       const key = `${Math.floor(instance.x / CELL_M)} ${Math.floor(instance.y / CELL_M)}`;
       const cell = this.#cells.get(key) ?? [];
@@ -54,9 +57,13 @@ export class NearInstances {
     }
   }
 
+  get meshes() {
+    return this.#seen.meshes;
+  }
+
   /** Triangles when as many as can be are drawn. */
   get triangles() {
-    const { index, attributes } = this.mesh.geometry;
+    const { index, attributes } = this.#shape;
     return this.#most * (index?.count ?? attributes.position.count) / 3;
   }
 
@@ -74,18 +81,19 @@ export class NearInstances {
     const { Color, Matrix4, Quaternion, Vector3 } = this.#three;
     const [matrix, turn, up, color] = [new Matrix4(), new Quaternion(), new Vector3(0, 0, 1),
       new Color()];
-    near.forEach((instance, i) => {
+    this.#seen.clear();
+    near.forEach((instance) => {
       turn.setFromAxisAngle(up, instance.yaw);
       matrix.compose(new Vector3(instance.x, instance.y, instance.z), turn,
         new Vector3(...instance.size));
-      this.mesh.setMatrixAt(i, matrix);
-      this.mesh.setColorAt(i, color.set(instance.color));
+      this.#seen.add(matrix, color.set(instance.color), false);
     });
-    this.mesh.count = near.length;
-    this.mesh.instanceMatrix.needsUpdate = true;
-    if (this.mesh.instanceColor !== null) {
-      this.mesh.instanceColor.needsUpdate = true;
-    }
+    this.#seen.seeAll();
+  }
+
+  /** @param {Sight} sight of the camera that draws next */
+  see(sight) {
+    this.#seen.see(sight);
   }
 
   /**
@@ -113,7 +121,6 @@ export class NearInstances {
 
   /** Free what the graphics card holds, but for the material. */
   dispose() {
-    this.mesh.geometry.dispose();
-    this.mesh.dispose();
+    this.#seen.dispose();
   }
 }

@@ -5,7 +5,7 @@
 import { localOrigin } from '../local_origin.js';
 import { Atmosphere } from './atmosphere.js';
 import { buildLand } from './land.js';
-import { geometryOf, grainTexture, paintedMaterial } from './materials.js';
+import { geometryOf, GRAIN_ANISOTROPY, grainTexture, paintedMaterial } from './materials.js';
 import { buildRoads } from './road_chunks.js';
 import { Obstacles } from './obstacles.js';
 import { placeLights, placeSigns } from './poles.js';
@@ -18,6 +18,7 @@ import { TrafficLights } from './traffic_lights.js';
 /** @import { FogExp2, Group, Object3D } from 'three' */
 /** @import { Environment, Scene } from '../../messages.js' */
 /** @import { Store } from '../../store.js' */
+/** @import { Sight } from '../seen_instances.js' */
 
 /** @typedef {typeof import('../three.js')} Three the library, as three.js exports it */
 /** @typedef {{x: number, y: number, z: number}} Point from the local origin [m] */
@@ -31,7 +32,10 @@ import { TrafficLights } from './traffic_lights.js';
  *   visibility than the scene document's
  * @property {(store: Store, now_ms: number, eye: Point) => void} update called before each
  *   picture, after `store.displayed(now_ms)`; eye is that of the main camera
+ * @property {(sight: Sight) => void} see called before each camera draws, after `update`; without
+ *   it all that is near is drawn
  * @property {(x: number, y: number) => number} heightAt of the road at a point of the map [m]
+ * @property {(fine: boolean) => void} setFine see Detail
  * @property {number} triangles in the whole group, at most
  * @property {number} drawCalls at most, when all of it is seen
  * @property {number} build_ms what making it took
@@ -58,7 +62,7 @@ export function createRoadWorld(three, scene) {
   const material = paintedMaterial(three, grain);
   const roads = buildRoads(scene, origin, index, heightAt, triangulator(three));
   const land = buildLand(scene, origin);
-  const meshes = [land.parts, ...roads].map((parts) => {
+  const meshes = [...land.tiles, ...roads].map((parts) => {
     const mesh = new three.Mesh(geometryOf(three, parts), material);
     mesh.matrixAutoUpdate = false;
     return mesh;
@@ -82,6 +86,17 @@ export function createRoadWorld(three, scene) {
       signs.update(eye);
       lights.update(store.signals.states, eye);
       obstacles.update(store.perceived.occupancy);
+    },
+    see(sight) {
+      standing.forEach((part) => part.see(sight));
+    },
+    setFine(fine) {
+      atmosphere.setFine(fine);
+      const anisotropy = fine ? GRAIN_ANISOTROPY : 1;
+      if (grain.anisotropy !== anisotropy) {
+        grain.anisotropy = anisotropy;
+        grain.needsUpdate = true;
+      }
     },
     triangles: meshes.reduce((sum, { geometry }) => sum + (geometry.index?.count ?? 0) / 3,
       standing.reduce((sum, part) => sum + part.triangles, atmosphere.triangles)),

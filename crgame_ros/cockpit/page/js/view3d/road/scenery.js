@@ -4,12 +4,13 @@
 
 import { geometryOf } from './materials.js';
 import { NearInstances } from './near_instances.js';
-import { fir, house, lamp, post, tree } from './scenery_shapes.js';
+import { fir, house, lamp, plainFir, plainTree, post, tree } from './scenery_shapes.js';
 
 /** @import { Origin } from '../local_origin.js' */
 /** @import { Heights } from './mesh_parts.js' */
 /** @import { Material } from 'three' */
 /** @import { Roadside } from './roadside.js' */
+/** @import { Sight } from '../seen_instances.js' */
 /** @typedef {typeof import('../three.js')} Three */
 
 const LEAVES = [0x5f7f3c, 0x6f8f48, 0x4f7236, 0x7c9150];
@@ -32,6 +33,7 @@ export class Scenery {
    */
   constructor(three, roadside, origin, heights, painted) {
     const shapes = { posts: post(), lamps: lamp(), trees: tree(), firs: fir(), houses: house() };
+    const plain = { trees: plainTree(), firs: plainFir(), posts: null, lamps: null, houses: null };
     const tones = { posts: [0xffffff], lamps: [0xffffff], trees: LEAVES, firs: NEEDLES,
       houses: WALLS };
     for (const kind of /** @type {(keyof Roadside)[]} */ (Object.keys(shapes))) {
@@ -41,13 +43,13 @@ export class Scenery {
       if (instances.length > 0) {
         const [most, reach] = NEAREST[kind];
         this.#kinds.push(new NearInstances(three, geometryOf(three, shapes[kind]),
-          painted, instances, most, reach));
+          painted, instances, most, reach, plain[kind] && geometryOf(three, plain[kind])));
       }
     }
   }
 
   get meshes() {
-    return this.#kinds.map(({ mesh }) => mesh);
+    return this.#kinds.flatMap(({ meshes }) => meshes);
   }
 
   get triangles() {
@@ -57,6 +59,11 @@ export class Scenery {
   /** @param {{x: number, y: number}} eye */
   update(eye) {
     this.#kinds.forEach((kind) => kind.update(eye));
+  }
+
+  /** @param {Sight} sight of the camera that draws next */
+  see(sight) {
+    this.#kinds.forEach((kind) => kind.see(sight));
   }
 
   /** Free what the graphics card holds. */

@@ -14,6 +14,8 @@ const COLOR = {
 };
 // Corners of what is round.
 const ROUND = 7;
+// Of what is small in the picture.
+const PLAIN_ROUND = 5;
 
 const shapeParts = () => new MeshParts({ x: 0, y: 0 });
 
@@ -23,25 +25,25 @@ const shapeParts = () => new MeshParts({ x: 0, y: 0 });
  * @param {MeshParts} parts
  * @param {[radius: number, height: number][]} profile from below
  * @param {Rgb} color
- * @param {number} [x] of its axis
+ * @param {number} [round] how many corners it has
  */
-export function addRound(parts, profile, color, x = 0) {
+export function addRound(parts, profile, color, round = ROUND) {
   const first = parts.ranks.length;
   profile.forEach(([radius, z], level) => {
     const [r0, z0] = profile[Math.max(level - 1, 0)];
     const [r1, z1] = profile[Math.min(level + 1, profile.length - 1)];
     const slope = Math.hypot(z1 - z0, r0 - r1) || 1;
-    for (let k = 0; k < ROUND; k += 1) {
-      const angle = 2 * Math.PI * k / ROUND;
+    for (let k = 0; k < round; k += 1) {
+      const angle = 2 * Math.PI * k / round;
       const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
       const shade = /** @type {Rgb} */ (color.map(
         (value) => value * (0.72 + 0.28 * (level / Math.max(profile.length - 1, 1)))));
-      parts.vertex(x + radius * cos, radius * sin, z, shade, 0,
+      parts.vertex(radius * cos, radius * sin, z, shade, 0,
         [cos * (z1 - z0) / slope, sin * (z1 - z0) / slope, (r0 - r1) / slope]);
       if (level > 0) {
-        const here = first + level * ROUND + k;
-        const next = first + level * ROUND + (k + 1) % ROUND;
-        parts.indices.push(here - ROUND, next - ROUND, next, here - ROUND, next, here);
+        const here = first + level * round + k;
+        const next = first + level * round + (k + 1) % round;
+        parts.indices.push(here - round, next - round, next, here - round, next, here);
       }
     }
   });
@@ -94,6 +96,22 @@ export function fir() {
   addRound(parts, [[0.05, -0.05], [0.04, 0.25]], COLOR.bark);
   addRound(parts, [[0.42, 0.2], [0.24, 0.5], [0.28, 0.5], [0.14, 0.76], [0.17, 0.76], [0.01, 1]],
     COLOR.leaves);
+  return parts;
+}
+
+/** A tree of few triangles, of the same outline. */
+export function plainTree() {
+  const parts = shapeParts();
+  addRound(parts, [[0.045, -0.05], [0.035, 0.4]], COLOR.bark, 3);
+  addRound(parts, [[0.14, 0.36], [0.5, 0.6], [0.42, 0.84], [0.04, 1]], COLOR.leaves, PLAIN_ROUND);
+  return parts;
+}
+
+/** A fir of few triangles, of the same outline. */
+export function plainFir() {
+  const parts = shapeParts();
+  addRound(parts, [[0.045, -0.05], [0.04, 0.22]], COLOR.bark, 3);
+  addRound(parts, [[0.4, 0.2], [0.01, 1]], COLOR.leaves, PLAIN_ROUND);
   return parts;
 }
 

@@ -15,6 +15,7 @@ import { faceOf } from './sign_faces.js';
 /** @import { PlateShape } from './sign_faces.js' */
 /** @import { SignPole } from './poles.js' */
 /** @import { Cell } from './sign_atlas.js' */
+/** @import { Sight } from '../seen_instances.js' */
 /** @typedef {typeof import('../three.js')} Three */
 
 // Lower edges of the lowest plate, and of one above a road [m].
@@ -67,7 +68,7 @@ export class Signs {
   }
 
   get meshes() {
-    return [this.#plates, this.#poles.mesh];
+    return [this.#plates, ...this.#poles.meshes];
   }
 
   get triangles() {
@@ -77,6 +78,11 @@ export class Signs {
   /** @param {{x: number, y: number}} eye */
   update(eye) {
     this.#poles.update(eye);
+  }
+
+  /** @param {Sight} sight of the camera that draws next */
+  see(sight) {
+    this.#poles.see(sight);
   }
 
   /** Free what the graphics card holds. */

@@ -14,6 +14,7 @@ import { SYMBOLS } from './sign_symbols.js';
 /** @import { Heights } from './mesh_parts.js' */
 /** @import { LightPole } from './poles.js' */
 /** @import { Cell } from './sign_atlas.js' */
+/** @import { Sight } from '../seen_instances.js' */
 /** @typedef {typeof import('../three.js')} Three */
 
 /** Lamps from above, and which of them each state lights. */
@@ -87,7 +88,7 @@ export class TrafficLights {
   }
 
   get meshes() {
-    return [this.#lamps, this.#poles.mesh, this.#housings.mesh];
+    return [this.#lamps, ...this.#poles.meshes, ...this.#housings.meshes];
   }
 
   get triangles() {
@@ -119,6 +120,12 @@ export class TrafficLights {
       });
       colors.needsUpdate = true;
     });
+  }
+
+  /** @param {Sight} sight of the camera that draws next */
+  see(sight) {
+    this.#poles.see(sight);
+    this.#housings.see(sight);
   }
 
   /** Free what the graphics card holds. */
