@@ -223,7 +223,7 @@ class RunTasks:
         comes = schedule is not None and self._n >= schedule.next_n
         if prompt is not None and (
                 comes or self._n - prompt.n >= self._steps(task.latest + GRACE_S)):
-            self._close(course, 'missed')
+            self._close(course, 'missed', '' if prompt.seen else 'unseen')
         if schedule is not None and comes:
             schedule.advance()
             course.number += 1
@@ -250,7 +250,10 @@ class RunTasks:
             return
         since_ms = times.response_ms
         if not concerns or since_ms is None or not 0.0 <= since_ms <= 1e3 * task.latest:
-            self._note(course, 'unrequested', 0, times=times)
+            if not any(entry.task == report.task and entry.what == 'unrequested'
+                       for entry in self._entries):
+                # One a step: nobody is quicker.
+                self._note(course, 'unrequested', 0, times=times)
         else:
             outcome = 'premature' if since_ms < 1e3 * task.earliest else 'hit'
             self._close(course, 'answer', outcome, times)
