@@ -56,6 +56,7 @@ class _Course:
     running: bool = False
     begun: bool = False
     pressed: bool = False
+    may_end: bool = True
     number: int = 0
     schedule: StimulusSchedule | None = None
     prompt: OpenPrompt | None = None
@@ -167,10 +168,12 @@ class RunTasks:
         for course in self._courses.values():
             by = 'trigger' if course.pressed else 'condition'
             if course.running:
-                if course.pressed or holds(course.spec.until):
+                if course.pressed or (course.may_end and holds(course.spec.until)):
                     self._end(course, by)
             elif course.pressed or (not course.begun and holds(course.when)):
                 self._begin(course, by)
+                # Begun by the button after that, it is ended by the button.
+                course.may_end = not holds(course.spec.until)
             course.pressed = False
 
     def at_step(self, n: int, driven: Mapping[str, bool]) -> tuple[TaskEntry, ...]:

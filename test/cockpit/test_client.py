@@ -210,6 +210,10 @@ GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({'type': 'sound', 'on': 1, 'volume': 0.5, 'rumble': 1, 'pitch': 2},
      {'type': 'sound', 'on': True, 'volume': 0.5, 'rumble': 1.0}),
     ({'type': 'ping', 't': 12}, {'type': 'ping', 't': 12.0}),
+    ({'type': 'task', 'seat': 'hv0', 'task': 'light', 'number': 3, 'what': 'answer',
+      'response_ms': 312, 'delay_ms': 20.5},
+     {'type': 'task', 'seat': 'hv0', 'task': 'light', 'number': 3, 'what': 'answer', 'times': {
+         'response_ms': 312.0, 'delay_ms': 20.5, 'picture_ms': None, 'paused_ms': None}}),
 ]
 
 
@@ -263,6 +267,12 @@ BAD = {
     'sound too loud': '{"type": "sound", "on": 1, "volume": 1.01, "rumble": 0}',
     'sound on is 2': '{"type": "sound", "on": 2, "volume": 1, "rumble": 0}',
     'ping without': '{"type": "ping"}',
+    'task of a path': '{"type": "task", "seat": "hv0", "task": "../x", "number": 1, '
+                      '"what": "shown"}',
+    'task without number': '{"type": "task", "seat": "hv0", "task": "x", "what": "shown"}',
+    'task begins': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, "what": "begin"}',
+    'task for ever': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, '
+                     '"what": "answer", "response_ms": 1e12}',
 }
 
 
