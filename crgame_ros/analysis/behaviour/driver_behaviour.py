@@ -69,7 +69,8 @@ def measure_behaviour(record: RunRecord, limits: ResponseLimits = USUAL_LIMITS,
 
     :param record: of a recording (`read_run_record`) or of an offline run (`run_record_of`).
     :param limits: what counts as a response to an event.
-    :param requests: names of the events that ask to take over; orders of the seat do anyway.
+    :param requests: names of the events that ask to take over; orders of the seat and the game's
+        take-over requests do anyway.
     :param progress: is told how much has been measured, from 0 to 1.
     :raises InputError: if the scenario in it cannot be used.
     """
@@ -192,6 +193,8 @@ def _requests(record: RunRecord, vehicle_id: str,
              if order.seat == vehicle_id and order.source not in _BACK]
     found += [TakeOverRequest(event.n * dt_s, event.name) for event in record.fired
               if event.name in events]
+    found += [TakeOverRequest(entry.n * dt_s, entry.task) for entry in record.tasks
+              if entry.seat == vehicle_id and entry.what == 'request']
     return sorted(found)
 
 
