@@ -134,7 +134,7 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
         {**_motion(everybody, states, keeping), **_commands(controls)},
         tuple(EventReaction(event.name, event.n * dt_s,
                             reaction_to(event.n * dt_s, controls, limits))
-              for event in record.fired if event.vehicle is None and len(controls.times_s)),
+              for event in record.fired if event.is_of_game and len(controls.times_s)),
         limits,
         tuple(_gap(everybody, number, keeping, change) for change in keeping.changes),
         () if human else find_take_overs(
