@@ -177,7 +177,7 @@ test('pictures of a processor come less often when each takes long, yet 20 times
   const quality = new Quality(true, 1);
   quality.take(5, 0);
   assert.equal(quality.period_ms, 33);
-  quality.take(20, 100);
+  quality.take(12, 100);
   assert.equal(quality.period_ms, 40);
   quality.take(500, 200);
   assert.equal(quality.period_ms, 50);

@@ -20,8 +20,8 @@
 /** From all that there is to what is told from each other no more. @type {Detail[]} */
 export const DETAILS = [
   { plain_m: Infinity, farthest_m: 600, wheels_m: 600, fine: true, mirrorEvery: 1 },
-  { plain_m: 60, farthest_m: 400, wheels_m: 90, fine: false, mirrorEvery: 2 },
-  { plain_m: 30, farthest_m: 250, wheels_m: 50, fine: false, mirrorEvery: 3 },
+  { plain_m: 60, farthest_m: 400, wheels_m: 90, fine: false, mirrorEvery: 1 },
+  { plain_m: 30, farthest_m: 250, wheels_m: 50, fine: false, mirrorEvery: 2 },
 ];
 
 /**
@@ -35,7 +35,7 @@ const RUNGS = [[1, 0], [0.85, 0], [0.7, 0], [0.7, 1], [0.6, 1], [0.5, 1], [0.42,
 // What a picture may take [ms], how often there is one at most [ms], and the rung to begin with:
 // pictures that the processor draws are taken from the simulation on the same machine.
 const HARDWARE = { budget_ms: 9, period_ms: 0, start: 0 };
-const SOFTWARE = { budget_ms: 13, period_ms: 33, start: 5 };
+const SOFTWARE = { budget_ms: 9, period_ms: 33, start: 5 };
 const FINEST = 2;
 const TOO_MUCH = 1.2;
 const PLENTY = 0.8;
@@ -43,7 +43,7 @@ const EVERY_MS = 800;
 // A rung that was too dear is tried again after so long, then after twice as long, and so on.
 const AGAIN_MS = 20_000;
 // Of the time, no more goes to pictures.
-const MOST_SHARE = 0.5;
+const MOST_SHARE = 0.3;
 const SLOWEST_MS = 50;
 
 /** Names of renderers that are the processor itself. */
