@@ -147,7 +147,9 @@ test('detail is left out where pictures are too dear, and comes back where they 
     settle(100);
     assert.equal(quality.detail, DETAILS[DETAILS.length - 1]);
     assert.ok(quality.ratio <= 0.25);
+    assert.equal(quality.period_ms, 50);
     settle(1);
+    assert.equal(quality.period_ms, software ? 33 : 0);
     assert.equal(quality.detail, DETAILS[0]);
     assert.equal(quality.ratio, 1);
     settle(100);
