@@ -147,7 +147,9 @@ test('detail is left out where pictures are too dear, and comes back where they 
     settle(100);
     assert.equal(quality.detail, DETAILS[DETAILS.length - 1]);
     assert.ok(quality.ratio <= 0.25);
+    assert.equal(quality.period_ms, 50);
     settle(1);
+    assert.equal(quality.period_ms, software ? 33 : 0);
     assert.equal(quality.detail, DETAILS[0]);
     assert.equal(quality.ratio, 1);
     settle(100);
@@ -177,7 +179,7 @@ test('pictures of a processor come less often when each takes long, yet 20 times
   const quality = new Quality(true, 1);
   quality.take(5, 0);
   assert.equal(quality.period_ms, 33);
-  quality.take(20, 100);
+  quality.take(12, 100);
   assert.equal(quality.period_ms, 40);
   quality.take(500, 200);
   assert.equal(quality.period_ms, 50);
