@@ -26,6 +26,8 @@ const BEAM = { from: 1.2, to: 30, wide: 13, above: 0.04, near: 6, texels: 64 };
 const BEAM_STRENGTH = { dusk: 0.95, day: 0.07 };
 // Of others the light on the road is seen up to here; more would be drawn than is seen [m].
 const BEAM_SEEN_M = 60;
+// Who is that near shares the light on the road: many in a queue do not make it white [m].
+const SHARED_M = 20;
 
 /**
  * Tell whether people drive with their lights on.
@@ -47,6 +49,9 @@ export class Headlights {
   #parts = [];
   /** @type {MeshBasicMaterial[]} */
   #materials = [];
+  // Light on the road of this picture that is not handed over yet.
+  /** @type {{matrix: Matrix4, own: boolean}[]} */
+  #beams = [];
   #visibility = Infinity;
   #strength = 0;
   #color;
@@ -94,10 +99,12 @@ export class Headlights {
   /** Nothing shines until it is added anew. */
   clear() {
     this.#parts.forEach((part) => part.clear());
+    this.#beams = [];
   }
 
   /** @param {Sight} sight of the camera that draws next */
   see(sight) {
+    this.#shareBeams();
     this.#parts.forEach((part) => part.see(sight));
   }
 
@@ -120,7 +127,7 @@ export class Headlights {
    * @param {boolean} own whether it is the vehicle in which the camera may be
    */
   add(place, { front, rear, size: [width, height] }, [sx, sy, sz], distance, own) {
-    const [lamps, glow, beams] = this.#parts;
+    const [lamps, glow] = this.#parts;
     const seen = Math.min(GLOW_BRIGHTNESS * contrastLeft(distance, this.#visibility), 1);
     for (const [at, way, color, look] of /** @type {const} */ ([
       [front, 1, FRONT, GLOW.front], [rear, -1, REAR, GLOW.rear]])) {
@@ -135,11 +142,22 @@ export class Headlights {
       }
     }
     if (own || distance < BEAM_SEEN_M) {
-      // Who sits in the vehicle sees its light, too.
-      beams.add(this.#at(place, front[0] * sx, 0, BEAM.above, 0),
-        this.#color.setRGB(this.#strength, this.#strength, this.#strength,
-          this.#three.SRGBColorSpace), false);
+      this.#beams.push({ own,
+        matrix: this.#at(place, front[0] * sx, 0, BEAM.above, 0).clone() });
     }
+  }
+
+  #shareBeams() {
+    const beams = this.#beams;
+    for (const { matrix: { elements: e }, own, matrix } of beams) {
+      const near = beams.filter(({ matrix: { elements: other } }) => (
+        Math.hypot(other[12] - e[12], other[13] - e[13]) < SHARED_M)).length;
+      const share = this.#strength / (own ? 1 : near);
+      // Who sits in the vehicle sees its light, too.
+      this.#parts[2].add(matrix,
+        this.#color.setRGB(share, share, share, this.#three.SRGBColorSpace), false);
+    }
+    this.#beams = [];
   }
 
   /**
