@@ -56,6 +56,7 @@ class _Course:
     running: bool = False
     begun: bool = False
     pressed: bool = False
+    may_end: bool = True
     number: int = 0
     schedule: StimulusSchedule | None = None
     prompt: OpenPrompt | None = None
@@ -167,10 +168,12 @@ class RunTasks:
         for course in self._courses.values():
             by = 'trigger' if course.pressed else 'condition'
             if course.running:
-                if course.pressed or holds(course.spec.until):
+                if course.pressed or (course.may_end and holds(course.spec.until)):
                     self._end(course, by)
             elif course.pressed or (not course.begun and holds(course.when)):
                 self._begin(course, by)
+                # Begun by the button after that, it is ended by the button.
+                course.may_end = not holds(course.spec.until)
             course.pressed = False
 
     def at_step(self, n: int, driven: Mapping[str, bool]) -> tuple[TaskEntry, ...]:
@@ -223,7 +226,7 @@ class RunTasks:
         comes = schedule is not None and self._n >= schedule.next_n
         if prompt is not None and (
                 comes or self._n - prompt.n >= self._steps(task.latest + GRACE_S)):
-            self._close(course, 'missed')
+            self._close(course, 'missed', '' if prompt.seen else 'unseen')
         if schedule is not None and comes:
             schedule.advance()
             course.number += 1
@@ -250,7 +253,10 @@ class RunTasks:
             return
         since_ms = times.response_ms
         if not concerns or since_ms is None or not 0.0 <= since_ms <= 1e3 * task.latest:
-            self._note(course, 'unrequested', 0, times=times)
+            if not any(entry.task == report.task and entry.what == 'unrequested'
+                       for entry in self._entries):
+                # One a step: nobody is quicker.
+                self._note(course, 'unrequested', 0, times=times)
         else:
             outcome = 'premature' if since_ms < 1e3 * task.earliest else 'hit'
             self._close(course, 'answer', outcome, times)

@@ -25,6 +25,7 @@ from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_script import PracticeDrives
 from crgame_ros.study.study_file import load_study, StudyFile
+from PIL import Image
 import yaml
 
 STUDY: dict[str, Any] = {
@@ -99,6 +100,7 @@ def write_study(folder: Path, **changed: Any) -> StudyFile:
                        ('welcome.md', WELCOME), ('kinds.yaml', dump(KINDS)),
                        ('study.yaml', dump(STUDY | changed))):
         (folder / name).write_text(text, encoding='utf-8')
+    Image.new('RGB', (320, 120), '#4a7').save(folder / 'road.png')
     return load_study(folder / 'study.yaml')
 
 

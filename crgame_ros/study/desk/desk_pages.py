@@ -44,6 +44,8 @@ class DeskPages:
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self._participants: dict[Client, str] = {}
+        # In which language each has the words of the page.
+        self._worded: dict[Client, str] = {}
         self._experimenters: set[Client] = set()
         self._used: Client | None = None
         self._used_page = ''
@@ -63,6 +65,7 @@ class DeskPages:
         """Forget a page."""
         self._experimenters.discard(client)
         self._participants.pop(client, None)
+        self._worded.pop(client, None)
         if client is self._used:
             self._used = None
             self._told = {}
@@ -104,7 +107,6 @@ class DeskPages:
             page = self._participants[client]
             if kind == 'here' or message['fresh'] or page == self._used_page or not self._used:
                 self._used, self._used_page, self._told = client, page, {}
-            self._send_words(client)
             self._changed()
             return
         if kind == 'ping':
@@ -141,8 +143,6 @@ class DeskPages:
         match message['type']:
             case 'language':
                 self.desk.choose_language(message['language'])
-                for client in self._participants:
-                    self._send_words(client)
             case 'ready':
                 self.desk.ready(message['item'])
             case 'finish':
@@ -178,13 +178,18 @@ class DeskPages:
             self._send_participant(client)
 
     def _send_words(self, client: Client) -> None:
-        client.put_event(_text({'type': 'words',
-                                'words': words_of(self.desk.session.study, self.desk.language)}))
+        """Send the words of the page before whatever is shown with them."""
+        language = self.desk.language
+        if self._worded.get(client) != language:
+            self._worded[client] = language
+            client.put_event(_text({'type': 'words',
+                                    'words': words_of(self.desk.session.study, language)}))
 
     def _send_participant(self, client: Client) -> None:
         if not self._participants.get(client):
             return
         try:
+            self._send_words(client)
             document = participant_document(self.desk)
         except CrgameError as error:
             # A page of the study that is not there: the experimenter has to mend it.

@@ -67,9 +67,10 @@ export class FittedParts {
     this.#materials = [lamp, shadow].map(({ material }) => /** @type {MeshBasicMaterial} */ (
       material));
     this.#lamps = new SeenInstances(this.#three, { near: [lamp] }, 2 * most);
-    this.#shadows = new SeenInstances(this.#three, { near: [shadow] }, Math.max(count, 1));
+    this.#shadows = new SeenInstances(this.#three, { near: [shadow],
+      far: [{ ...shadow, geometry: shadow.geometry.clone() }], sooner: 0 }, Math.max(count, 1));
     // After the road and its markings.
-    this.#shadows.meshes[0].renderOrder = 5;
+    this.#shadows.meshes.forEach((mesh) => { mesh.renderOrder = 5; });
     this.#group.add(...this.#lamps.meshes, ...this.#shadows.meshes);
   }
 
