@@ -85,7 +85,9 @@ setup(
     python_requires='>=3.11,<3.13',
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={PACKAGE: ['py.typed', 'cockpit/page/*', 'cockpit/page/**/*',
-                            'analysis/report/page/*', 'evaluation/summary/page/*']},
+                            'analysis/report/page/*', 'evaluation/summary/page/*',
+                             'study/data/page/*', 'study/scales/*', 'study/desk/words/*',
+                             'study/desk/page/*', 'study/desk/page/**/*']},
     data_files=data_files(),
     zip_safe=False,
     # What is imported, at the versions of requirements.txt. Those that other packages need in turn
@@ -100,6 +102,7 @@ setup(
         'evdev-binary>=2.0,<3',
         'lxml>=6.1,<7',
         'lz4>=4.4,<5',
+        'markdown-it-py>=4.3,<5',
         'matplotlib>=3.9,<4',
         'mcap>=1.6,<2',
         'numba>=0.68.1,<0.69',

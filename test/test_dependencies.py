@@ -39,6 +39,7 @@ THIRD_PARTY = {
     'evdev': ('evdev-binary', 'python3-evdev'),
     'lxml': ('lxml', 'python3-lxml'),
     'lz4': ('lz4', 'python3-lz4'),
+    'markdown_it': ('markdown-it-py', None),
     'matplotlib': ('matplotlib', 'python3-matplotlib'),
     'mcap': ('mcap', None),
     'numba': ('numba', None),

@@ -23,6 +23,7 @@ from typing import Protocol
 
 from aiohttp import WSMsgType
 from crgame_ros.cockpit.rights import ALL_RIGHTS
+from crgame_ros.cockpit.seen_view import SeenView
 
 MAX_WAITING = 256
 MAX_WAITING_BYTES = 16 * 2 ** 20
@@ -121,6 +122,7 @@ class Client:
         self.wants_scans = False
         # As the page told it last.
         self.sound = Sound()
+        self.view = SeenView()
         # Least time between two frames of the slot 'state' [s]; 0 sends each.
         self.state_period_s = 0.0
         self.dropped = ''

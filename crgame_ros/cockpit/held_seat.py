@@ -17,8 +17,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from crgame_ros.cockpit.input_delay import InputDelay
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
+from crgame_ros.driver.input_delay import InputDelay
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
@@ -52,6 +52,7 @@ class HeldSeat:
         self._lever = IndicatorLever(_LIGHTS)
         self._keys: KeyState | None = None
         self._axes: DriverCommand | None = None
+        self._put_back = False
         self._heard_s = 0.0
         self.away = True
 
@@ -64,6 +65,7 @@ class HeldSeat:
         """
         self._heard_s = now_s
         before = (self._keys, self._axes)
+        self._put_back = bool(message.get('put_back'))
         reverse = bool(message.get('reverse'))
         keys, axes = message.get('keys'), message.get('axes')
         self.away = keys is None and axes is None
@@ -82,6 +84,7 @@ class HeldSeat:
         """Take the hands off everything at once."""
         self.away = True
         self._keys = self._axes = None
+        self._put_back = False
         self._cycles.reset()
         self._lever.hold(())
 
@@ -104,4 +107,4 @@ class HeldSeat:
                 self._cycles.reset()
             command = self._cycles.command(n, self._keys, dt_s)
         self._lever.turn(command.steering)
-        return command._replace(lights=self._lever.lights)
+        return command._replace(lights=self._lever.lights, put_back=self._put_back)

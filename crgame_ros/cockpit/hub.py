@@ -50,10 +50,12 @@ class Hub:
     Everybody who watches. Nothing here waits: a client that reads slowly delays nobody.
 
     :param mode: live or replay, for `hello`.
+    :param framed_by: origin of the page that may show this one within it, for `hello`.
     """
 
-    def __init__(self, mode: str) -> None:
+    def __init__(self, mode: str, framed_by: str = '') -> None:
         self._mode = mode
+        self._framed_by = framed_by
         self._clients: dict[str, Client] = {}
         self._documents: dict[str, bytes] = {}
         self._frames: dict[str, _Frame] = {}
@@ -177,7 +179,7 @@ class Hub:
         client.address, client.heard_s = address, now_s
         client.put_event(_encode('hello', {
             'client': client.id, 'name': client.name, 'mode': self._mode,
-            'version': __version__, 'rights': _rights(client)}))
+            'version': __version__, 'rights': _rights(client), 'framed_by': self._framed_by}))
         for kind, text in self._documents.items():
             client.put_document(kind, text)
         for slot, frame in self._frames.items():

@@ -14,7 +14,7 @@
 # limitations under the License.
 """The files of the page, read once: a request names a key of this table, never a path."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 import hashlib
 from pathlib import Path
@@ -60,7 +60,7 @@ def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
     :return: by the path of the request.
     :raises CrgameError: if the page or Plotly is not installed.
     """
-    table = dict(_page_files(directory))
+    table = read_files(directory, '/static/')
     index = table.pop('/static/index.html', None)
     if index is None:
         raise CrgameError(f'{directory}: the page of the cockpit is missing; '
@@ -79,10 +79,16 @@ def read_three(path: str) -> PageFile | None:
     return None if folder is None else _read(folder / THREE[path])
 
 
-def _page_files(directory: Path) -> Iterator[tuple[str, PageFile]]:
-    for path in sorted(directory.rglob('*')):
-        if path.suffix in TYPES and path.is_file():
-            yield f'/static/{path.relative_to(directory).as_posix()}', _read(path)
+def read_files(directory: Path, prefix: str) -> dict[str, PageFile]:
+    """
+    Read all files of a folder that a page may consist of.
+
+    :param prefix: of their requests.
+    :return: by the path of the request.
+    """
+    return {f'{prefix}{path.relative_to(directory).as_posix()}': _read(path)
+            for path in sorted(directory.rglob('*'))
+            if path.suffix in TYPES and path.is_file()}
 
 
 def _read(path: Path) -> PageFile:

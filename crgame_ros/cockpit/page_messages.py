@@ -15,6 +15,7 @@
 """The messages of the page: JSON of strangers in, checked mappings or one clear error out."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 import json
 import math
 import re
@@ -22,13 +23,20 @@ from typing import Any
 import unicodedata
 
 from crgame_ros.cockpit.rights import ROLES
+from crgame_ros.cockpit.seen_view import SHOWN
 from crgame_ros.errors import InputError
+from crgame_ros.game.task_documents import LONGEST_MS, MAX_NUMBER, PageTimes
 
 MAX_BYTES = 64 * 1024
 MAX_NAME = 40
 MAX_EVENT = 100
 MAX_DEVICE = 60
+MAX_RENDERER = 160
 MAX_DELAY_MS = 60_000.0
+# The most that the numbers of a view can be.
+_VIEW_NUMBERS = {'width_px': 1e5, 'height_px': 1e5, 'ratio': 100.0}
+_VIEW_MEASURES = {'across_deg': 180.0, 'screen_width_m': 20.0, 'eye_distance_m': 20.0,
+                  'rate_hz': 1000.0}
 REAL_TIME_FACTORS = (0.1, 10.0)
 ACTIONS = ('start', 'pause', 'step', 'reset', 'stop')
 # Rounding of a calibrated axis in the page.
@@ -39,6 +47,8 @@ _VEHICLE = re.compile(r'(hv|av)[0-9]{1,3}')
 _AV = re.compile(r'av[0-9]{1,3}')
 _CLIENT = re.compile(r'c[0-9]{1,9}')
 _KEY = re.compile(r'[0-9a-f]{32}')
+_TASK = re.compile(r'[a-z0-9_-]{1,40}')
+_TASK_TIMES = tuple(field.name for field in fields(PageTimes))
 # Control and format characters, surrogates, private use, unassigned, line and paragraph breaks:
 # they hide or reorder what others read. Angle brackets and ampersands are for mark-up only.
 _HIDDEN = frozenset({'Cc', 'Cf', 'Cs', 'Co', 'Cn', 'Zl', 'Zp'})
@@ -93,6 +103,8 @@ def _input(message: Mapping[str, Any]) -> dict[str, Any]:
     hands: dict[str, Any] = {'seat': seat, 'reverse': reverse}
     if 'lights' in message:
         hands['lights'] = [_as_flag(each, 'lights') for each in _list(message, 'lights', 4)]
+    if 'put_back' in message:
+        hands['put_back'] = _flag(message, 'put_back')
     if given == ['keys']:
         keys = _list(message, 'keys', 4)
         return {**hands, 'keys': [_as_flag(key, 'keys') for key in keys]}
@@ -192,6 +204,19 @@ def _sound(message: Mapping[str, Any]) -> dict[str, Any]:
             'rumble': _share(message, 'rumble')}
 
 
+def _view(message: Mapping[str, Any]) -> dict[str, Any]:
+    """Read what is shown; what nobody knows is left out."""
+    if message.get('shown') not in SHOWN:
+        raise _wrong('shown', f'is none of {", ".join(SHOWN)}')
+    flags = {field: _flag(message, field)
+             for field in ('inset', 'plans', 'mirrors', 'bare', 'software')}
+    numbers = {field: _within(message, field, most) for field, most in _VIEW_NUMBERS.items()}
+    measures = {field: _within(message, field, most) for field, most in _VIEW_MEASURES.items()
+                if message.get(field) is not None}
+    return {'shown': message['shown'], 'renderer': _words(message, 'renderer', MAX_RENDERER),
+            **flags, **numbers, **measures}
+
+
 def _ping(message: Mapping[str, Any]) -> dict[str, Any]:
     delay_ms = message.get('round_trip_ms')
     if delay_ms is None:
@@ -202,11 +227,30 @@ def _ping(message: Mapping[str, Any]) -> dict[str, Any]:
     return {'t': _number(message.get('t'), 't'), 'round_trip_ms': delay_ms}
 
 
+def _task(message: Mapping[str, Any]) -> dict[str, Any]:
+    name, number = message.get('task'), message.get('number')
+    if not isinstance(name, str) or _TASK.fullmatch(name) is None:
+        raise _wrong('task', 'is no name of a task')
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= MAX_NUMBER:
+        raise _wrong('number', 'is no number of a stimulus')
+    if message.get('what') not in ('shown', 'answer'):
+        raise _wrong('what', 'is neither shown nor answer')
+    times: dict[str, float | None] = {}
+    for field in _TASK_TIMES:
+        value = message.get(field)
+        times[field] = None if value is None else _number(value, field)
+        if abs(times[field] or 0.0) > LONGEST_MS:
+            raise _wrong(field, f'is not from -{LONGEST_MS:g} to {LONGEST_MS:g}')
+    return {'seat': _matching(message, 'seat', _VEHICLE), 'task': name, 'number': number,
+            'what': message['what'], 'times': times}
+
+
 _READERS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
     'input': _input, 'claim': _claim, 'release': _seat, 'ask': _seat, 'hand_over': _hand_over,
     'answer': _answer, 'ready': _ready, 'person': _person, 'role': _role, 'device': _device,
     'control': _control, 'rate': _rate, 'planner': _planner, 'trigger': _trigger,
-    'name': _name, 'layers': _layers, 'sound': _sound, 'ping': _ping}
+    'name': _name, 'layers': _layers, 'sound': _sound, 'view': _view, 'ping': _ping,
+    'task': _task}
 
 
 def _id(message: Mapping[str, Any]) -> int:
@@ -242,6 +286,13 @@ def _share(message: Mapping[str, Any], field: str) -> float:
     return number
 
 
+def _within(message: Mapping[str, Any], field: str, most: float) -> float:
+    number = _number(message.get(field), field)
+    if not 0.0 <= number <= most:
+        raise _wrong(field, f'is not from 0 to {most:g}')
+    return number
+
+
 def _axis(value: Any, low: float) -> float:
     number = _number(value, 'axes')
     if not low - _AXIS_TOLERANCE <= number <= 1.0 + _AXIS_TOLERANCE:
@@ -249,12 +300,12 @@ def _axis(value: Any, low: float) -> float:
     return min(max(number, low), 1.0)
 
 
-def _words(message: Mapping[str, Any], field: str) -> str:
+def _words(message: Mapping[str, Any], field: str, length: int = MAX_DEVICE) -> str:
     """Read a text for others to read; empty where there is none."""
     value = message.get(field, '')
     if not isinstance(value, str):
         raise _wrong(field, 'is no text')
-    return clean_text(value, MAX_DEVICE)
+    return clean_text(value, length)
 
 
 def _flag(message: Mapping[str, Any], field: str) -> bool:

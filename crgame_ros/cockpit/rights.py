@@ -21,7 +21,8 @@ from typing import Any
 # What a page, a link or the address may ask for.
 ROLES = ('direct', 'drive', 'watch', 'all')
 _DIRECTS = ('control', 'rate', 'planner', 'trigger')
-_DRIVES = ('input', 'claim', 'release', 'ask', 'hand_over', 'answer', 'ready', 'device')
+_DRIVES = ('input', 'claim', 'release', 'ask', 'hand_over', 'answer', 'ready', 'device',
+           'task')
 _DEEDS = {'start': 'start the run', 'pause': 'pause the run', 'step': 'step through the run',
           'reset': 'reset the run', 'stop': 'stop the run', 'rate': 'change the speed of time',
           'planner': 'stop a planner or let it go on', 'trigger': 'trigger events',

@@ -30,6 +30,7 @@ from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.game.task_spec import TaskSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import group_outline, LoadedScenario
@@ -78,9 +79,18 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'drivers': {human.id: human.driver for human in game.humans},
         'planners': {av.id: av.planner for av in game.avs},
         'occupancy': game.occupancy is not None,
-        'events': list(game.event_entries), 'sound': game.sound}
+        'events': list(game.event_entries), 'sound': game.sound,
+        'contact': game.drivability.contact,
+        'tasks': [_task(task) for task in game.tasks], 'language': game.language}
     finite: Document = _finite(document)
     return finite
+
+
+def _task(spec: TaskSpec) -> Document:
+    task = spec.task
+    return {'name': spec.name, 'kind': spec.kind, 'label': spec.label, 'seat': spec.seat,
+            'shown_s': getattr(task, 'shown', None), 'latest_s': getattr(task, 'latest', None),
+            'lead_s': getattr(task, 'lead', None), 'show': getattr(task, 'show', True)}
 
 
 def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) -> Document:

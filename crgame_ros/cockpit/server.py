@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The web server of the cockpit: routes, who is let in, headers, ports."""
+"""The web server of the cockpit: routes and ports."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -21,43 +21,27 @@ import errno
 from pathlib import Path
 from typing import cast
 
-from aiohttp import hdrs, web
-from aiohttp.typedefs import Handler, Middleware
+from aiohttp import web
 from crgame_ros.cockpit import invite_routes, library_routes, page_files
-from crgame_ros.cockpit.access import Access, is_own_origin
+from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.backend import Backend, ReplayControls
 from crgame_ros.cockpit.doorkeeper import Doorkeeper, server_log, WatchedSite
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_files import PageFile
-from crgame_ros.cockpit.request_rights import RIGHTS
+from crgame_ros.cockpit.request_guard import ACCESS, file_answer, guard, header_writer, KEEPER
 from crgame_ros.cockpit.session import Session
 from crgame_ros.errors import InputError
 
 HUB = web.AppKey('hub', Hub)
-KEEPER = web.AppKey('keeper', Doorkeeper)
-ACCESS = web.AppKey('access', Access)
-# How long a browser keeps what it got for its token [s].
-COOKIE_S = 12 * 3600
 PORTS_TRIED = 20
 SHUTDOWN_S = 0.8
 _STALL_CHECK_S = 0.5
 _JSON_BYTES = 256 * 1024
 
-_POLICY = 'Content-Security-Policy'
-_HEADERS = {
-    _POLICY: (
-        "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-        "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
-    'X-Content-Type-Options': 'nosniff',
-    'Referrer-Policy': 'no-referrer',
-    'Cross-Origin-Resource-Policy': 'same-origin',
-    'Server': 'crgame_ros',
-}
-
 
 def create_app(backend: Backend, access: Access, library: Library | None, *,
-               page: Path = page_files.PAGE) -> web.Application:
+               page: Path = page_files.PAGE, framed_by: str = '') -> web.Application:
     """
     Make the server's application. It starts the backend, and stops it when it is cleaned up.
 
@@ -65,15 +49,16 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     :param access: who is let in.
     :param library: scenarios that can be chosen; None for none.
     :param page: the folder of the page.
+    :param framed_by: origin of the one page that may show this one within it; empty for none.
     :raises CrgameError: if the page or Plotly is not installed.
     """
-    hub = Hub(backend.mode)
+    hub = Hub(backend.mode, framed_by)
     keeper = Doorkeeper()
     sessions: set[Session] = set()
-    app = web.Application(middlewares=[_guard(access, keeper)], client_max_size=_JSON_BYTES)
+    app = web.Application(middlewares=[guard(access, keeper)], client_max_size=_JSON_BYTES)
     app[HUB], app[KEEPER], app[ACCESS] = hub, keeper, access
     app.cleanup_ctx.append(_running(backend, hub))
-    app.on_response_prepare.append(_add_headers)
+    app.on_response_prepare.append(header_writer(_is_static, framed_by=framed_by))
 
     async def connect(request: web.Request) -> web.WebSocketResponse:
         session = Session(hub, backend)
@@ -133,66 +118,8 @@ async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRun
         raise
 
 
-def _guard(access: Access, keeper: Doorkeeper) -> Middleware:
-    @web.middleware
-    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
-        transport = request.transport
-        keeper.begins(transport)
-        try:
-            return await _answer(access, request, handler)
-        finally:
-            keeper.ends(transport)
-    return guard
-
-
-async def _answer(access: Access, request: web.Request,
-                  handler: Handler) -> web.StreamResponse:
-    sockname = request.get_extra_info('sockname')
-    if sockname is None:
-        raise ConnectionResetError
-    refusal = _refusal(access, request, sockname[1])
-    if refusal:
-        return web.Response(status=403, text=f'{refusal}\n')
-    name = f'crgame-{sockname[1]}'
-    cookie = request.cookies.get(name)
-    if access.asks and request.path == '/' and 'token' in request.query:
-        try:
-            cookie = access.exchange(request.query['token'], cookie)
-        except InputError as error:
-            return web.Response(status=403, text=f'{error}\n')
-        answer = web.Response(status=303, headers={'Location': '/'})
-        answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
-                          secure=access.tls is not None, max_age=COOKIE_S)
-        return answer
-    rights = access.rights(cookie)
-    if rights is None:
-        return web.Response(status=403, text=f'{access.refusal}\n')
-    request[RIGHTS] = rights
-    return await handler(request)
-
-
-def _refusal(access: Access, request: web.Request, port: int) -> str:
-    """Say why a request is refused whatever its token, empty if it is not."""
-    host = request.headers.get(hdrs.HOST, '')
-    if not access.allows_host(host, port):
-        return f'This is not the name of the cockpit: open http://127.0.0.1:{port}/'
-    if not is_own_origin(request.headers.get(hdrs.ORIGIN), host):
-        return 'Pages of other sites cannot use the cockpit.'
-    foreign = request.headers.get('Sec-Fetch-Site') in ('cross-site', 'same-site')
-    if foreign and request.path != '/':
-        return 'Pages of other sites cannot use the cockpit.'
-    if request.method == hdrs.METH_POST and request.headers.get('X-Crgame') != '1':
-        return 'The header X-Crgame: 1 is missing.'
-    return ''
-
-
-async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
-    own = response.headers.get(_POLICY)
-    response.headers.update(_HEADERS)
-    if own is not None:
-        response.headers[_POLICY] = own
-    static = request.path.startswith(('/static/', '/three/')) or request.path == page_files.PLOTLY
-    response.headers[hdrs.CACHE_CONTROL] = 'no-cache' if static else 'no-store'
+def _is_static(path: str) -> bool:
+    return path.startswith(('/static/', '/three/')) or path == page_files.PLOTLY
 
 
 def _add_page(app: web.Application, table: Mapping[str, PageFile]) -> None:
@@ -206,14 +133,7 @@ def _add_page(app: web.Application, table: Mapping[str, PageFile]) -> None:
         return table.get(path) or three.get(path)
 
     async def serve(request: web.Request) -> web.Response:
-        file = find(request.path)
-        if file is None:
-            return web.Response(status=404, text='There is no such file.\n')
-        if request.headers.get(hdrs.IF_NONE_MATCH) == f'"{file.tag}"':
-            return web.Response(status=304, headers={hdrs.ETAG: f'"{file.tag}"'})
-        return web.Response(body=file.body, content_type=file.content_type,
-                            charset='utf-8' if file.is_text else None,
-                            headers={hdrs.ETAG: f'"{file.tag}"'})
+        return file_answer(request, find(request.path))
 
     for path in (page_files.INDEX, page_files.PLOTLY, *page_files.THREE, '/static/{name:.*}'):
         app.router.add_get(path, serve)

@@ -28,6 +28,7 @@ from crgame_ros.cockpit.client import Client, Sound, TokenBucket
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.request_rights import browser_of, granted
 from crgame_ros.cockpit.rights import refusal_of
+from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.errors import CrgameError, InputError
 
 MESSAGES_PER_S = 400.0
@@ -166,13 +167,13 @@ class Session:
             case _ if refusal and self._backend.mode == 'live':
                 if 'id' in message:
                     self._reply(client, message, False, refusal)
-            case 'input':
+            case 'input' | 'task':
                 try:
                     await self._backend.command(client, message)
                 except CrgameError as error:
                     # Repeated every 50 ms, and sent for a while after a seat was lost: the seats
                     # say who holds them.
-                    _log.debug('input of %s: %s', client.id, error)
+                    _log.debug('%s of %s: %s', message['type'], client.id, error)
             case 'name':
                 client.name = message['name']
             case 'layers':
@@ -182,6 +183,9 @@ class Session:
                 self._hub.send_wanted(client)
             case 'sound':
                 client.sound = Sound(message['on'], message['volume'], message['rumble'])
+            case 'view':
+                client.view = SeenView(**{key: value for key, value in message.items()
+                                          if key != 'type'})
             case 'person':
                 self._hub.identify(client, message['key'], fresh=message['fresh'])
                 self._backend.joined(client)

@@ -161,7 +161,7 @@ class ButtonPair:
 @dataclass(frozen=True)
 class ButtonEntry:
     """
-    Buttons of the gear, the indicators and the horn.
+    Buttons of the gear, the indicators, the horn, and of being put back.
 
     :param reverse_on: a press selects reverse.
     :param reverse_off: a press selects forward.
@@ -171,6 +171,7 @@ class ButtonEntry:
     :param right_indicator: a press switches the right indicator on or off.
     :param hazard: a press switches the hazard lights on or off.
     :param horn: it sounds while held.
+    :param put_back: after a contact the vehicle is put back on its lane.
     """
 
     FORM: ClassVar[Form] = _FORM
@@ -183,6 +184,7 @@ class ButtonEntry:
     right_indicator: tuple[ButtonPair, ...] = ()
     hazard: tuple[ButtonPair, ...] = ()
     horn: tuple[ButtonPair, ...] = ()
+    put_back: tuple[ButtonPair, ...] = ()
 
     def gears(self, way: Literal['evdev', 'joy']) -> GearButtons:
         """Give those of the gear as the program has them, in one way of reading the device."""
@@ -213,6 +215,7 @@ class KeyEntry:
     :param right_indicator: a press switches the right indicator on or off.
     :param hazard: a press switches the hazard lights on or off.
     :param horn: it sounds while held.
+    :param put_back: after a contact the vehicle is put back on its lane.
     """
 
     FORM: ClassVar[Form] = _FORM
@@ -226,6 +229,7 @@ class KeyEntry:
     right_indicator: Keys = ()
     hazard: Keys = ()
     horn: Keys = ()
+    put_back: Keys = ()
 
 
 _PEDALS = ('throttle', 'pedals')
@@ -282,6 +286,8 @@ class DeviceFile:
         brake = none if self.brake is None else self.brake.bindings(False)
         pedals = none if self.pedals is None else self.pedals.bindings(True)
         return (ControlBindings(steering[0], throttle[0], brake[0], pedals[0],
-                                self.buttons.gears('evdev'), self.buttons.lights('evdev')),
+                                self.buttons.gears('evdev'), self.buttons.lights('evdev'),
+                                _codes(self.buttons.put_back, 'evdev')),
                 ControlBindings(steering[1], throttle[1], brake[1], pedals[1],
-                                self.buttons.gears('joy'), self.buttons.lights('joy')))
+                                self.buttons.gears('joy'), self.buttons.lights('joy'),
+                                _codes(self.buttons.put_back, 'joy')))

@@ -55,6 +55,7 @@ class KeyBindings:
     right_indicator: frozenset[int] = frozenset()
     hazard: frozenset[int] = frozenset()
     horn: frozenset[int] = frozenset()
+    put_back: frozenset[int] = frozenset()
 
     @property
     def codes(self) -> frozenset[int]:
@@ -77,7 +78,7 @@ class KeyBindings:
         return KeyState(not self.throttle.isdisjoint(pressed), not self.brake.isdisjoint(pressed),
                         not self.left.isdisjoint(pressed), not self.right.isdisjoint(pressed),
                         reverse, bool(lights & Light.LEFT), bool(lights & Light.RIGHT),
-                        bool(lights & Light.HORN))
+                        bool(lights & Light.HORN), not self.put_back.isdisjoint(pressed))
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ class KeyState(NamedTuple):
     :param left_indicator: the left indicator is on; a device's lever switches it
     :param right_indicator: the right indicator is on; both together are the hazard lights
     :param horn: the horn sounds
+    :param put_back: the vehicle is to be put back on its lane
     """
 
     throttle: bool = False
@@ -46,6 +47,7 @@ class KeyState(NamedTuple):
     left_indicator: bool = False
     right_indicator: bool = False
     horn: bool = False
+    put_back: bool = False
 
     @property
     def lights(self) -> int:
@@ -126,7 +128,7 @@ class KeyboardFilter:
         return DriverCommand(
             min(1.0, max(0.0, state.throttle + throttle_rate * dt_s)),
             min(1.0, max(0.0, state.brake + brake_rate * dt_s)),
-            steering, bool(keys.reverse), keys.lights)
+            steering, bool(keys.reverse), keys.lights, bool(keys.put_back))
 
     def command(self, state: DriverCommand) -> DriverCommand:
         """
@@ -140,7 +142,7 @@ class KeyboardFilter:
             0.0 if state.throttle < p.pedal_deadband else state.throttle,
             0.0 if state.brake < p.pedal_deadband else state.brake,
             0.0 if abs(state.steering) < p.steering_deadband else state.steering,
-            state.reverse, state.lights)
+            state.reverse, state.lights, state.put_back)
 
     def advance(self, keys: KeyState, dt_s: float) -> DriverCommand:
         """Commit a cycle with these keys held, and give its command."""

@@ -30,15 +30,13 @@ class ReplayDriver(DriverSource):
     After their end nobody is there: as after any loss of a driver the pedals and the steering are
     let go at their rates, then the brake is applied gently and stays, in simulation time.
 
-    :param commands: (cycles, 5) throttle, brake, steering, reverse and lights of cycle 0, 1, …;
-        NaN where an AV followed its plan. What earlier versions kept has no lights.
+    :param commands: (cycles, 6) throttle, brake, steering, reverse, lights and put_back of cycle
+        0, 1, …; NaN where an AV followed its plan. What earlier versions kept has the first four
+        or five.
     """
 
     def __init__(self, commands: NDArray[np.float64]) -> None:
-        self._commands = [
-            DriverCommand(throttle, brake, steering, reverse == 1.0,
-                          *(int(each) for each in lights if each == each))
-            for throttle, brake, steering, reverse, *lights in commands.tolist()]
+        self._commands = [_command(row) for row in commands.tolist()]
         self._recorded = len(self._commands)
         self._end = SeatWatchdog()
 
@@ -55,3 +53,9 @@ class ReplayDriver(DriverSource):
             # At an infinite speed it never takes the brake off again.
             self._commands.append(self._end.filter(RELEASED, math.inf, dt_s, math.inf))
         return self._commands[n]
+
+
+def _command(row: list[float]) -> DriverCommand:
+    throttle, brake, steering, reverse, *switches = row
+    lights, put_back = (*(each if each == each else 0.0 for each in switches), 0.0, 0.0)[:2]
+    return DriverCommand(throttle, brake, steering, reverse == 1.0, int(lights), put_back == 1.0)

@@ -102,7 +102,7 @@ class JoyTimeline:
     Written by hand as points of simulation time [s] since the start of the run, followed by
     the listed axes; linear between points, constant before the first and after the last. Axes
     that are not listed rest. Reverse is the gear, asked for in its intervals; the indicators and
-    the horn are on in theirs:
+    the horn are on in theirs, and in those of put_back the vehicle is to be put back:
 
         joy:
           axes: [throttle, brake, steering]
@@ -116,7 +116,8 @@ class JoyTimeline:
 
     :param times_s: (P) times of the points, rising [s].
     :param values: (P, 3) throttle, brake in [0, 1], steering in [-1, 1], positive to the left.
-    :param held: intervals in which the reverse gear is asked for and lights are on.
+    :param held: intervals in which the reverse gear is asked for, lights are on, or the
+        vehicle is to be put back.
     """
 
     times_s: tuple[float, ...]

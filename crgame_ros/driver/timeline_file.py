@@ -41,10 +41,11 @@ _KEPT = 32
 REMEDY = 'see docs/driving.md, section "Scripted drivers"'
 _FORM = Form(REMEDY)
 Time = Annotated[float, Within(0.0, MAX_TIME_S)]
-LightName = Literal['left_indicator', 'right_indicator', 'horn']
+LightName = Literal['left_indicator', 'right_indicator', 'horn', 'put_back']
 KeyName = Literal['throttle', 'brake', 'left', 'right', 'reverse', 'left_indicator',
                   'right_indicator', 'horn']
-_SWITCHES: tuple[Literal['reverse'] | LightName, ...] = ('reverse', *get_args(LightName))
+_SWITCHES: tuple[Literal['reverse', 'put_back'] | LightName, ...] = (
+    'reverse', *get_args(LightName), 'put_back')
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,8 @@ class HeldKeys(Span):
     :param start: first instant, since the start of the run [s]
     :param end: first instant after it [s]
     :param hold: the keys, a list or one of them; reverse is the gear, asked for while held;
-        indicators (both: hazard lights) and horn are on while held.
+        indicators (both: hazard lights) and horn are on while held; put_back, after a contact,
+        puts the vehicle back on its lane.
     """
 
     hold: Annotated[KeyName | tuple[KeyName, ...], Advice(
@@ -99,6 +101,7 @@ class JoyEntry:
     :param left_indicator: intervals in which the left indicator is on.
     :param right_indicator: intervals in which the right indicator is on.
     :param horn: intervals in which the horn sounds.
+    :param put_back: intervals in which the vehicle is to be put back on its lane.
     """
 
     FORM: ClassVar[Form] = Form(REMEDY, first=('axes',))
@@ -109,6 +112,7 @@ class JoyEntry:
     left_indicator: Annotated[tuple[Span, ...], LeftOut()] = ()
     right_indicator: Annotated[tuple[Span, ...], LeftOut()] = ()
     horn: Annotated[tuple[Span, ...], LeftOut()] = ()
+    put_back: Annotated[tuple[Span, ...], LeftOut()] = ()
 
     def check(self) -> None:
         """Refuse axes that come twice, and points that do not fit them or do not rise in time."""

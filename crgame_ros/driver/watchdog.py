@@ -127,7 +127,8 @@ class SeatWatchdog:
         return DriverCommand(
             _ramp(now.throttle, goal.throttle, p.throttle_rate * dt_s, release),
             _ramp(now.brake, goal.brake, p.brake_rate * dt_s, release),
-            _ramp(now.steering, goal.steering, turn, turn), goal.reverse, goal.lights)
+            _ramp(now.steering, goal.steering, turn, turn), goal.reverse, goal.lights,
+            goal.put_back)
 
 
 def _ramp(value: float, goal: float, up: float, down: float) -> float:

@@ -140,6 +140,7 @@ class ControlLayout:
     :param pedals: one axis for both pedals, throttle on its positive side.
     :param gear: the gear buttons.
     :param lights: those of indicators and horn.
+    :param put_back: those that put the vehicle back on its lane.
     """
 
     steering: AxisRange
@@ -148,6 +149,7 @@ class ControlLayout:
     pedals: AxisRange | None = None
     gear: GearButtons = GearButtons()
     lights: LightButtons = LightButtons()
+    put_back: frozenset[int] = frozenset()
 
     @property
     def ranges(self) -> tuple[AxisRange, ...]:
@@ -220,6 +222,7 @@ class ControlBindings:
     pedals: AxisBinding | None
     gear: GearButtons
     lights: LightButtons = LightButtons()
+    put_back: frozenset[int] = frozenset()
 
     def layout(self, reported: Mapping[int, tuple[float, float]] | None = None) -> ControlLayout:
         """
@@ -235,7 +238,7 @@ class ControlBindings:
 
         return ControlLayout(
             self.steering.range(known.get(self.steering.code)), complete(self.throttle),
-            complete(self.brake), complete(self.pedals), self.gear, self.lights)
+            complete(self.brake), complete(self.pedals), self.gear, self.lights, self.put_back)
 
 
 def reported(axes: Mapping[int, float], layout: ControlLayout,
@@ -294,4 +297,5 @@ def normalize(raw: RawInput, layout: ControlLayout, reverse: bool = False,
     else:
         throttle = layout.throttle.travel(raw) if layout.throttle else 0.0
         brake = layout.brake.travel(raw) if layout.brake else 0.0
-    return DriverCommand(throttle, brake, layout.steering.deflection(raw), reverse, lights)
+    return DriverCommand(throttle, brake, layout.steering.deflection(raw), reverse, lights,
+                         not layout.put_back.isdisjoint(raw.pressed))

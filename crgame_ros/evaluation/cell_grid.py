@@ -148,11 +148,17 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
 
 
 def _told_apart(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:
-    """Name scenarios with one benchmark id by their files, too; refuse what is still alike."""
+    """
+    Name alike ones by more: scenarios by their files, runs by the folders that they lie in.
+
+    :raises InputError: about what is still alike.
+    """
     labels = Counter(scene.label for scene in scenes)
     named = tuple(
+        scene if labels[scene.label] == 1 else
+        replace(scene, human=_longer_name(path, paths)) if scene.human else
         replace(scene, scenario=f'{scene.scenario} ({path.stem})')
-        if labels[scene.label] > 1 and scene.label == scene.scenario else scene
+        if scene.label == scene.scenario else scene
         for scene, path in zip(scenes, paths, strict=True))
     known: set[str] = set()
     for scene, path in zip(named, paths, strict=True):
@@ -161,6 +167,17 @@ def _told_apart(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[Cel
                              'rename one of them, or evaluate them apart')
         known.add(scene.label)
     return named
+
+
+def _longer_name(path: Path, paths: Sequence[Path]) -> str:
+    """Name a run from the folder on that it shares with those that are called alike."""
+    whole = path.resolve()
+    alike = {other.resolve() for other in paths} - {whole}
+    for count in range(2, len(whole.parts)):
+        tail = whole.parts[-count:]
+        if all(other.parts[-count:] != tail for other in alike):
+            return '/'.join(tail)
+    return str(whole)
 
 
 def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore) -> GridPlanner:

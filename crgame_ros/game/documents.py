@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import (
@@ -36,10 +36,11 @@ from crgame_ros.game.driven_vehicle import (
 )
 from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.event_file import parse_document_entries
-from crgame_ros.game.events import EventSpec, FiredEvent
+from crgame_ros.game.events import EventSpec, FiredBy, FiredEvent
 from crgame_ros.game.game import DrivabilitySpec, MAX_VEHICLES, TimingSpec
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.schema.reading import read
@@ -79,6 +80,8 @@ class GameDocument:
     :param event_entries: the same, as pages are told.
     :param file: text of the game file; empty where there is none.
     :param sound: on or none: whether pages may sound and gamepads rumble.
+    :param tasks: what drivers are asked to do besides driving.
+    :param language: of what drivers read.
     """
 
     epoch: int
@@ -100,6 +103,8 @@ class GameDocument:
     event_entries: tuple[Any, ...]
     file: str
     sound: str
+    tasks: tuple[TaskSpec, ...]
+    language: str
 
     @property
     def vehicles(self) -> tuple[DrivenVehicle, ...]:
@@ -154,7 +159,9 @@ def parse_game_document(text: str) -> GameDocument:
             environment=None if environment is None else read(
                 EnvironmentSpec, environment, f'{GAME_TOPIC}: environment'),
             events=parse_document_entries(events, GAME_TOPIC), event_entries=tuple(events),
-            file=str(content.get('file') or ''), sound=str(content.get('sound') or 'on'))
+            file=str(content.get('file') or ''), sound=str(content.get('sound') or 'on'),
+            tasks=read(TaskList, content.get('tasks') or [], f'{GAME_TOPIC}: tasks'),
+            language=str(content.get('language') or 'en'))
     except MALFORMED as error:
         raise InputError(f'is no game document ({type(error).__name__}: {error})',
                          GAME_TOPIC) from error
@@ -243,7 +250,7 @@ def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
         content = json.loads(text)
         return int(content['epoch']), tuple(
             FiredEvent(str(item['name']), int(item['n']), int(item['k']),
-                       'trigger' if item['by'] == 'trigger' else 'condition')
+                       item['by'] if item['by'] in get_args(FiredBy) else 'condition')
             for item in content['fired'])
     except MALFORMED as error:
         raise InputError(f'is no list of events ({type(error).__name__}: {error})',

@@ -24,6 +24,7 @@ from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.events import EventList
 from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.game.task_spec import TaskList
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import (
@@ -287,6 +288,8 @@ class Game:
     :param occupancy: map of permanent obstacles (FS II-A2).
     :param sound: whether pages may sound and gamepads rumble; `none` for a study without.
     :param environment: light and air, as people see the world.
+    :param tasks: what drivers are asked to answer or to do besides driving.
+    :param language: of what drivers read while they drive, where the page's address names none.
     """
 
     FORM: ClassVar[Form] = Form(
@@ -310,6 +313,8 @@ class Game:
     # YAML reads a bare on as a truth value.
     sound: Annotated[Literal['on', 'none'], Meaning(True, 'on'), LeftOut()] = 'on'
     environment: EnvironmentSpec | None = None
+    tasks: Annotated[TaskList, LeftOut()] = ()
+    language: Annotated[Literal['en', 'de'], LeftOut()] = 'en'
 
     def _repr_html_(self) -> str:
         """Show it in a notebook as its file says it."""

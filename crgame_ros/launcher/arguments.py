@@ -21,6 +21,7 @@ import math
 from pathlib import Path
 import re
 
+from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
@@ -76,6 +77,8 @@ class RunRequest:
     :param namespace: of all nodes, topics and services.
     :param no_report: without the report, one HTML file, at the end of each run.
     :param drivers: driver sources of humans by their ids.
+    :param countdown_s: from when all drivers at pages are ready to the start [s]
+    :param framed_by: origin of the one page that may show the cockpit's within it; empty for none.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
@@ -100,6 +103,8 @@ class RunRequest:
     namespace: str = '/'
     no_report: bool = False
     drivers: tuple[tuple[str, str], ...] = ()
+    countdown_s: float = 3.0
+    framed_by: str = ''
 
 
 class _Parser(argparse.ArgumentParser):
@@ -143,9 +148,14 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--certificate', type=Path, metavar='FILE',
         help='PEM file for TLS, with --key (default: --open-cockpit makes one by openssl)')
     add('--key', type=Path, metavar='FILE', help='PEM file with the key of the certificate')
+    add('--framed-by', type=_origin, default=argparse.SUPPRESS, metavar='ORIGIN',
+        help="let the page at this origin, such as http://127.0.0.1:8070, show the cockpit's "
+        'within it (default: none may)')
     add('--replay', type=Path, metavar='BAG',
         help='show a recording in the page instead of running a game; goes with --port, --listen '
         'and --token')
+    add('--countdown', type=_countdown, default=3.0, metavar='S', dest='countdown_s',
+        help='seconds from when all drivers at pages are ready to the start (default: 3)')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--namespace', type=_namespace, default='/', metavar='/NAME',
@@ -208,10 +218,11 @@ def _check_opening(request: RunRequest) -> None:
     if (request.certificate is None) != (request.key is None):
         raise InputError('a certificate and its key belong together', '--certificate',
                          'give --certificate and --key')
-    opened = request.open_cockpit or request.token or request.certificate is not None
+    opened = (request.open_cockpit or request.token or request.certificate is not None
+              or request.framed_by)
     if request.headless and opened:
         raise InputError('there is no page', '--headless',
-                         'leave it out, or --open-cockpit, --token and --certificate')
+                         'leave it out, or --open-cockpit, --token, --certificate and --framed-by')
 
 
 def _positive(text: str) -> float:
@@ -229,10 +240,24 @@ def _namespace(text: str) -> str:
     return '/' + text.removeprefix('/')
 
 
+def _origin(text: str) -> str:
+    try:
+        return read_origin(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
 def _port(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 65535:
         raise argparse.ArgumentTypeError(f'{text} is no port from 1 to 65535')
     return int(text)
+
+
+def _countdown(text: str) -> float:
+    value = _number(text)
+    if not 0.0 <= value <= 60.0:
+        raise argparse.ArgumentTypeError(f'{text} is not within 0 to 60')
+    return value
 
 
 def _factor(text: str) -> float:

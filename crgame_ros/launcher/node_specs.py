@@ -53,7 +53,8 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
         folders.append(request.game.resolve().parent)
     directories = ', '.join(f'"{folder}"' for folder in folders)
     simulation = NodeSpec('sim_node', 'sim_node', {
-        'at_end': at_end(request), 'folder': f'"{plan.folder}"',
+        'at_end': at_end(request), 'countdown': repr(float(request.countdown_s)),
+        'folder': f'"{plan.folder}"',
         'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
         'realtime_priority': str(request.realtime_priority).lower(),
         'scenario_directories': f'[{directories}]', 'roster': f'"{plan.roster}"',
@@ -115,6 +116,7 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
             'token': str(request.token).lower(),
             'open_cockpit': str(request.open_cockpit).lower(),
             'certificate': _path(request.certificate), 'key': _path(request.key),
+            'framed_by': f'"{request.framed_by}"',
             'private': f'"{plan.private}"', 'seats': f'[{seats}]',
             'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
             'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"',

@@ -19,6 +19,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.opening import Opening
 from crgame_ros.cockpit.runs.run_archive import RunArchive
@@ -42,6 +43,9 @@ class CockpitNode(Node):
         # Removed at the end.
         self._private = ExitStack()
         self._opening = self._declare_opening()
+        self._framed_by: str = declare('framed_by', '', ParameterDescriptor(
+            description='origin of the one page that may show this one within it, such as '
+                        'http://127.0.0.1:8070; nobody may if empty', read_only=True)).value
         self._seats: list[str] = declare('seats', ['hv0'], ParameterDescriptor(
             description='seats for which open_cockpit makes links', read_only=True)).value
         self._folders: list[str] = declare('folders', [''], ParameterDescriptor(
@@ -95,7 +99,8 @@ class CockpitNode(Node):
         opening = self._opening
         access = opening.access()
         app = create_app(LiveBackend(self, Path(self._runs) if self._runs else None), access,
-                         Library(folders, work / 'uploads', work / 'games'))
+                         Library(folders, work / 'uploads', work / 'games'),
+                         framed_by=read_origin(self._framed_by) if self._framed_by else '')
         if self._runs:
             archive = RunArchive(Path(self._runs), Path(self._archive) if self._archive else None)
             add_run_routes(app, archive, work)

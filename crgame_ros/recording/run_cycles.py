@@ -37,9 +37,9 @@ class ReplayInputs(NamedTuple):
     """
     What `ReplayDriver` and `run_offline` need to repeat a recorded run to the last bit.
 
-    :param commands: (n, 5) throttle, brake, steering, reverse, lights by human, and by AV that
-        somebody took over (NaN while it followed its plan); row i was consumed in the step from i
-        to i + 1.
+    :param commands: (n, 6) throttle, brake, steering, reverse, lights and put_back by human, and
+        by AV that somebody took over (NaN while it followed its plan); row i was consumed in the
+        step from i to i + 1.
     :param dt_eff_s: (n) interval over which that step was integrated [s]
     """
 

@@ -15,7 +15,7 @@
 """What a run was, on the grid of its scenario's time steps."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError, one_line
@@ -75,7 +75,7 @@ class RunLog:
     :param object_velocities: (K, M, 3) their derivatives; NaN where absent.
     :param notices: what of the run is not in here, one line each.
     :param cycles: its recorded cycles, where they are known.
-    :param commands: (K, V, 5) that the steps which led to these states consumed, columns as in
+    :param commands: (K, V, 6) that the steps which led to these states consumed, columns as in
         `COMMAND_COLUMNS`; NaN where none is known, None where none at all is.
     """
 
@@ -100,6 +100,16 @@ class RunLog:
     def objects(self) -> tuple[ObjectDescription, ...]:
         """Descriptions of the M other objects."""
         return self.descriptions[self.vehicle_states.shape[1]:]
+
+    def until(self, k: int) -> 'RunLog':
+        """Give the run up to a scenario step, the step itself included; without its cycles."""
+        count = int(np.searchsorted(self.ks, k, side='right'))
+        return replace(
+            self, ks=self.ks[:count], cycles=None, vehicle_states=self.vehicle_states[:count],
+            published_states=self.published_states[:count],
+            object_poses=self.object_poses[:count],
+            object_velocities=self.object_velocities[:count],
+            commands=None if self.commands is None else self.commands[:count])
 
 
 def read_run_log(path: Path, epoch: int | None = None,

@@ -19,9 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.recording.recorded_drivers import read_drivers, RecordedDriver
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
+from crgame_ros.recording.recorded_tasks import read_task_entries
 from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
@@ -37,12 +39,13 @@ class RunRecord:
     :param log: how everybody moved, at the scenario's steps.
     :param ns: (R) simulation steps n of which is known what led to them, rising; where a recorder
         missed some they are not consecutive.
-    :param commands: (R, V, 5) throttle, brake, steering, reverse and lights that the step from
-        n - 1 to n consumed, of the driven vehicles in the log's order; NaN of an AV that
-        follows its plan.
+    :param commands: (R, V, 6) throttle, brake, steering, reverse, lights and put_back that the
+        step from n - 1 to n consumed, of the driven vehicles in the log's order; NaN of an AV
+        that follows its plan.
     :param fired: events that took effect, in order.
     :param orders: of the seats, in order; an offline run has none.
     :param drivers: who drove, in order; an offline run does not say it.
+    :param tasks: what happened in the game's tasks, in order.
     """
 
     log: RunLog
@@ -51,11 +54,34 @@ class RunRecord:
     fired: tuple[FiredEvent, ...]
     orders: tuple[SeatOrder, ...] = ()
     drivers: tuple[RecordedDriver, ...] = ()
+    tasks: tuple[TaskEntry, ...] = ()
 
     @property
     def times_s(self) -> NDArray[np.float64]:
         """Give the simulated time of the commands since the run's start (R) [s]."""
         return np.asarray(self.ns * self.log.game.scheduler.dt_s)
+
+    @property
+    def put_back(self) -> dict[str, tuple[int, ...]]:
+        """Give the last steps k before vehicles were put back on their lane, by vehicle."""
+        scheduler = self.log.game.scheduler
+        found: dict[str, tuple[int, ...]] = {}
+        for event in self.fired:
+            if event.vehicle is not None:
+                k = scheduler.k0 + (event.n - 1) // scheduler.steps_per_tick
+                found[event.vehicle] = (*found.get(event.vehicle, ()), k)
+        return found
+
+    def ways(self) -> NDArray[np.float64]:
+        """Give how far each driven vehicle has come (V) [m], but for where it was put back."""
+        log = self.log
+        steps = np.hypot(*np.moveaxis(np.diff(log.vehicle_states[..., :2], axis=0), -1, 0))
+        for vehicle, ks in self.put_back.items():
+            column = [item.id for item in log.vehicles].index(vehicle)
+            for row in np.searchsorted(log.ks, ks).tolist():
+                # Its own time may be a step behind; it stands before and after.
+                steps[row:row + 2, column] = 0.0
+        return np.asarray(steps.sum(axis=0))
 
 
 def read_run_record(path: Path, epoch: int | None = None,
@@ -78,16 +104,18 @@ def record_of_log(path: Path, log: RunLog) -> RunRecord:
     fired = read_run_events(path, log.game.epoch).fired
     orders = read_seat_orders(path, log.game.epoch)
     drivers = read_drivers(path, log.game.epoch)
+    tasks = read_task_entries(path, log.game.epoch) if log.game.tasks else ()
     if log.cycles is None:
         return RunRecord(log, np.empty(0, dtype=np.int64),
                          np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired, orders,
-                         drivers)
+                         drivers, tasks)
     ns = log.cycles.column('n').astype(np.int64)
-    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders, drivers)
+    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders, drivers,
+                     tasks)
 
 
 def run_record_of(result: OfflineResult) -> RunRecord:
     """Give the record of an offline run."""
     commands = np.concatenate((result.commands, result.av_commands), axis=1)[1:]
     return RunRecord(run_log_of(result), np.arange(1, len(result.commands)), commands,
-                     result.fired)
+                     result.fired, tasks=result.tasks)

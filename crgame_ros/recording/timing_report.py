@@ -33,6 +33,7 @@ from crgame_ros.recording.run_contacts import recorded_contacts
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.seat_sound import SeatSound
+from crgame_ros.recording.seat_view import SeatView
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.timing_metrics import TimingMetrics
@@ -92,6 +93,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None
                             'list': collected.violations},
             'contacts': contacts,
             'sound': collected.sound.as_dict(),
+            'view': collected.view.as_dict(),
             'benchmark_id': run.game.benchmark_id,
             'epoch': run.game.epoch,
             'notices': [*dict.fromkeys((
@@ -148,6 +150,7 @@ class _Collector:
         self._reasons: dict[str, Counter[str]] = defaultdict(Counter)
         self._statuses: dict[str, dict[str, str]] = {}
         self.sound = SeatSound()
+        self.view = SeatView()
 
     def take(self, recorded: BagMessage, reader: BagReader) -> None:
         """Take one message; those of other runs, and those that are none, are passed over."""
@@ -170,7 +173,7 @@ class _Collector:
                 if topic in self._verdicts:
                     self._take_verdict(self._verdicts[topic], status)
                 else:
-                    self._take_status(status)
+                    self._take_status(status, stamp_ns)
 
     def _take_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1
@@ -184,11 +187,12 @@ class _Collector:
         else:
             self._latencies_ms[av].append(latency_ms)
 
-    def _take_status(self, status: Any) -> None:
+    def _take_status(self, status: Any, stamp_ns: int) -> None:
         told = read_status(status)
         values = told.values
         self._statuses[status.name] = values
         self.sound.take(told)
+        self.view.take(told, (stamp_ns - self._run.game.scheduler.clock_offset_ns) * 1e-9)
         if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
             self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
             if status.message.startswith(_BRAKING):

@@ -186,6 +186,15 @@ class RoadNetwork:
         lanelet = self._lanelet(lanelet_id)
         return lanelet.adj_right if lanelet.adj_right_same_direction else None
 
+    def opposite_of(self, lanelet_id: int) -> int | None:
+        """Name the neighbour that has the other direction, on whichever side it is."""
+        lanelet = self._lanelet(lanelet_id)
+        for neighbour, same in ((lanelet.adj_left, lanelet.adj_left_same_direction),
+                                (lanelet.adj_right, lanelet.adj_right_same_direction)):
+            if neighbour is not None and not same:
+                return int(neighbour)
+        return None
+
     def width_at(self, lanelet_id: int, s: float) -> float:
         """Give the distance between the bounds at arc length s of the centre line [m]."""
         lanelet = self._lanelet(lanelet_id)

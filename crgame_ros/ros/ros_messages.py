@@ -136,7 +136,8 @@ def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
     """
     message = Joy(axes=array('f', (command.throttle, command.brake, command.steering)),
                   buttons=array('i', (
-                      int(command.reverse), *(int(bool(command.lights & bit)) for bit in Light))))
+                      int(command.reverse), *(int(bool(command.lights & bit)) for bit in Light),
+                      int(command.put_back))))
     message.header.frame_id = source
     message.header.stamp = to_time(stamp_ns)
     return message
@@ -144,7 +145,7 @@ def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
 
 def from_joy(message: Joy, where: str) -> DriverCommand:
     """
-    Read a driver's command; lights that it does not tell are off.
+    Read a driver's command; what its buttons do not tell is off.
 
     :raises InputError: if axes or buttons are missing.
     """
@@ -152,6 +153,6 @@ def from_joy(message: Joy, where: str) -> DriverCommand:
         raise InputError(f'has {len(message.axes)} axes and {len(message.buttons)} buttons', where,
                          'give axes throttle, brake, steering and the button reverse')
     throttle, brake, steering = message.axes[:3]
-    reverse, left, right, horn = (*message.buttons, 0, 0, 0)[:4]
+    reverse, left, right, horn, put_back = (*message.buttons, 0, 0, 0, 0)[:5]
     return DriverCommand(throttle, brake, steering, bool(reverse),
-                         lights_of(left, right, horn)).rounded()
+                         lights_of(left, right, horn), bool(put_back)).rounded()

@@ -14,7 +14,7 @@
 # limitations under the License.
 """The resolved game written as JSON text: `/scenario/game`."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 import json
 import math
 from typing import Any
@@ -24,6 +24,7 @@ from crgame_ros.game.game_file import dump_game
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.simulation.task_check import task_seat
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.steering import table_text
 
@@ -70,6 +71,9 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
         'occupancy': write(game.occupancy),
         'sound': game.sound,
         'environment': write(environment_of(setup.loaded.scenario, game.environment)),
+        'tasks': write([replace(task, seat=task_seat(task, setup.vehicle_ids))
+                        for task in game.tasks]),
+        'language': game.language,
         'file': dump_game(game)}
     return json.dumps(document, allow_nan=False)
 

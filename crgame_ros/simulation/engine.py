@@ -14,15 +14,16 @@
 # limitations under the License.
 """The simulation engine that both runners drive (CRG algorithms 1 and 2)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import hashlib
 from itertools import chain
 from struct import Struct
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.game.task_documents import OpenPrompt, TaskEntry, TaskReport
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.planner.planner_registry import EXTERNAL
 from crgame_ros.planner.road_limit import RoadLimit
@@ -36,8 +37,10 @@ from crgame_ros.simulation.av_models import (
 )
 from crgame_ros.simulation.contact_stop import at_rest, ContactStop
 from crgame_ros.simulation.plan_requests import PlanRequests
+from crgame_ros.simulation.put_back import PutBack
 from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.run_events import RunEvents
+from crgame_ros.simulation.run_tasks import RunTasks
 from crgame_ros.simulation.setup import AvSetup, Setup
 from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.publishing import steps_between_messages
@@ -58,9 +61,10 @@ class StepResult(NamedTuple):
     :param tick: True where k has just advanced; only then are objects and requests given.
     :param requests: the plan requests to send, by AV id.
     :param objects: poses of everything that is no driven vehicle.
-    :param fired: the events that took effect at this tick.
+    :param fired: the events that took effect in this step.
     :param agents_k: tick whose agents the objects show, less than k if traffic is late; None
         without agents.
+    :param tasks: what has happened in the game's tasks since the step before.
     """
 
     n: int
@@ -70,6 +74,7 @@ class StepResult(NamedTuple):
     objects: ObjectStates | None
     fired: tuple[FiredEvent, ...] = ()
     agents_k: int | None = None
+    tasks: tuple[TaskEntry, ...] = ()
 
 
 class Simulation:
@@ -113,12 +118,16 @@ class Simulation:
         self.commands: list[DriverCommand | None] = [
             *[DriverCommand()] * len(self.humans), *[None] * len(self.avs)]
         self._events = RunEvents(setup) if setup.game.events else None
+        self._tasks = RunTasks(setup) if setup.game.tasks else None
+        self._task_names = {task.name for task in setup.game.tasks}
         self._world = World(setup, self._events, feed)
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
         self._driven = (*self.humans, *self.avs)
-        self._contact_stop = ContactStop(setup) \
-            if setup.game.drivability.contact == 'stop' else None
+        stops = setup.game.drivability.contact == 'stop'
+        self._contact_stop = ContactStop(setup) if stops else None
+        self._put_back = PutBack(setup)
+        self._own_events: tuple[FiredEvent, ...] = ()
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
         self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
@@ -174,18 +183,39 @@ class Simulation:
 
     def trigger(self, name: str) -> str | None:
         """
-        Let an event of the game take effect at the next tick.
+        Let an event of the game take effect at the next tick, or a task begin or end.
 
         :return: None if it will, else the reason why not.
         """
+        if self._tasks is not None and name in self._task_names:
+            return self._tasks.trigger(name)
         if self._events is None:
             return f'there is no event "{name[:40]}"; the game has none'
         return self._events.trigger(name)
 
+    def report_task(self, report: TaskReport) -> str | None:
+        """
+        Take what a page has shown of a task or its driver answered, at the next step.
+
+        :return: None if it is taken, else the reason why not.
+        """
+        return 'the game has no tasks' if self._tasks is None else self._tasks.report(report)
+
+    @property
+    def tasks_running(self) -> tuple[str, ...]:
+        """Names of the tasks that last now."""
+        return () if self._tasks is None else self._tasks.running
+
+    @property
+    def prompts(self) -> tuple[OpenPrompt, ...]:
+        """Stimuli and requests that are neither answered nor over."""
+        return () if self._tasks is None else self._tasks.prompts
+
     @property
     def fired(self) -> tuple[FiredEvent, ...]:
         """All events that have taken effect so far."""
-        return () if self._events is None else self._events.fired
+        of_game = () if self._events is None else self._events.fired
+        return tuple(sorted((*self._own_events, *of_game), key=lambda event: event.n))
 
     def step(self, dt_eff_s: float, commands: Sequence[DriverCommand | None]) -> StepResult:
         """
@@ -225,28 +255,49 @@ class Simulation:
         since_tick = (self.n - 1) % self.scheduler.steps_per_tick + 1
         if since_tick == 1:
             contacts.set_objects(self._world.objects)
-        for index in contacts.stopped(since_tick * self.scheduler.dt_s, before, self.states):
+        for index, other in contacts.stopped(
+                since_tick * self.scheduler.dt_s, before, self.states):
             driven = self._driven[index]
-            if isinstance(driven, HumanVehicle) or (
-                    isinstance(driven, AutonomousVehicle) and driven.driven):
+            if _has_driver(driven):
                 driven.stand(at_rest(before[index], driven.state))
+                if self._put_back.note(index, driven.state):
+                    self._tell(FiredEvent.contact, self.setup.vehicle_ids[index], other)
+        for index, command in enumerate(self.commands):
+            if command is not None and command.put_back:
+                self._put_on_lane(index, since_tick * self.scheduler.dt_s)
+
+    def _put_on_lane(self, index: int, since_tick_s: float) -> None:
+        """Put a vehicle back that a contact has stopped, if there is room."""
+        driven = self._driven[index]
+        if not _has_driver(driven):
+            return
+        place = self._put_back.place(index, since_tick_s, self.states, self._world.objects)
+        if place is not None:
+            driven.stand(place)
+            self._tell(FiredEvent.put_back, self.setup.vehicle_ids[index])
+
+    def _tell(self, make: Callable[..., FiredEvent], *ids: str) -> None:
+        self._own_events += (make(*ids, self.n, self.scheduler.k(self.n)),)
 
     def conclude(self) -> StepResult:
         """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
         result = self._result()
         self._add_to_hash()
-        return result
+        own = tuple(event for event in self._own_events if event.n == self.n)
+        return result._replace(fired=(*own, *result.fired)) if own else result
 
     def _result(self) -> StepResult:
         k = self.scheduler.k(self.n)
         if not self.scheduler.is_tick(self.n):
-            return StepResult(self.n, k, False, {}, None)
+            return StepResult(self.n, k, False, {}, None, tasks=self._task_entries())
         for av in self.avs:
             if av.route_lane is not None and not av.driven:
                 av.route_lane.measure(av.state)
         objects = self._world.advance(k)
         fired = () if self._events is None else self._take_effect(self._events, k, objects)
+        if self._tasks is not None:
+            self._tasks.at_tick(self.n, k, self.states, objects, fired)
         objects = self._world.settle(self.states)
         asking = [av for av in self.avs if av.wants_request(self.n)]
         requests: dict[str, JointSeries] = {}
@@ -259,11 +310,15 @@ class Simulation:
                 request = self._requests.build(av.setup, stamp_ns, states, forecast)
                 av.request_sent(self.n, stamp_ns, ego_of(request))
                 requests[av.setup.id] = request
-        return StepResult(self.n, k, True, requests, objects, fired, self._world.agents_k)
+        return StepResult(self.n, k, True, requests, objects, fired, self._world.agents_k,
+                          self._task_entries())
 
     def _take_effect(self, events: RunEvents, k: int,
                      objects: ObjectStates) -> tuple[FiredEvent, ...]:
         """Let events change what is there and who plans, at a tick."""
+        for name in () if self._tasks is None else self._tasks.due_events(self.n):
+            # It may have taken effect before.
+            events.trigger(name)
         fired = events.at_tick(self.n, k, self.states, objects)
         for action in events.actions(fired):
             if isinstance(action, PlannerRun):
@@ -271,6 +326,12 @@ class Simulation:
             elif isinstance(action, TrafficOrder):
                 self._world.obey(action)
         return fired
+
+    def _task_entries(self) -> tuple[TaskEntry, ...]:
+        """Let the tasks go on, and tell what has happened in them."""
+        return () if self._tasks is None else self._tasks.at_step(self.n, dict(zip(
+            self.setup.vehicle_ids, (command is not None for command in self.commands),
+            strict=True)))
 
     def _localise(self) -> None:
         """Let AVs estimate the pose that they steer by."""
@@ -288,6 +349,13 @@ class Simulation:
     def state_hash(self) -> str:
         """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""
         return self._hash.hexdigest()
+
+
+def _has_driver(driven: HumanVehicle | TracedVehicle | AutonomousVehicle
+                ) -> TypeGuard[HumanVehicle | AutonomousVehicle]:
+    """Tell whether a person drives a vehicle now; traces go on, and so do plans."""
+    return isinstance(driven, HumanVehicle) or (
+        isinstance(driven, AutonomousVehicle) and driven.driven)
 
 
 def _road_limit(setup: Setup, av: AvSetup) -> RoadLimit | None:

@@ -22,6 +22,7 @@ from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.messages.joints import JointSeries, plan_to_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
@@ -77,8 +78,8 @@ class OfflineResult:
     :param vehicle_states: (n + 1, V, 8) states of humans, then AVs, at every step.
     :param object_poses: (ticks, M, 3) centre poses at every tick.
     :param object_velocities: (ticks, M, 3) their derivatives.
-    :param commands: (n + 1, H, 5) throttle, brake, steering, reverse and lights; row i was
-        consumed by the step that led to state i, row 0 by none.
+    :param commands: (n + 1, H, 6) throttle, brake, steering, reverse, lights and put_back; row i
+        was consumed by the step that led to state i, row 0 by none.
     :param intervals_s: (n + 1, V) interval over which each vehicle was moved in that step: Delta
         t_eff where somebody drives it, else the nominal step [s]
     :param planners: what each AV's planner did.
@@ -86,8 +87,9 @@ class OfflineResult:
     :param fired: events that took effect, in order.
     :param stop: the human's violation that ended the run, where the game has it so; its n is that
         of the last state.
-    :param av_commands: (n + 1, A, 5) the same commands of those who took over an AV; NaN while it
+    :param av_commands: (n + 1, A, 6) the same commands of those who took over an AV; NaN while it
         followed its plan.
+    :param tasks: what happened in the game's tasks, in order.
     """
 
     setup: Setup
@@ -103,6 +105,7 @@ class OfflineResult:
     stop: VehicleDrivability | None = None
     av_commands: NDArray[np.float64] = field(
         default_factory=lambda: np.empty((0, 0, COMMAND_WIDTH)))
+    tasks: tuple[TaskEntry, ...] = ()
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """Give the states (n + 1, 8) of one driven vehicle."""
@@ -279,6 +282,7 @@ class _Trace:
         self.av_commands = np.full((steps + 1, len(setup.avs), COMMAND_WIDTH), np.nan)
         self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
+        self.tasks: list[TaskEntry] = []
         self.object_velocities: list[NDArray[np.float64]] = []
         # The steps whose states a live run publishes, and so its observers see.
         self._observe_every = steps_between_messages(setup.game.timing.rate)
@@ -299,11 +303,12 @@ class _Trace:
             np.array(self.objects), np.array(self.object_velocities), self.commands[:count],
             self.intervals_s[:count], planners,
             () if self._drivability is None else self._drivability.report(), simulation.fired,
-            self.stop, self.av_commands[:count])
+            self.stop, self.av_commands[:count], tuple(self.tasks))
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
         """Take a state and the interval of the step that led to it [s]."""
         n = simulation.n
+        self.tasks += result.tasks
         for index, command in enumerate(simulation.commands):
             if command is not None:
                 self.intervals_s[n, index] = effective_s

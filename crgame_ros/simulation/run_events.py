@@ -14,25 +14,22 @@
 # limitations under the License.
 """The events of one run: which are due at a tick, and what they do to the objects."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import math
 
 from crgame_ros.game.events import (
     Action,
     ALL_AGENTS,
-    AtStep,
-    AtTime,
     Brake,
-    Condition,
     EventSpec,
     FiredEvent,
-    Near,
     PutObstacle,
     Release,
     TrafficChange,
 )
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.scenario.courses import ObstacleCourses
+from crgame_ros.simulation.condition_check import ConditionCheck
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.state import VehicleState
 
@@ -97,10 +94,10 @@ class RunEvents:
         self._k, self._objects = k, objects
         if not self._waiting:
             return ()
-        where = _Places(self._setup, states, self._columns, objects)
+        conditions = ConditionCheck(self._setup, k, states, objects, self._columns)
         due = [event for event in self._waiting.values()
                if (event.name in self._triggered
-                   or (event.when is not None and self._holds(event.when, k, where.of)))
+                   or (event.when is not None and conditions.holds(event.when)))
                and self._hindrance(event, k) is None]
         fired = []
         for event in due:
@@ -137,19 +134,6 @@ class RunEvents:
         present = math.isfinite(self._objects.poses[self._columns[agent], 0])
         return None if present else f'{agent} is not on the road'
 
-    def _holds(self, condition: Condition, k: int, place: Callable[[str], Point]) -> bool:
-        """Tell whether a condition holds at k; NaN, somebody who is absent, makes it false."""
-        if isinstance(condition, AtStep):
-            return k >= condition.step
-        if isinstance(condition, AtTime):
-            elapsed_s = (k - self._setup.scheduler.k0) * self._setup.scheduler.time_step_s
-            return elapsed_s >= condition.time - ROUNDING
-        if isinstance(condition, Near):
-            return math.dist(place(condition.vehicle), (condition.x, condition.y)) \
-                <= condition.radius
-        first, second = condition.between
-        return math.dist(place(first), place(second)) <= condition.distance
-
     def _change(self, event: EventSpec, k: int) -> None:
         """Change the object that the event is about, if it is about one."""
         action, object_id = event.action, event.object_id
@@ -162,23 +146,3 @@ class RunEvents:
             self.obstacles.brake(column, k, action.deceleration, action.speed)
         elif isinstance(action, PutObstacle):
             self.obstacles.put(column, (action.x, action.y, action.yaw))
-
-
-class _Places:
-    """Finds the centre of a vehicle or object at a tick."""
-
-    def __init__(self, setup: Setup, states: Sequence[VehicleState], columns: dict[str, int],
-                 objects: ObjectStates) -> None:
-        self._setup = setup
-        self._states = states
-        self._columns = columns
-        self._objects = objects
-
-    def of(self, object_id: str) -> Point:
-        column = self._columns.get(object_id)
-        if column is not None:
-            x, y = self._objects.poses[column, :2].tolist()
-            return x, y
-        index = self._setup.vehicle_ids.index(object_id)
-        center = self._states[index].center(self._setup.vehicles[index].vehicle.rear_to_center)
-        return center[0], center[1]

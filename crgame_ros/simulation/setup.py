@@ -45,6 +45,7 @@ from crgame_ros.simulation.event_check import (
     held_obstacles,
     put_obstacles,
 )
+from crgame_ros.simulation.task_check import check_tasks
 from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, TrafficSetup
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -216,6 +217,10 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
     check_events(game, loaded.source, network, obstacles, [human.id for human in game.humans],
                  [av.spec for av in avs])
+    check_tasks(game.tasks, game.events, loaded.source,
+                [*(human.id for human in game.humans), *(av.spec.id for av in avs)],
+                [*(item.id for item in obstacles.descriptions),
+                 *(item.id for item in game.objects)])
     notices = [*loaded.notices, *(f'{loaded.source}: {remark}' for remark in remarks),
                *_discrepancies(avs), *(
         f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'

@@ -43,6 +43,8 @@ class SessionEvent(StrEnum):
     PRACTISED = 'practised'
     NOTE = 'note'
     MARKER = 'marker'
+    LANGUAGE = 'language'
+    HELD = 'held'
     ENDED = 'ended'
 
 
@@ -102,6 +104,35 @@ class ParticipantSession:
             return None
         done = self.done
         return next((item for item in self.items if item.id not in done), None)
+
+    @property
+    def language(self) -> str | None:
+        """Give the language that the participant has chosen last; None before."""
+        return next((entry['language'] for entry in reversed(self.journal.entries)
+                     if entry['entry'] == SessionEvent.LANGUAGE), None)
+
+    def choose_language(self, language: str) -> None:
+        """
+        Keep the language in which the participant reads.
+
+        :raises InputError: if the study does not have it.
+        """
+        if language not in self.study.all_languages:
+            raise InputError('is no language of this study', language[:20],
+                             f'name {", ".join(self.study.all_languages)}')
+        self._add(SessionEvent.LANGUAGE, language=language)
+
+    @property
+    def held_at(self) -> str | None:
+        """Name the item after which the experimenter holds the session; None if it goes on."""
+        last = next((entry for entry in reversed(self.journal.entries)
+                     if entry['entry'] == SessionEvent.HELD), None)
+        return None if last is None or not last['held'] else last['item']
+
+    def hold(self, held: bool) -> None:
+        """Hold the session before the item after the present one, or let it go on."""
+        item = self.next_item
+        self._add(SessionEvent.HELD, held=held, item='' if item is None else item.id)
 
     def attempts(self, item: str) -> int:
         """Count how often an item was started."""
@@ -167,9 +198,13 @@ class ParticipantSession:
             self._add(SessionEvent.FINISHED, item=item.id, answers={}, drives=len(drives))
         return over
 
-    def abort(self, reason: str) -> None:
-        """Say that the present attempt of the next item counts for nothing; it comes again."""
-        self._add(SessionEvent.ABORTED, item=self._now().id, reason=reason)
+    def abort(self, reason: str, item: str = '') -> None:
+        """
+        Say that the present attempt at an item counts for nothing; it comes again.
+
+        :param item: that is left; the next one where empty.
+        """
+        self._add(SessionEvent.ABORTED, item=item or self._now().id, reason=reason)
 
     def skip(self, reason: str) -> None:
         """Leave the next item out, for a reason."""

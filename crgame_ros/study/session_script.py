@@ -15,7 +15,7 @@
 """Everything that a participant goes through, item by item, in order."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from crgame_ros.study.study_file import Block, Break, Practice, Step, StepEntry, StudyFile
 from crgame_ros.study.trial_plan import plan_trials, PlannedTrial
@@ -71,13 +71,19 @@ def session_of(study: StudyFile, place: int) -> tuple[SessionItem, ...]:
     return tuple(items)
 
 
+def placed(settings: TrialSettings, trial: TrialSettings) -> TrialSettings:
+    """Let practice be where the first trial is, unless its settings say otherwise."""
+    if settings.game is not None or settings.scenario is not None:
+        return settings
+    return replace(settings, game=trial.game, scenario=trial.scenario)
+
+
 def _block(study: StudyFile, block: Block, trials: list[PlannedTrial]) -> Iterator[SessionItem]:
     yield from _steps(f'{block.name}/before', block.before)
     if block.practice is not None:
         settings = laid(study.settings, block.settings, block.practice.settings)
-        if settings.game is None and trials:
-            # Practice is in the game of the first trial where nobody says otherwise.
-            settings = TrialSettings(game=trials[0].condition.settings.game).over(settings)
+        if trials:
+            settings = placed(settings, trials[0].condition.settings)
         yield SessionItem(f'{block.name}/practice', PracticeDrives(block.practice, settings))
     for trial in trials:
         name = f'{block.name}/{trial.place}'

@@ -25,7 +25,7 @@ from crgame_ros.game.game_file import dump_game, parse_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.questionnaire import load_questionnaire
-from crgame_ros.study.session_script import Fields, PracticeDrives, session_of, SessionItem
+from crgame_ros.study.session_script import Fields, placed, PracticeDrives, session_of, SessionItem
 from crgame_ros.study.study_file import Block, Break, Page, Questions, StudyFile
 from crgame_ros.study.study_pages import page_file, questionnaire_name
 from crgame_ros.study.trial_game import trial_game
@@ -126,8 +126,7 @@ def _drives(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:
         if block.practice is not None:
             first = conditions_of(study, block)[0].settings
             settings = laid(study.settings, block.settings, block.practice.settings)
-            yield f'{block.name}: practice', TrialSettings(game=first.game).over(settings) \
-                if settings.game is None else settings
+            yield f'{block.name}: practice', placed(settings, first)
         for condition in conditions_of(study, block):
             yield f'{block.name}: {condition.name}', condition.settings
 

@@ -19,14 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, HumanSpec
 from crgame_ros.game.game_file import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.adapted_game import adapt_game, OWN
-from crgame_ros.study.trial_settings import TrialSettings
+from crgame_ros.study.trial_settings import tasks_over, TrialSettings
 from crgame_ros.yaml_text import read_yaml
 
 PERFECT, NONE = 'perfect', 'none'
@@ -55,13 +55,12 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
     :param driver: of the participant's seat.
     :raises InputError: if a file cannot be used, or the settings do not fit the game.
     """
-    if settings.game is None:
-        raise InputError('names no game', 'trial', 'give "game" to the study, a block or a level')
-    game = load_game(Path(settings.game))
+    game = _written_game(settings)
     seat = seat_of(settings, game)
     game = replace(game, humans=tuple(
         replace(human, driver=driver) if human.id == seat else human for human in game.humans),
         events=(*game.events, *settings.events),
+        tasks=tasks_over(game.tasks, settings.tasks),
         sound='on' if settings.sound else 'none')
     if settings.duration is not None:
         game = replace(game, duration=settings.duration)
@@ -70,6 +69,18 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
         planner=settings.planner or OWN, options=settings.options,
         perception=_spec(PerceptionSpec, settings.perception, PERFECT, 'perception'),
         traffic=_spec(TrafficSpec, settings.traffic, NONE, 'traffic'))
+
+
+def _written_game(settings: TrialSettings) -> Game:
+    """Give the game as files have it: a game's, a scenario's, or one in the other's road."""
+    scenario = settings.scenario
+    if settings.game is not None:
+        game = load_game(Path(settings.game))
+        return game if scenario is None else replace(game, scenario=scenario)
+    if scenario is None:
+        raise InputError('names no game', 'trial', 'give "game" or "scenario" to the study, a '
+                         'block or a level')
+    return Game(scenario, humans=(HumanSpec('hv0'),))
 
 
 def _spec(kind: type[Any], name: str | None, nothing: str, what: str) -> Any:

@@ -30,9 +30,8 @@ TIMING_COLUMNS = (
     'sleep_s', 'dt_eff_s', 'resets', 'dropped_s')
 # Why the cycle was late [s], and in which phase; earlier versions did not tell.
 LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
-# Earlier versions had no lights.
-COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights')
-_LIGHTS = COMMAND_COLUMNS.index('lights')
+# Earlier versions had the first four, then no `put_back`.
+COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights', 'put_back')
 # Where in a row they begin.
 _LATE, _COMMANDS = len(TIMING_COLUMNS), len(TIMING_COLUMNS) + len(LATE_COLUMNS)
 NO_COMMAND = (math.nan,) * len(COMMAND_COLUMNS)
@@ -140,10 +139,10 @@ class CycleTable:
 
     def commands(self, vehicle_id: str) -> NDArray[np.float64]:
         """
-        Give (R, 5) consumed throttle, brake, steering, reverse and lights of a vehicle.
+        Give (R, 6) consumed throttle, brake, steering, reverse, lights, put_back of a vehicle.
 
-        Rows are NaN where nobody drove it: those of an AV that followed its plan. Where no lights
-        were recorded, none were on.
+        Rows are NaN where nobody drove it: those of an AV that followed its plan. What earlier
+        versions did not record was off.
 
         :raises InputError: if the vehicle took no part.
         """
@@ -151,13 +150,13 @@ class CycleTable:
         if names[0] not in self._place:
             raise InputError(f'{vehicle_id} took no part', '/timing/cycle',
                              'choose one of the vehicles of this recording')
-        if names[_LIGHTS] in self._place:
-            return self.rows[:, [self._place[name] for name in names]]
-        found = self.rows[:, [self._place[name] for name in names[:_LIGHTS]]]
-        return np.column_stack((found, np.where(np.isnan(found[:, 0]), np.nan, 0.0)))
+        recorded = [name for name in names if name in self._place]
+        found = self.rows[:, [self._place[name] for name in recorded]]
+        off = np.where(np.isnan(found[:, 0]), np.nan, 0.0)
+        return np.column_stack((found, *[off] * (len(names) - len(recorded))))
 
     def commands_of(self, vehicle_ids: Sequence[str]) -> NDArray[np.float64]:
-        """Give (R, V, 5) what was consumed of several; NaN of those that took no part."""
+        """Give (R, V, 6) what was consumed of several; NaN of those that took no part."""
         values = np.full((len(self.rows), len(vehicle_ids), len(COMMAND_COLUMNS)), np.nan)
         for place, vehicle in enumerate(vehicle_ids):
             if f'{vehicle}/{COMMAND_COLUMNS[0]}' in self._place:

@@ -30,6 +30,8 @@ class DriverCommand(NamedTuple):
     :param reverse: True while the reverse gear is selected
     :param lights: what others see and hear of it, bits of `Light`; the vehicle's motion does not
         depend on it
+    :param put_back: True while the driver asks for the vehicle to be put back on its lane, which a
+        game with `contact: stop` does after a contact
     """
 
     throttle: float = 0.0
@@ -37,6 +39,7 @@ class DriverCommand(NamedTuple):
     steering: float = 0.0
     reverse: bool = False
     lights: int = 0
+    put_back: bool = False
 
     def rounded(self) -> 'DriverCommand':
         """
@@ -48,7 +51,7 @@ class DriverCommand(NamedTuple):
         return DriverCommand(
             _clip_float32(self.throttle, 0.0), _clip_float32(self.brake, 0.0),
             _clip_float32(self.steering, -1.0), bool(self.reverse),
-            int(self.lights) & ALL_LIGHTS)
+            int(self.lights) & ALL_LIGHTS, bool(self.put_back))
 
 
 RELEASED = DriverCommand()

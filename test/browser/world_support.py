@@ -209,8 +209,8 @@ class Served:
 
 
 @contextmanager
-def served(backend: RunBackend) -> Iterator[Served]:
-    """Serve the page and a backend, as the cockpit does."""
+def served(backend: RunBackend, framed_by: str = '') -> Iterator[Served]:
+    """Serve the page and a backend, as the cockpit does; one page may show it within itself."""
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever, daemon=True)
     thread.start()
@@ -218,7 +218,8 @@ def served(backend: RunBackend) -> Iterator[Served]:
     def wait(coroutine: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(coroutine, loop).result(30.0)
 
-    runner, port = wait(listen(create_app(backend, Access(HOST, 0, None), None), HOST, 0))
+    app = create_app(backend, Access(HOST, 0, None), None, framed_by=framed_by)
+    runner, port = wait(listen(app, HOST, 0))
     try:
         yield Served(backend, loop, port)
     finally:

@@ -170,6 +170,9 @@ def test_the_bucket_allows_the_burst_then_the_rate() -> None:
     assert sum(bucket.take(100.0) for _ in range(2000)) == 800
 
 
+# As a page tells what it shows; numbers that are flags become booleans.
+MAP_VIEW = {'shown': 'map', 'inset': 0, 'plans': 1, 'mirrors': 0, 'bare': 1, 'software': 0,
+            'width_px': 900.0, 'height_px': 500.0, 'ratio': 2.0, 'renderer': ''}
 GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({'type': 'input', 'seat': 'hv0', 'keys': [1, 0, 0, 1], 'reverse': 1, 'more': 1},
      {'type': 'input', 'seat': 'hv0', 'keys': [True, False, False, True], 'reverse': True}),
@@ -209,7 +212,19 @@ GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({'type': 'layers', 'perception': ''}, {'type': 'layers', 'perception': ''}),
     ({'type': 'sound', 'on': 1, 'volume': 0.5, 'rumble': 1, 'pitch': 2},
      {'type': 'sound', 'on': True, 'volume': 0.5, 'rumble': 1.0}),
+    ({'type': 'view', **MAP_VIEW, 'across_deg': None, 'rate_hz': None, 'more': 1},
+     {'type': 'view', **MAP_VIEW, 'inset': False, 'plans': True, 'mirrors': False, 'bare': True,
+      'software': False}),
+    ({'type': 'view', **MAP_VIEW, 'shown': 'driver', 'across_deg': 75, 'screen_width_m': 0.6,
+      'eye_distance_m': 0.7, 'rate_hz': 29.5, 'renderer': 'ANGLE <b>'},
+     {'type': 'view', **MAP_VIEW, 'inset': False, 'plans': True, 'mirrors': False, 'bare': True,
+      'software': False, 'shown': 'driver', 'across_deg': 75.0, 'screen_width_m': 0.6,
+      'eye_distance_m': 0.7, 'rate_hz': 29.5, 'renderer': 'ANGLE b'}),
     ({'type': 'ping', 't': 12}, {'type': 'ping', 't': 12.0}),
+    ({'type': 'task', 'seat': 'hv0', 'task': 'light', 'number': 3, 'what': 'answer',
+      'response_ms': 312, 'delay_ms': 20.5},
+     {'type': 'task', 'seat': 'hv0', 'task': 'light', 'number': 3, 'what': 'answer', 'times': {
+         'response_ms': 312.0, 'delay_ms': 20.5, 'picture_ms': None, 'paused_ms': None}}),
 ]
 
 
@@ -261,8 +276,19 @@ BAD = {
     'scans are text': '{"type": "layers", "scans": "yes"}',
     'sound without': '{"type": "sound"}',
     'sound too loud': '{"type": "sound", "on": 1, "volume": 1.01, "rumble": 0}',
+    'view of the moon': json.dumps({'type': 'view', **MAP_VIEW, 'shown': 'moon'}),
+    'view without size': '{"type": "view", "shown": "map"}',
+    'view too wide': json.dumps({'type': 'view', **MAP_VIEW, 'across_deg': 181}),
+    'view too fine': json.dumps({'type': 'view', **MAP_VIEW, 'ratio': 1e9}),
+    'view by a number': json.dumps({'type': 'view', **MAP_VIEW, 'renderer': 4}),
     'sound on is 2': '{"type": "sound", "on": 2, "volume": 1, "rumble": 0}',
     'ping without': '{"type": "ping"}',
+    'task of a path': '{"type": "task", "seat": "hv0", "task": "../x", "number": 1, '
+                      '"what": "shown"}',
+    'task without number': '{"type": "task", "seat": "hv0", "task": "x", "what": "shown"}',
+    'task begins': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, "what": "begin"}',
+    'task for ever': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, '
+                     '"what": "answer", "response_ms": 1e12}',
 }
 
 

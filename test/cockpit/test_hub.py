@@ -78,7 +78,7 @@ async def test_a_new_client_gets_hello_then_documents_and_the_newest_frames() ->
         {'type': 'hello', 'client': 'c1', 'name': 'Guest 1', 'mode': 'live',
          'version': __version__, 'rights': {
              'role': 'director and driver', 'directs': True, 'drives': True, 'seat': '',
-             'may_direct': True, 'may_drive': True}},
+             'may_direct': True, 'may_drive': True}, 'framed_by': ''},
         {'type': 'scene', 'id': 2}, {'type': 'seats', 'seats': {}}]
     assert sink.frames == [b'new']
 

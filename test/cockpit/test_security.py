@@ -103,8 +103,12 @@ async def test_without_the_token_nothing_is_served_and_the_token_is_not_told() -
 async def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
     async with cockpit(token=TOKEN) as running:
         url = f'{running.address}/?token={TOKEN}'
+        # What else the address says of the page stays.
+        for rest, place in (('', '/'), ('&stage=hv0&view=map', '/?stage=hv0&view=map'),
+                            ('&a=http://b.example', '/?a=http://b.example')):
+            async with running.http.get(f'{url}{rest}', allow_redirects=False) as answer:
+                assert (answer.status, answer.headers['Location']) == (303, place)
         async with running.http.get(url, allow_redirects=False) as answer:
-            assert (answer.status, answer.headers['Location']) == (303, '/')
             cookie = answer.headers['Set-Cookie']
             assert 'HttpOnly' in cookie and 'SameSite=Strict' in cookie
             assert answer.headers['Cache-Control'] == 'no-store'

@@ -20,7 +20,7 @@ from pathlib import Path
 import shutil
 import struct
 
-from aiohttp import ClientSession, web, WSMsgType
+from aiohttp import ClientSession, web, WSMsgType, WSServerHandshakeError
 from cockpit_support import (
     close_code,
     cockpit,
@@ -35,6 +35,7 @@ from crgame_ros.cockpit import hub, page_files, server, session
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Sound
 from crgame_ros.cockpit.frames import FrameKind
+from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError, InputError
 import pytest
@@ -105,6 +106,22 @@ async def test_every_answer_has_the_headers_that_protect_the_page() -> None:
                 kept[path] = answer.headers['Cache-Control']
     assert kept == {'/': 'no-store', '/static/js/main.js': 'no-cache', '/plotly.js': 'no-cache',
                     '/api/scenarios': 'no-store', '/nothing': 'no-store'}
+
+
+@in_loop
+async def test_one_origin_may_show_the_page_and_the_page_is_told_which() -> None:
+    async with cockpit(framed_by='http://127.0.0.1:8070') as running:
+        for path in ('/', '/static/js/main.js', '/nothing'):
+            async with running.http.get(f'{running.address}{path}') as answer:
+                policy = answer.headers['Content-Security-Policy']
+                assert 'frame-ancestors http://127.0.0.1:8070; base-uri' in policy
+                assert policy.startswith("default-src 'self';")
+        joined = await running.join()
+        assert (await next_text(joined, 'hello'))['framed_by'] == 'http://127.0.0.1:8070'
+        # To look is not to talk: its own scripts cannot.
+        with pytest.raises(WSServerHandshakeError):
+            await running.join(Origin='http://127.0.0.1:8070')
+        await joined.close()
 
 
 @in_loop
@@ -198,11 +215,16 @@ async def test_names_layers_and_sound_are_kept() -> None:
         socket = await running.join()
         await socket.send_json({'type': 'name', 'name': 'Ada'})
         await socket.send_json({'type': 'sound', 'on': 1, 'volume': 0.5, 'rumble': 0.25})
+        await socket.send_json({
+            'type': 'view', 'shown': 'chase', 'inset': 1, 'plans': 0, 'mirrors': 0, 'bare': 0,
+            'software': 1, 'width_px': 900, 'height_px': 500, 'ratio': 0.5, 'renderer': 'x'})
         await socket.send_json({'type': 'layers', 'predictions': True})
         client = running.hub.clients['c1']
         await wait_until(lambda: client.wants_predictions, 'the layers')
         assert client.name == 'Ada' and not running.backend.commands
         assert client.sound == Sound(True, 0.5, 0.25)
+        assert client.view == SeenView('chase', inset=True, software=True, width_px=900.0,
+                                       height_px=500.0, ratio=0.5, renderer='x')
         # What was not named stays; who wants more gets the newest of it, also in a pause.
         wanted = running.hub.send_frame
         wanted('seen:1', b'12345678', only_if=lambda other: other.perceives_as == 'av0')

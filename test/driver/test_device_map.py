@@ -23,6 +23,7 @@ from crgame_ros.driver.device_map import (
     load_device_maps,
     parse_device_map,
 )
+from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import joy_state, normalize, RawInput
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.lights import Light
@@ -87,9 +88,10 @@ def test_wheel_endpoints(name: str) -> None:
     gas, brake = {'logitech_g923_xbox': (ecodes.ABS_Y, ecodes.ABS_Z)}.get(
         name, (ecodes.ABS_Z, ecodes.ABS_RZ))
     rest = {ecodes.ABS_X: 32767.5, ecodes.ABS_Y: 255, ecodes.ABS_Z: 255, ecodes.ABS_RZ: 255}
-    assert normalize(RawInput(rest), layout) == (0.0, 0.0, 0.0, False, 0)
-    assert normalize(RawInput({**rest, 0: 0, gas: 0}), layout) == (1.0, 0.0, 1.0, False, 0)
-    assert normalize(RawInput({**rest, 0: 65535, brake: 0}), layout) == (0.0, 1.0, -1.0, False, 0)
+    assert normalize(RawInput(rest), layout) == (0.0, 0.0, 0.0, False, 0, False)
+    assert normalize(RawInput({**rest, 0: 0, gas: 0}), layout) == (1.0, 0.0, 1.0, False, 0, False)
+    assert normalize(RawInput({**rest, 0: 65535, brake: 0}), layout) == (
+        0.0, 1.0, -1.0, False, 0, False)
 
 
 @pytest.mark.parametrize(('name', 'limits'), [
@@ -131,7 +133,8 @@ def test_keyboard_has_the_papers_keys() -> None:
     assert (keys.left, keys.right) == ({e.KEY_A, e.KEY_LEFT}, {e.KEY_D, e.KEY_RIGHT})
     assert keys.held({e.KEY_SPACE, e.KEY_LEFT}, True)[:5] == (False, True, True, False, True)
     assert keys.held({e.KEY_UP, e.KEY_D}, False, Light.RIGHT | Light.HORN) == (
-        True, False, False, True, False, False, True, True)
+        True, False, False, True, False, False, True, True, False)
+    assert keys.held({e.KEY_BACKSPACE}, False) == KeyState(put_back=True)
 
 
 COMBINED = """
@@ -151,7 +154,7 @@ def test_combined_pedals_are_read() -> None:
     assert device.evdev is not None
     layout = device.evdev.layout({ecodes.ABS_WHEEL: (0, 100), ecodes.ABS_GAS: (-50, 50)})
     raw = RawInput({ecodes.ABS_WHEEL: 55, ecodes.ABS_GAS: 25})
-    assert normalize(raw, layout) == (0.0, 0.5, 0.0, False, 0)
+    assert normalize(raw, layout) == (0.0, 0.5, 0.0, False, 0, False)
     assert layout.gear.toggle == {ecodes.BTN_A}
 
 

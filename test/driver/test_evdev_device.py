@@ -110,11 +110,11 @@ def test_a_wheel_drives_through_its_map(tmp_path: Path) -> None:
     """Half throttle and 225 of 450 degrees to the left, at once, from real events."""
     device = absent(tmp_path, 'logitech_g29')
     driver = EvdevDriver(device)
-    assert driver.command(0, DT_S) == (0.0, 0.0, 0.0, False, 0)
+    assert driver.command(0, DT_S) == (0.0, 0.0, 0.0, False, 0, False)
     feed(device.decoder, (ecodes.EV_ABS, ecodes.ABS_X, 16384), (ecodes.EV_ABS, ecodes.ABS_Z, 51),
          (ecodes.EV_KEY, ecodes.BTN_PINKIE, 1))
     command = driver.command(1, DT_S)
-    assert command == pytest.approx((0.8, 0.0, 0.5, True, 0), abs=2e-5)
+    assert command == pytest.approx((0.8, 0.0, 0.5, True, 0, False), abs=2e-5)
     feed(device.decoder, (ecodes.EV_ABS, ecodes.ABS_RZ, 0), (ecodes.EV_KEY, ecodes.BTN_TOP2, 1))
     assert driver.command(1, DT_S)[1:4:2] == (1.0, False)
 
@@ -124,11 +124,11 @@ def test_a_keyboard_drives_through_the_filter(tmp_path: Path) -> None:
     device = absent(tmp_path, 'keyboard')
     driver = EvdevDriver(device)
     feed(device.decoder, (ecodes.EV_KEY, ecodes.KEY_W, 1), (ecodes.EV_KEY, ecodes.KEY_A, 1))
-    assert driver.command(0, DT_S) == (1.8 * DT_S, 0.0, 2.0 * DT_S, False, 0)
+    assert driver.command(0, DT_S) == (1.8 * DT_S, 0.0, 2.0 * DT_S, False, 0, False)
     assert driver.command(1, DT_S)[:3] == pytest.approx((0.036, 0.0, 0.04))
     feed(device.decoder, (ecodes.EV_KEY, ecodes.KEY_W, 0), (ecodes.EV_KEY, ecodes.KEY_R, 1))
-    assert driver.command(1, DT_S) == (0.0, 0.0, pytest.approx(0.04), True, 0)
-    assert device.joy == ((), (0, 0, 1, 0, 1, 0, 0, 0))
+    assert driver.command(1, DT_S) == (0.0, 0.0, pytest.approx(0.04), True, 0, False)
+    assert device.joy == ((), (0, 0, 1, 0, 1, 0, 0, 0, 0))
     driver.reset()
     assert driver.command(0, DT_S)[:3] == (0.0, 0.0, 2.0 * DT_S)
 
@@ -141,7 +141,7 @@ def test_no_input_directory_is_explained(tmp_path: Path) -> None:
     assert (driver.connected, driver.fileno(), driver.joy()) == (False, None, None)
     assert isinstance(driver.problem, InputError)
     assert 'this machine has no input devices; drive with keys:FILE' in str(driver.problem)
-    assert driver.command(0, DT_S) == (0.0, 0.0, 0.0, False, 0)
+    assert driver.command(0, DT_S) == (0.0, 0.0, 0.0, False, 0, False)
     driver.close()
 
 

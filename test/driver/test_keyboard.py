@@ -58,9 +58,9 @@ def test_one_cycle_gives_the_papers_increments() -> None:
     """The first cycle of 10 ms adds exactly rate * dt."""
     keyboard = KeyboardFilter()
     assert keyboard.advance(KeyState(throttle=True, left=True), DT_S) == (
-        1.8 * DT_S, 0.0, 2.0 * DT_S, False, 0)
+        1.8 * DT_S, 0.0, 2.0 * DT_S, False, 0, False)
     assert KeyboardFilter().advance(KeyState(brake=True, right=True), DT_S) == (
-        0.0, 2.5 * DT_S, -2.0 * DT_S, False, 0)
+        0.0, 2.5 * DT_S, -2.0 * DT_S, False, 0, False)
 
 
 def test_braking_takes_precedence() -> None:
@@ -68,7 +68,7 @@ def test_braking_takes_precedence() -> None:
     keyboard = KeyboardFilter()
     keyboard.state = DriverCommand(throttle=0.5)
     command = keyboard.advance(KeyState(throttle=True, brake=True), DT_S)
-    assert command == (0.5 - 2.2 * DT_S, 2.5 * DT_S, 0.0, False, 0)
+    assert command == (0.5 - 2.2 * DT_S, 2.5 * DT_S, 0.0, False, 0, False)
 
 
 def test_both_steering_keys_hold_the_steering() -> None:
@@ -130,13 +130,14 @@ def test_look_ahead_commits_nothing() -> None:
     keyboard = KeyboardFilter()
     keyboard.advance(KeyState(throttle=True), DT_S)
     ahead = [keyboard.look_ahead(KeyState(throttle=True), DT_S) for _ in range(3)]
-    assert ahead == [(2 * 1.8 * DT_S, 0.0, 0.0, False, 0)] * 3
+    assert ahead == [(2 * 1.8 * DT_S, 0.0, 0.0, False, 0, False)] * 3
     assert keyboard.advance(KeyState(throttle=True), DT_S) == ahead[0]
 
 
 def test_reverse_is_passed_on_at_once() -> None:
     """The gear is a request; the vehicle decides at standstill."""
-    assert KeyboardFilter().advance(KeyState(reverse=True), DT_S) == (0.0, 0.0, 0.0, True, 0)
+    command = KeyboardFilter().advance(KeyState(reverse=True), DT_S)
+    assert command == (0.0, 0.0, 0.0, True, 0, False)
 
 
 def test_a_cycle_can_be_computed_again() -> None:
@@ -177,7 +178,7 @@ def test_wrong_parameters_are_refused(wrong: dict[str, float]) -> None:
 @pytest.mark.parametrize(('state', 'command'), [
     (DriverCommand(0.00099, 0.00099, 0.000099), RELEASED),
     (DriverCommand(0.00099, 0.00099, -0.000099), RELEASED),
-    (DriverCommand(0.00101, 0.00101, -0.000101), (0.00101, 0.00101, -0.000101, False, 0))])
+    (DriverCommand(0.00101, 0.00101, -0.000101), (0.00101, 0.00101, -0.000101, False, 0, False))])
 def test_deadbands_are_the_papers(state: DriverCommand, command: DriverCommand) -> None:
     """1e-3 for both pedals and 1e-4 for the steering, in either direction."""
     assert KeyboardFilter().command(state) == command

@@ -178,11 +178,13 @@ def test_a_lost_driver_no_longer_sounds_the_horn() -> None:
 
 
 def test_replays_repeat_lights_and_know_recordings_without() -> None:
-    """Four columns are a recording of an earlier version."""
+    """Four or five columns are recordings of earlier versions."""
     rows = np.array([[0.5, 0.0, 0.1, 0.0, 6.0], [0.5, 0.0, 0.1, 1.0, 0.0], [np.nan] * 5])
     assert [ReplayDriver(rows).command(n, DT_S).lights for n in range(2)] == [6, 0]
     assert not ReplayDriver(rows).drives(2)
-    assert ReplayDriver(rows[:, :4]).command(1, DT_S) == (0.5, 0.0, 0.1, True, 0)
+    assert ReplayDriver(rows[:, :4]).command(1, DT_S) == (0.5, 0.0, 0.1, True, 0, False)
+    asks = np.column_stack((rows, [1.0, 0.0, np.nan]))
+    assert [ReplayDriver(asks).command(n, DT_S).put_back for n in range(2)] == [True, False]
 
 
 def test_signals_are_told_in_words() -> None:
@@ -197,5 +199,5 @@ def test_keys_of_the_documents_are_the_maps() -> None:
     """docs/driving.md names the keys that config/devices/keyboard.yaml has."""
     text = (Path(__file__).parents[2] / 'docs/driving.md').read_text()
     for row in ('| , | left indicator', '| . | right indicator', '| J | hazard lights',
-                '| G | horn'):
+                '| G | horn', '| Backspace | after a contact'):
         assert row in text, row

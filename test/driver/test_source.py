@@ -134,24 +134,24 @@ def test_reset_begins_again() -> None:
 def test_scripted_axes_are_sampled_at_the_start_of_the_cycle() -> None:
     """A tenth of the way per second, and the gear in its interval."""
     driver = ScriptedDriver.from_text(JOY, 'j')
-    assert driver.command(250, DT_S) == (0.25, 0.0, 0.25, False, 0)
-    assert driver.joy() == ((0.25, 0.0, 0.25), (0, 0, 0, 0))
-    assert driver.command(400, DT_S) == (0.4, 0.0, 0.4, True, 0)
-    assert driver.joy() == ((0.4, 0.0, 0.4), (1, 0, 0, 0))
+    assert driver.command(250, DT_S) == (0.25, 0.0, 0.25, False, 0, False)
+    assert driver.joy() == ((0.25, 0.0, 0.25), (0, 0, 0, 0, 0))
+    assert driver.command(400, DT_S) == (0.4, 0.0, 0.4, True, 0, False)
+    assert driver.joy() == ((0.4, 0.0, 0.4), (1, 0, 0, 0, 0))
 
 
 def test_scripted_keys_are_shown_as_buttons() -> None:
     """The raw device of /<hv>/joy: throttle, brake, left, right, reverse, then lights."""
     driver = ScriptedDriver.from_text(KEYS, 'k')
     driver.command(100, DT_S)
-    assert driver.joy() == ((), (1, 0, 1, 0, 0, 0, 0, 0))
+    assert driver.joy() == ((), (1, 0, 1, 0, 0, 0, 0, 0, 0))
 
 
 def test_joy_messages_are_normalised_by_the_device_map() -> None:
     """Logitech through a joy node: left is 1, pedals go from -1 to 1."""
     driver = JoyDriver(load_device_map('logitech_g29'))
     driver.receive([0.5, -1.0, 0.0001, -0.5], [0] * 20, now_s=0.0)
-    assert driver.command(0, DT_S) == pytest.approx((0.50005, 0.25, 0.5, False, 0))
+    assert driver.command(0, DT_S) == pytest.approx((0.50005, 0.25, 0.5, False, 0, False))
 
 
 def test_pedals_that_have_not_moved_are_released() -> None:

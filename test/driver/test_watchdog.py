@@ -103,7 +103,7 @@ def test_return_is_without_a_jump() -> None:
     """From the gentle brake to full throttle and left in steps of at most rate * dt."""
     watchdog = heard(DRIVING)
     before = silence(watchdog, DRIVING, 1.0)[-1]
-    assert before == (0.0, 0.15, 0.0, False, 0)
+    assert before == (0.0, 0.15, 0.0, False, 0, False)
     back = DriverCommand(1.0, 0.0, 1.0)
     given = [watchdog.filter(back, 0.0, DT_S, 5.0) for _ in range(60)]
     for a, b in zip([before, *given], given, strict=False):

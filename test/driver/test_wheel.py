@@ -42,9 +42,9 @@ def raw(steering: float = 32767.5, throttle: float = 255, brake: float = 255) ->
 
 def test_ends_are_exact() -> None:
     """Full left, full right, pressed and released pedals are exactly 1, -1, 1 and 0."""
-    assert normalize(raw(0, 0, 255), WHEEL) == (1.0, 0.0, 1.0, False, 0)
-    assert normalize(raw(65535, 255, 0), WHEEL) == (0.0, 1.0, -1.0, False, 0)
-    assert normalize(raw(), WHEEL) == (0.0, 0.0, 0.0, False, 0)
+    assert normalize(raw(0, 0, 255), WHEEL) == (1.0, 0.0, 1.0, False, 0, False)
+    assert normalize(raw(65535, 255, 0), WHEEL) == (0.0, 1.0, -1.0, False, 0, False)
+    assert normalize(raw(), WHEEL) == (0.0, 0.0, 0.0, False, 0, False)
 
 
 @pytest.mark.parametrize('value', range(0, 256, 5))
@@ -65,13 +65,13 @@ def test_steering_is_linear_in_the_wheel_angle(degrees: float) -> None:
 
 def test_values_beyond_the_range_are_clipped() -> None:
     """A calibration narrower than the device clips; so does a value that no range holds."""
-    assert normalize(raw(-500, -3, 300), WHEEL) == (1.0, 0.0, 1.0, False, 0)
+    assert normalize(raw(-500, -3, 300), WHEEL) == (1.0, 0.0, 1.0, False, 0, False)
     assert normalize(raw(70000), WHEEL).steering == -1.0
 
 
 def test_values_that_are_no_numbers_count_as_rest() -> None:
     """Neither NaN nor infinity must not press a pedal."""
-    assert normalize(raw(math.nan, math.inf, -math.inf), WHEEL) == (0.0, 0.0, 0.0, False, 0)
+    assert normalize(raw(math.nan, math.inf, -math.inf), WHEEL) == (0.0, 0.0, 0.0, False, 0, False)
 
 
 def test_each_side_of_an_uneven_rest_reaches_its_end() -> None:

@@ -62,6 +62,18 @@ def test_a_cockpit_is_opened_on_purpose() -> None:
             parse_arguments(words)
 
 
+def test_one_origin_may_show_the_cockpit_within_its_page() -> None:
+    """None unless it is named; where there is no page, or a recording's, nothing can show it."""
+    assert parse_arguments([]).framed_by == ''
+    request = parse_arguments(['--framed-by', 'http://LocalHost:8070/'])
+    assert request.framed_by == 'http://localhost:8070'
+    for words, named in ((['--framed-by', 'http://*:8070'], 'argument --framed-by.*is no origin'),
+                         (['--framed-by', 'http://a:1', '--headless'], 'there is no page'),
+                         (['--framed-by', 'http://a:1', '--replay', 'bag'], '--replay')):
+        with pytest.raises(InputError, match=named):
+            parse_arguments(words)
+
+
 @pytest.mark.parametrize(('arguments', 'named'), [
     (['--duration', 'long'], 'argument --duration: long is no number'),
     (['--duration', '0'], 'argument --duration: 0 is not above 0'),

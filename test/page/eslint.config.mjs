@@ -38,7 +38,8 @@ export default [
     },
   },
   {
-    files: ['crgame_ros/cockpit/page/js/**/*.js', 'crgame_ros/analysis/report/page/*.js'],
+    files: ['crgame_ros/cockpit/page/js/**/*.js', 'crgame_ros/study/desk/page/js/**/*.js',
+      'crgame_ros/analysis/report/page/*.js'],
     languageOptions: { globals: globals.browser },
   },
   {

@@ -12,6 +12,7 @@ import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
 import type { createPerception } from
   '../../crgame_ros/cockpit/page/js/perception/perception.js';
 import type { Sound } from '../../crgame_ros/cockpit/page/js/sound/sound.js';
+import type { Stage } from '../../crgame_ros/cockpit/page/js/stage/stage.js';
 import type { Store } from '../../crgame_ros/cockpit/page/js/store.js';
 import type { View3d } from '../../crgame_ros/cockpit/page/js/view3d/view3d.js';
 import type { World } from '../../crgame_ros/cockpit/page/js/world/world.js';
@@ -27,6 +28,7 @@ interface Crgame {
   sound?: Sound;
   view3d?: View3d;
   lastSeconds?: ReturnType<typeof createInstantReplay>;
+  stage?: Stage;
   scenario?: ReturnType<typeof createScenario>;
   ready?: boolean;
   [part: string]: unknown;

@@ -31,6 +31,7 @@ pytestmark = pytest.mark.xdist_group('test_lint')
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 PAGE = ROOT / 'crgame_ros' / 'cockpit' / 'page' / 'js'
+DESK = ROOT / 'crgame_ros' / 'study' / 'desk' / 'page' / 'js'
 REPORT = ROOT / 'crgame_ros' / 'analysis' / 'report' / 'page'
 HEAD = ['// Copyright 2026 The crgame_ros authors', '// SPDX-License-Identifier: Apache-2.0']
 # What eslint itself needs.
@@ -98,7 +99,8 @@ def check_rules(root: Path) -> None:
     """Let eslint check the page of a tree, and its tests."""
     here = root / HERE.relative_to(ROOT)
     run('node', here / 'node_modules' / 'eslint' / 'bin' / 'eslint.js', '--max-warnings', '0',
-        '--config', here / 'eslint.config.mjs', root / PAGE.relative_to(ROOT), here, cwd=root)
+        '--config', here / 'eslint.config.mjs',
+        *(root / pages.relative_to(ROOT) for pages in (PAGE, DESK)), here, cwd=root)
 
 
 @pytest.mark.usefixtures('tools')
@@ -129,7 +131,8 @@ def test_units() -> None:
 def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], None], code: str,
                         told: list[str]) -> None:
     """Each of them fails on a page with such a file in it, and says why."""
-    shutil.copytree(PAGE, tmp_path / PAGE.relative_to(ROOT))
+    for pages in (PAGE, DESK):
+        shutil.copytree(pages, tmp_path / pages.relative_to(ROOT))
     here = tmp_path / HERE.relative_to(ROOT)
     here.mkdir(parents=True)
     for name in ('tsconfig.json', 'globals.d.ts', 'eslint.config.mjs'):
@@ -182,7 +185,8 @@ def test_tools_are_pinned_and_come_from_whatever_registry_is_set() -> None:
 
 def test_every_file_has_its_notice_and_fits_a_screen() -> None:
     """Copyright and licence first, 400 lines of 99 columns at most."""
-    files = [*PAGE.rglob('*.js'), *REPORT.glob('*.js'), *HERE.glob('*.mjs'), *HERE.glob('*.ts')]
+    files = [*PAGE.rglob('*.js'), *DESK.rglob('*.js'), *REPORT.glob('*.js'),
+             *HERE.glob('*.mjs'), *HERE.glob('*.ts')]
     assert len(files) > 90
     wrong = []
     for file in sorted(files):

@@ -9,6 +9,7 @@ const VIEW = '../../crgame_ros/cockpit/page/js/view3d';
 const { above, chasing, mountedAt } = await import(`${VIEW}/cameras.js`);
 const { acrossAngle, heightAngle, readSeat, trueAngle } = await import(
   `${VIEW}/field_of_view.js`);
+const { wantsHeadlights } = await import(`${VIEW}/headlights.js`);
 const { localOrigin } = await import(`${VIEW}/local_origin.js`);
 const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirror_optics.js`);
 const { DETAILS, isSoftware, Quality } = await import(`${VIEW}/quality.js`);
@@ -242,6 +243,13 @@ test('normals point outwards, are smooth on curves and sharp at edges', () => {
     const axial = 2 * positions[i + 1] * normals[i + 1];
     // On the tyre along the radius, at the ends along the axis.
     near(Math.max(radial, axial), 1, 1e-3);
+  }
+});
+
+test('lights are on at dusk and in fog', () => {
+  for (const [light, visibility, on] of [['day', 30000, false], ['day', 201, false],
+    ['day', 200, true], ['day', 80, true], ['dusk', 30000, true], ['dusk', 80, true]]) {
+    assert.equal(wantsHeadlights({ light, visibility }), on, `${light} ${visibility}`);
   }
 });
 

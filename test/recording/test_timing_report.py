@@ -229,3 +229,32 @@ def test_the_sound_of_seats(tmp_path: Path, recorder: Any, drive: Drive) -> None
     assert timing_report(recorder.ours(tmp_path / 'bag', messages))['sound'] == {
         'hv0': {'on_share': 0.75, 'volume': 0.8, 'rumble': 0.5},
         'av0': {'on_share': 0.0, 'volume': None, 'rumble': 0.0}}
+
+
+def test_the_views_of_seats(tmp_path: Path, recorder: Any, drive: Drive) -> None:
+    """A period for each choice, to the next one; what cannot be read is passed over."""
+    messages = documents(recorder, drive(CUT_IN, duration_s=0.1)) + cycles(recorder, {}, {}, 30)
+    map_view = {'shown': 'map', 'plans': 'true', 'ratio': '1', 'rate_hz': '', 'width_px': '900'}
+    driver = {'shown': 'driver', 'across_deg': '75.0', 'plans': 'false', 'ratio': '0.5',
+              'renderer': 'SwiftShader', 'software': 'true', 'screen_width_m': '0.6',
+              'eye_distance_m': '0.7', 'inset': 'true'}
+    told = [('hv0', {'shown': ''}), ('hv0', map_view), ('hv0', map_view | {'rate_hz': '60'}),
+            ('hv0', driver | {'rate_hz': '20'}), ('hv0', driver | {'rate_hz': '30'}),
+            ('nobody', map_view), ('hv0', {'shown': 'moon'}),
+            ('hv0', driver | {'rate_hz': 'nan', 'inset': 'false'})]
+    for number, (seat, values) in enumerate(told):
+        stamp_ns = 10_000_000 * (number + 1)
+        messages.append(('/diagnostics', DIAGNOSTICS, START + stamp_ns, recorder.status(
+            stamp_ns, f'cockpit_node: {seat} view', '', **values)))
+    seen = timing_report(recorder.ours(tmp_path / 'bag', messages))['view']
+    assert list(seen) == ['hv0']
+    assert [(item['from_s'], item['to_s'], item['shown'], item['inset'], item['plans'],
+             item['rate_hz']) for item in seen['hv0']] == [
+        (0.02, 0.04, 'map', False, True, 60.0), (0.04, 0.08, 'driver', True, False, 25.0),
+        (0.08, 0.08, 'driver', False, False, None)]
+    assert seen['hv0'][1] == {
+        'from_s': 0.04, 'to_s': 0.08, 'shown': 'driver', 'inset': True, 'plans': False,
+        'mirrors': False, 'bare': False, 'software': True, 'across_deg': 75.0,
+        'screen_width_m': 0.6, 'eye_distance_m': 0.7, 'width_px': None, 'height_px': None,
+        'renderer': 'SwiftShader', 'ratio': 0.5, 'rate_hz': 25.0}
+    assert seen['hv0'][0]['width_px'] == 900.0

@@ -21,6 +21,7 @@ from typing import Any
 
 from cockpit_graph import Graph, lived, OFFSET_NS
 from crgame_ros.cockpit.client import Sound
+from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import events_document
 from crgame_ros.game.events import FiredEvent
@@ -152,12 +153,12 @@ def test_giving_back_lets_go_of_the_pedals(setup: Setup) -> None:
     lived(check)
 
 
-def test_what_the_person_in_a_seat_hears_is_told(setup: Setup) -> None:
+def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
     """At each change and once a second, with the time of the run; of nobody else."""
-    def told(graph: Graph) -> list[tuple[int, dict[str, str]]]:
+    def told(graph: Graph, what: str = 'sound') -> list[tuple[int, dict[str, str]]]:
         return [(from_time(message.header.stamp), read_status(status).values)
                 for message in graph.peer.messages['/diagnostics'] for status in message.status
-                if status.name == 'cockpit_node: hv0 sound']
+                if status.name == f'cockpit_node: hv0 {what}']
 
     async def check(graph: Graph) -> None:
         page, other = graph.page(), graph.page()
@@ -178,6 +179,15 @@ def test_what_the_person_in_a_seat_hears_is_told(setup: Setup) -> None:
         await graph.until(lambda: [values for _, values in told(graph)].count(loud) > 1,
                           'the same once more')
         assert all(values in (silent, loud) for _, values in told(graph))
+        assert told(graph, 'view')[0][1]['shown'] == ''
+        page.view = SeenView('driver', inset=True, across_deg=75.0, ratio=0.5, rate_hz=30.0,
+                             renderer='a card', width_px=1280.0, height_px=720.0)
+        seen = {'shown': 'driver', 'inset': 'true', 'plans': 'false', 'mirrors': 'false',
+                'bare': 'false', 'across_deg': '75.0', 'screen_width_m': '',
+                'eye_distance_m': '', 'width_px': '1280', 'height_px': '720', 'ratio': '0.500',
+                'rate_hz': '30.0', 'renderer': 'a card', 'software': 'false'}
+        await graph.until(lambda: told(graph, 'view')[-1][1] == seen, 'the new view')
+        assert told(graph, 'view')[-1][0] == OFFSET_NS + 200_000_000
     lived(check)
 
 

@@ -255,7 +255,7 @@ def test_message_that_is_no_plan_is_refused(names: tuple[str, ...], times_ns: Se
 
 @pytest.mark.parametrize('command', [
     DriverCommand(), DriverCommand(1.0, 0.0, -1.0, True, 5), DriverCommand(0.1, 0.7, 1.0 / 3.0),
-    DriverCommand(lights=2)])
+    DriverCommand(lights=2), DriverCommand(put_back=True)])
 def test_command_is_rounded_once(command: DriverCommand) -> None:
     """A Joy holds float32, to which every command is rounded: what comes is what was meant."""
     message = _sent(to_joy(command, 1_230_000_000, 'cockpit'))
@@ -263,7 +263,8 @@ def test_command_is_rounded_once(command: DriverCommand) -> None:
     assert from_time(message.header.stamp) == 1_230_000_000
     left, right, horn = (int(command.lights) >> bit & 1 for bit in range(3))
     assert message.axes.typecode == 'f'
-    assert list(message.buttons) == [int(command.reverse), left, right, horn]
+    assert list(message.buttons) == [
+        int(command.reverse), left, right, horn, int(command.put_back)]
     read = from_joy(message, '/hv0/driver_command')
     assert read == command.rounded()
     assert read == from_joy(_sent(to_joy(read, 0, 'game')), '/hv0/driver_command')
@@ -272,7 +273,7 @@ def test_command_is_rounded_once(command: DriverCommand) -> None:
 
 def test_command_of_a_stranger_is_clipped() -> None:
     """Values out of range are clipped, no numbers count as released, further axes are ignored."""
-    message = Joy(axes=[3.0, -1.0, -math.inf, 9.0], buttons=[5, 1, 0, 7, 9])
+    message = Joy(axes=[3.0, -1.0, -math.inf, 9.0], buttons=[5, 1, 0, 7, 0, 9])
     assert from_joy(_sent(message), 'joy') == DriverCommand(1.0, 0.0, -1.0, True, 5)
     # As recordings of earlier versions have it: one button.
     message = Joy(axes=[math.nan, 0.5, math.nan], buttons=[0])

@@ -73,6 +73,11 @@ objects:
   - {kind: particle, trajectory: [[0, 0, 0], [1, 1, 0]]}
 traffic: {recorded: reactive, agents: 3, options: {time_gap: 1.2}, capacity: 7, seed: null}
 occupancy: map.yaml
+tasks:
+  - {name: light, detection_response: {interval: [3, 5], shown: 1.0}, when: {time: 0}}
+  - {name: call, take_over: {lead: 4, before: slow}, seat: hv0, label: Take over}
+  - {name: radio, secondary_task: {show: true}, when: {event: slow}, until: {step: 90}}
+language: de
 """
 # What compares values with each other, or looks beyond the file.
 NO_SCHEMA = ('is there already', 'is larger than "dt_max"', 'the same place', 'km long',
@@ -160,7 +165,7 @@ def test_every_key_is_described() -> None:
         for name, part in {'': schema, **schema['$defs']}.items():
             part = part['anyOf'][1] if 'anyOf' in part and 'type' not in part else part
             for key, entry in part.get('properties', {}).items():
-                keyed = name in ('EventSpec', 'TimelineFile', 'StepEntry', 'Question')
+                keyed = name in ('EventSpec', 'TaskSpec', 'TimelineFile', 'StepEntry', 'Question')
                 assert 'description' in entry or keyed, f'{name}.{key}'
 
 

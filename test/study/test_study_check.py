@@ -111,6 +111,17 @@ def test_texts_that_a_language_lacks_are_told(tmp_path: Path) -> None:
     assert 'warning: mine.yaml: has no texts in "de"' in told(study)
 
 
+def test_a_scenario_alone_can_be_driven(tmp_path: Path) -> None:
+    """A level may name a CommonRoad file: alone, or as the road of a game."""
+    road = {'name': 'road', 'scenario': str(scenarios_directory() / 'ZAM_Merge-1_1_T-1.xml')}
+    study = study_of(tmp_path, settings={'duration': 1}, factors=[{'name': 'scene', 'levels': [
+        road, {'name': 'game', 'game': CUT_IN}]}], blocks=[{'name': 'main', 'practice': {}}])
+    assert told(study) == ''
+    first = trial_game(conditions_of(study, study.blocks[0])[0].settings, 'cockpit')
+    assert first.scenario.name == 'ZAM_Merge-1_1_T-1.xml'
+    assert [human.driver for human in first.humans] == ['cockpit']
+
+
 def test_a_sequence_is_taken_as_it_is(tmp_path: Path) -> None:
     study = study_of(tmp_path, blocks=[{'name': 'main', 'sequences': [['a', 'a', 'b'], ['b']]}])
     assert [[trial.condition.name for trial in plan_trials(study, place)]

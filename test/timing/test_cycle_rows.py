@@ -39,7 +39,7 @@ def test_columns_name_what_is_in_them() -> None:
     """Each value is found under its name after the way through the flat message."""
     rows = filled()
     table = CycleTable.from_message(','.join(rows.columns), rows.taken())
-    assert table.rows.shape == (2, 12 + 9 + 2 * 5)
+    assert table.rows.shape == (2, 12 + 9 + 2 * 6)
     expected = {'epoch': (4, 4), 'n': (7, 8), 'k': (12, 13), 'ideal_s': (0.07, 0.08),
                 'actual_s': (0.0701, 0.0805), 'step_error_s': (0.0001, 0.0002),
                 'cumulative_error_s': (0.0002, 0.0005), 'busy_s': (0.002, 0.003),
@@ -71,16 +71,18 @@ def test_an_av_that_follows_its_plan_has_no_command() -> None:
     assert commands[1].tolist() == list(map(float, BACK))
 
 
-def test_rows_of_earlier_versions_have_no_lights() -> None:
-    """They had four columns a vehicle; no lights were on, and who did not drive stays NaN."""
+@pytest.mark.parametrize('without', [('/put_back',), ('/lights', '/put_back')])
+def test_rows_of_earlier_versions_have_no_switches(without: tuple[str, ...]) -> None:
+    """They had four or five columns; the rest was off, and who did not drive stays NaN."""
     rows = CycleRows(('hv0', 'av0'), 2)
     rows.add(0, 1, FIRST, 0.0, 0.0, (LEFT._replace(lights=3), None))
     table = CycleTable.from_message(','.join(rows.columns), rows.taken())
     assert table.commands('hv0')[0, 4] == 3.0
-    kept = [i for i, name in enumerate(table.columns) if not name.endswith('/lights')]
+    kept = [i for i, name in enumerate(table.columns) if not name.endswith(without)]
     old = CycleTable([table.columns[i] for i in kept], table.rows[:, kept])
-    assert old.commands('hv0').tolist() == [[*map(float, LEFT[:4]), 0.0]]
-    assert np.isnan(old.commands_of(['av0'])).all() and old.commands_of(['av0']).shape == (1, 1, 5)
+    lights = 0.0 if '/lights' in without else 3.0
+    assert old.commands('hv0').tolist() == [[*map(float, LEFT[:4]), lights, 0.0]]
+    assert np.isnan(old.commands_of(['av0'])).all() and old.commands_of(['av0']).shape == (1, 1, 6)
 
 
 def test_rows_for_the_metrics() -> None:
@@ -97,7 +99,7 @@ def test_taking_empties_the_buffer() -> None:
     rows.add(4, 13, FIRST, 0.0, 0.0, (LEFT, BACK))
     assert rows.full
     taken = rows.taken()
-    assert len(taken) == 3 * 31
+    assert len(taken) == 3 * 33
     assert (rows.count, rows.full, len(rows.taken())) == (0, False, 0)
     rows.add(5, 1, SECOND, 0.0, 0.0, (BACK, LEFT))
     assert (taken[0], taken[1]) == (4.0, 7.0)

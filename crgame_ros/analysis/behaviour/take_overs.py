@@ -100,6 +100,22 @@ def find_take_overs(controls: DriverControls, calm: NDArray[np.bool_],
     return tuple(found)
 
 
+def hands_on_after(controls: DriverControls, request_s: float) -> float:
+    """
+    Give the time from a request to hands on of the first take-over after it.
+
+    :param controls: of the AV.
+    :return: NaN where nobody took it over in `LONGEST_WAIT_S`, or nobody's hands came on [s]
+    """
+    for piece in controls.pieces():
+        begin_s = controls.times_s[piece][0]
+        if request_s <= begin_s + 1e-9 and begin_s - request_s <= LONGEST_WAIT_S:
+            hands_on = _hands_on(controls, piece)
+            return math.nan if hands_on is None else float(
+                controls.times_s[piece][hands_on] - request_s)
+    return math.nan
+
+
 def _hands_on(controls: DriverControls, piece: slice) -> int | None:
     """Give the row of the first input in a piece."""
     turned = np.abs(controls.wheel_deg[piece] - controls.wheel_deg[piece][0])

@@ -45,13 +45,13 @@ _WAY_POINTS, _WAY_LEAST = 6000, 20
 def motion_section(run: ReportRun) -> Section:
     """Show speeds, headings and positions of the driven vehicles."""
     rows = []
-    states = run.log.vehicle_states
+    states, distances = run.log.vehicle_states, run.record.ways()
     for i, item in enumerate(run.log.vehicles):
         speeds = states[:, i, StateColumn.SPEED]
-        way = np.hypot(*np.diff(states[:, i, :2], axis=0).T).sum() if len(states) > 1 else 0.0
         accelerations = states[:, i, StateColumn.ACCELERATION]
-        rows.append((named(run, item.id), number(float(way), 1), number(float(speeds.mean())),
-                     number(float(speeds.min())), number(float(speeds.max())),
+        rows.append((named(run, item.id), number(float(distances[i]), 1),
+                     number(float(speeds.mean())), number(float(speeds.min())),
+                     number(float(speeds.max())),
                      number(float(accelerations.min())), number(float(accelerations.max()))))
     html = table('How the driven vehicles moved', (
         'vehicle', 'way [m]', 'mean speed [m/s]', 'least [m/s]', 'greatest [m/s]',

@@ -44,7 +44,7 @@ def write_report(runs: Sequence[ReportRun], path: Path, driven_here: bool = Fals
     :raises InputError: if the file cannot be written.
     :raises CrgameError: if Plotly is not installed.
     """
-    write_text(report_html(runs, software_note(_software(), driven_here)), path)
+    write_text(report_html(runs, software_note(software(), driven_here)), path)
 
 
 def check_report_path(path: Path) -> None:
@@ -65,7 +65,7 @@ def check_report_runs(count: int) -> None:
         raise InputError(f'{count} runs', 'report', f'give {MOST_RUNS} at most')
 
 
-def _software() -> tuple[tuple[str, str], ...]:
+def software() -> tuple[tuple[str, str], ...]:
     """Name the software and the machine: nothing that changes from one minute to the next."""
     found = [('crgame_ros', __version__), ('Python', platform.python_version())]
     for name in _PACKAGES:

@@ -80,6 +80,9 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     sound = '; '.join(_sound(run))
     if sound:
         yield 'sound', sound
+    view = '; '.join(_view(run))
+    if view:
+        yield 'view', view
 
 
 def _sound(run: ReportRun) -> Iterator[str]:
@@ -88,6 +91,27 @@ def _sound(run: ReportRun) -> Iterator[str]:
         words = 'off' if told['volume'] is None else \
             f'on for {_percent(told["on_share"])} of the time, volume {_percent(told["volume"])}'
         yield f'{free(seat)} {words}, rumble {_percent(told["rumble"])}'
+
+
+def _view(run: ReportRun) -> Iterator[str]:
+    """Say what people in the cockpit's seats saw, from when to when."""
+    for seat, periods in ((run.timing or {}).get('view') or {}).items():
+        for period in periods:
+            words = [f'{plain(period["shown"])} from {number(period["from_s"], 1)} to '
+                     f'{number(period["to_s"], 1)} s']
+            if period['across_deg'] is not None:
+                words.append(f'{number(period["across_deg"], 0)}° across')
+            if period['screen_width_m'] is not None and period['eye_distance_m'] is not None:
+                words.append(f'true to scale on a screen of {number(period["screen_width_m"], 2)}'
+                             f' m, {number(period["eye_distance_m"], 2)} m from the eyes')
+            words += [text for key, text in (('inset', 'with the small map'),
+                                             ('plans', 'with the plans of AVs')) if period[key]]
+            if period['rate_hz'] is not None:
+                words.append(f'{number(period["rate_hz"], 0)} pictures/s')
+            if period['renderer']:
+                words.append(f'drawn by {"the processor" if period["software"] else "a card"} '
+                             f'({free(period["renderer"])})')
+            yield f'{free(seat)} {", ".join(words)}'
 
 
 def _percent(share: float) -> str:
@@ -127,12 +151,15 @@ def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
 
 
 def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
-    """Say who was in the seats of cockpits; games whose people sat elsewhere have none."""
+    """Say who was in the seats of cockpits, and whose device at the machine drove."""
     last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
     for spell, delay_ms in run.record.drivers:
         person = spell.person
-        if person is not None:
-            until_n = last_n if spell.until_n is None else spell.until_n
+        until_n = last_n if spell.until_n is None else spell.until_n
+        if person is None and delay_ms is not None:
+            yield (named(run, spell.seat), NOTHING, 'driver', free(spell.driver), 'at the machine',
+                   f'{spell.from_n} to {until_n}', number(delay_ms, 0))
+        elif person is not None:
             yield (named(run, spell.seat), free(person.name or NOTHING),
                    free(person.role or NOTHING), free(person.device or NOTHING),
                    free(person.browser or NOTHING), f'{spell.from_n} to {until_n}',

@@ -48,7 +48,7 @@ def scores_of(record: RunRecord, plans: Mapping[str, PlanRecord], *, drives_only
     """
     try:
         if drives_only:
-            return RunScores(score_drives(record.log, plans=plans))
+            return RunScores(score_drives(record.log, plans=plans, put_back=record.put_back))
         # The checker takes a second to import.
         from crgame_ros.analysis.scores.scored_run import score_run
         return RunScores(score_run(record, plans=plans, progress=progress).vehicles)

@@ -14,7 +14,7 @@
 # limitations under the License.
 """Scores the drives of a run alone: nuPlan's score and plans, without CommonRoad's checker."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from crgame_ros.analysis.scores.nuplan_score import Expert, NuplanScore, NuplanScorer
 from crgame_ros.analysis.scores.plan_record import PlanRecord
@@ -29,10 +29,14 @@ from crgame_ros.scenario.loading import parse_scenario
 
 
 def score_drives(log: RunLog, *, expert: Expert | None = None,
-                 plans: Mapping[str, PlanRecord] | None = None) -> tuple[VehicleScores, ...]:
+                 plans: Mapping[str, PlanRecord] | None = None,
+                 put_back: Mapping[str, Sequence[int]] | None = None
+                 ) -> tuple[VehicleScores, ...]:
     """
     Score how every driven vehicle of a run drove; CommonRoad's tools are not asked.
 
+    :param put_back: last scenario steps before vehicles were put back on their lane: they are
+        scored up to the first of them, for nobody drives such a jump.
     :param expert: as for `score_run`.
     :param plans: as for `score_run`.
     :raises InputError: if nobody drives in the run.
@@ -40,35 +44,50 @@ def score_drives(log: RunLog, *, expert: Expert | None = None,
     if not log.vehicles:
         raise InputError('nobody drives in it', 'the run', 'score a run with a human or an AV')
     run = _Drives(log, expert)
-    vehicles = []
+    vehicles, ends = [], first_ends(log, put_back or {})
     for number, item in enumerate(log.vehicles):
         av = log.game.av(item.id)
-        nuplan, remarks = run.score(number)
+        nuplan, remarks = run.score(number, ends.get(item.id, log))
         vehicles.append(VehicleScores(
             item.id, 'human' if item.role is Role.HUMAN else 'autonomous',
             '' if av is None else av.planner, nuplan, None, None, (plans or {}).get(item.id),
-            remarks))
+            (*remarks, *_ended(item.id, ends.get(item.id)))))
     return tuple(vehicles)
+
+
+def first_ends(log: RunLog, put_back: Mapping[str, Sequence[int]]) -> dict[str, RunLog]:
+    """Give the run of each vehicle that was put back on its lane, up to just before that."""
+    return {vehicle: log.until(min(ks)) for vehicle, ks in put_back.items()}
+
+
+def _ended(vehicle_id: str, log: RunLog | None) -> Iterator[str]:
+    """Say up to when a vehicle was scored that was put back on its lane."""
+    if log is not None:
+        scheduler = log.game.scheduler
+        end_s = (int(log.ks[-1]) - scheduler.k0) * scheduler.time_step_s
+        yield (f'scored up to {end_s:.1f} s: {vehicle_id} was put back on its lane then, which '
+               'nobody drives')
 
 
 class _Drives:
     """The drives of one run, on the roads of its scenario."""
 
     def __init__(self, log: RunLog, expert: Expert | None) -> None:
-        self._log, self._expert = log, expert
+        self._expert = expert
         original = parse_scenario(log.xml_text, '/scenario/xml')
         self._nuplan = NuplanScorer(original)
         self._original = ScoredScenario.of_file(original)
         self._problems = {problem.planning_problem_id: problem
                           for problem in original.planning_problems}
 
-    def score(self, number: int) -> tuple[NuplanScore | None, tuple[str, ...]]:
-        """Score a vehicle by its number; without a score the remark says why."""
-        av = self._log.game.av(self._log.vehicles[number].id)
+    def score(self, number: int, log: RunLog
+              ) -> tuple[NuplanScore | None, tuple[str, ...]]:
+        """Score a vehicle by its number over a log; without a score the remark says why."""
+        av = log.game.av(log.vehicles[number].id)
         problem = None if av is None else self._problems.get(av.planning_problem)
         expert = self._expert or recorded_expert(
-            self._original, problem, int(self._log.ks[0]), len(self._log.ks))
+            self._original, problem, int(log.ks[0]), len(log.ks))
         try:
-            return self._nuplan.score(drive_of(self._log, number), expert, problem), ()
+            return self._nuplan.score(drive_of(log, number), expert, problem), ()
         except InputError as error:
             return None, (f'no nuPlan score: {error}',)

@@ -28,7 +28,7 @@ from crgame_ros.analysis.scores.driven_states import (
 from crgame_ros.analysis.scores.nuplan_score import Expert
 from crgame_ros.analysis.scores.plan_record import find_goal, PlanRecord
 from crgame_ros.analysis.scores.planner_scores import PlannerScores, REMARKS
-from crgame_ros.analysis.scores.scored_drives import score_drives
+from crgame_ros.analysis.scores.scored_drives import first_ends, score_drives
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import SolutionJudge
 from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
@@ -50,11 +50,13 @@ def score_run(record: RunRecord, *, expert: Expert | None = None,
     :raises InputError: if nobody drives in the run, or it cannot be exported.
     """
     log = record.log
-    drives = score_drives(log, expert=expert, plans=plans)
+    drives = score_drives(log, expert=expert, plans=plans, put_back=record.put_back)
+    ends = first_ends(log, record.put_back)
     scored, exported = ScoredScenario.of_run(log)
     judge = SolutionJudge(scored)
     vehicles = [
-        _judged(log, number, drive, exported.problem_ids[drive.vehicle_id], scored, judge,
+        _judged(ends.get(drive.vehicle_id, log), number, drive,
+                exported.problem_ids[drive.vehicle_id], scored, judge,
                 partial(_share, progress, number, len(drives)))
         for number, drive in enumerate(drives)]
     return PlannerScores(scored.loaded.scenario.scenario_id, exported.xml_text, tuple(vehicles),

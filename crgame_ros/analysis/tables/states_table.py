@@ -198,7 +198,9 @@ class _StateRows:
 
 def _consumed(commands: FloatArray) -> dict[str, Any]:
     """Give the columns of what was consumed (R, 5)."""
-    found: dict[str, Any] = dict(zip(COMMAND_COLUMNS, commands.T, strict=True))
+    # Being put back is an event (`events`).
+    found: dict[str, Any] = {name: column for name, column in zip(
+        COMMAND_COLUMNS, commands.T, strict=True) if name != 'put_back'}
     lights, nobody = np.nan_to_num(found.pop('lights')).astype(int), np.isnan(found['reverse'])
     flags = {'reverse': found['reverse'] > 0.5, 'left_indicator': lights & Light.LEFT > 0,
              'right_indicator': lights & Light.RIGHT > 0, 'horn': lights & Light.HORN > 0}

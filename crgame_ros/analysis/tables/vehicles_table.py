@@ -62,8 +62,8 @@ def _drive(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
     states = run.record.log.vehicle_states
     speeds, accelerations = (states[..., column] for column in (
         StateColumn.SPEED, StateColumn.ACCELERATION))
-    ways = np.hypot(*np.moveaxis(np.diff(states[..., :2], axis=0), -1, 0)).sum(axis=0)
-    return {'distance': ways, 'mean_speed': speeds.mean(axis=0), 'max_speed': speeds.max(axis=0),
+    return {'distance': run.record.ways(), 'mean_speed': speeds.mean(axis=0),
+            'max_speed': speeds.max(axis=0),
             'max_acceleration': accelerations.max(axis=0),
             'min_acceleration': accelerations.min(axis=0)}
 

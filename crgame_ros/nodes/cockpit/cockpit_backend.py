@@ -23,11 +23,12 @@ from typing import Any, Literal
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.task_documents import PageTimes, TaskReport
 from crgame_ros.nodes.cockpit.cockpit_feed import CockpitFeed
 from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.nodes.cockpit.page_report import PageReport
 from crgame_ros.nodes.cockpit.people_feed import PeopleFeed
 from crgame_ros.nodes.cockpit.seat_desk import SeatDesk
-from crgame_ros.nodes.cockpit.sound_report import SoundReport
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.spinning import attempt
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -63,7 +64,7 @@ class LiveBackend:
         self._runs = runs
         self._endpoints = Endpoints(node)
         self._orders = CockpitOrders(node, self._endpoints)
-        self._sound_report = SoundReport(self._endpoints.diagnostics)
+        self._page_report = PageReport(self._endpoints.diagnostics)
         self._seat_slot = self._endpoints.polled('/seats')
         self._served_s = 0.0
         self._lost: dict[str, bool] = {}
@@ -76,7 +77,8 @@ class LiveBackend:
         self._hub = hub
         self._feed = CockpitFeed(self._endpoints, hub, self._runs)
         self._desk = SeatDesk(self._node, self._endpoints, self._orders, hub, self._feed)
-        self._people = PeopleFeed(self._endpoints, hub, self._desk.table)
+        self._people = PeopleFeed(
+            self._endpoints, hub, self._desk.table, self._feed.status)
         self._pump = asyncio.create_task(self._run())
 
     async def stop(self) -> None:
@@ -122,7 +124,7 @@ class LiveBackend:
         self._desk.serve()
         self._people.tell(time.monotonic())
         if self._feed.scenario is not None:
-            self._sound_report.tell(
+            self._page_report.tell(
                 self._desk.table.held.values(), self._hub.clients,
                 self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 
@@ -157,6 +159,8 @@ class LiveBackend:
         kind = message['type']
         if kind == 'input':
             return self._desk.input(client, message)
+        if kind == 'task':
+            return self._report_task(client, message)
         if kind == 'control':
             return await self._control(client, message['action'], bool(message.get('all')))
         if kind == 'rate':
@@ -191,12 +195,23 @@ class LiveBackend:
 
     def _trigger(self, client: Client, event: str) -> str:
         scenario = self._feed.scenario
-        events = () if scenario is None else scenario.game.events
-        if event not in {item.name for item in events}:
-            raise InputError('is no event of this game', event[:40])
+        game = None if scenario is None else scenario.game
+        if game is None or event not in {*(item.name for item in game.events),
+                                         *(task.name for task in game.tasks)}:
+            raise InputError('is no event or task of this game', event[:40])
         self._orders.trigger(event)
         self._announce(client, f'triggered {event}')
         return f'{event}: triggered'
+
+    def _report_task(self, client: Client, message: Mapping[str, Any]) -> str:
+        """Pass on what the page of a seat has shown, or what its driver has answered."""
+        seat, what = message['seat'], message['what']
+        # A request to take over is seen before anybody has the seat.
+        if what != 'shown' or seat in self._desk.table.held or not client.rights.drives:
+            self._desk.table.holding(client.id, seat)
+        self._orders.report_task(TaskReport(
+            seat, message['task'], message['number'], what, PageTimes(**message['times'])))
+        return ''
 
     def _known_av(self, av: str) -> None:
         scenario = self._feed.scenario

@@ -33,6 +33,7 @@ from crgame_ros.game.documents import (
     parse_events_document,
     parse_signals_document,
 )
+from crgame_ros.game.task_documents import parse_state, STATE_TOPIC
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.nodes.cockpit.av_feed import AvFeed
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
@@ -81,6 +82,7 @@ class CockpitFeed:
         self._criticality = endpoints.polled(CRITICALITY_TOPIC, depth=QUEUE)
         self._signals = endpoints.polled('/scenario/signals')
         self._fired = endpoints.polled('/scenario/events')
+        self._tasks = endpoints.polled(STATE_TOPIC)
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._diagnostics = endpoints.polled('/diagnostics', depth=QUEUE)
         self._verdicts: dict[str, PolledSubscription] = {}
@@ -118,7 +120,7 @@ class CockpitFeed:
             for work in (self._poll_documents, self._poll_plans, self._poll_perception,
                          self._poll_texts, self._poll_criticality, self._poll_diagnostics):
                 _read(work, problems)
-        for work in (self._poll_commands, self.poll_states, self._poll_objects):
+        for work in (self._poll_commands, self.poll_states, self._poll_tasks, self._poll_objects):
             _read(work, problems)
         # The page holds its picture still in a pause, and sounds at a collision: it must not
         # learn of them late.
@@ -162,6 +164,7 @@ class CockpitFeed:
                 self._verdicts[vehicle] = self._endpoints.polled('/<v>/drivability', vehicle)
         self._hub.set_document('scene', {**scene, 'again': self._again})
         self._hub.set_document('events', {'fired': []})
+        self._hub.set_document('tasks', {'running': [], 'open': []})
         self._avs.show_map()
 
     def _poll_plans(self) -> None:
@@ -207,6 +210,14 @@ class CockpitFeed:
             return
         with suppress(InputError):
             self._hub.send_frame(*frames.objects(place, message))
+
+    def _poll_tasks(self) -> None:
+        message = None if self.scenario is None else self._tasks.latest()
+        if message is None or self.scenario is None:
+            return
+        epoch, state = parse_state(message.data)
+        if epoch == self.scenario.game.epoch:
+            self._hub.set_document('tasks', state)
 
     def _poll_criticality(self) -> None:
         for _ in range(QUEUE):

@@ -19,6 +19,7 @@ from typing import Any
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.seat_documents import demand_text, SeatDemand
+from crgame_ros.game.task_documents import report_text, REPORT_TOPIC, TaskReport
 from crgame_ros.ros.endpoints import Endpoints
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
@@ -51,6 +52,7 @@ class CockpitOrders:
         self._parameters = node.create_client(SetParameters, 'sim_node/set_parameters')
         self._triggers = endpoints.publisher('/trigger')
         self._seat_orders = endpoints.publisher('/seats/order')
+        self._task_reports = endpoints.publisher(REPORT_TOPIC)
 
     def close(self) -> None:
         """Let go of the executor."""
@@ -62,8 +64,12 @@ class CockpitOrders:
         self._executor.spin_once(timeout_sec=0)
 
     def trigger(self, event: str) -> None:
-        """Fire an event of the game."""
+        """Fire an event of the game, or let a task begin or end."""
         self._triggers.publish(String(data=event))
+
+    def report_task(self, report: TaskReport) -> None:
+        """Tell what a page has shown of a task, or what its driver has answered."""
+        self._task_reports.publish(String(data=report_text(report)))
 
     def order_seat(self, demand: SeatDemand) -> None:
         """Order who drives a vehicle, or tell of who does."""

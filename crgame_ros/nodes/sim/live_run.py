@@ -256,8 +256,7 @@ class LiveRun:
     def _take_triggers(self) -> None:
         """Hand the events over that somebody triggered since the last tick."""
         for name in self._inputs.triggers():
-            reason = self.simulation.trigger(name)
-            if reason is not None:
+            if (reason := self.simulation.trigger(name)) is not None:
                 self._diagnostics.event_refused(name, reason)
 
     def _loop(self) -> Outcome:
@@ -310,6 +309,7 @@ class LiveRun:
             self._publish_seats()
         if simulation.scheduler.is_tick(simulation.n + 1):
             self._take_triggers()
+        inputs.pass_task_reports(simulation.report_task)
         watch.mark(Phase.STEP)
         simulation.move(cycle.dt_eff_s, commands)
         if outputs.shows_vehicles(simulation):
@@ -333,9 +333,6 @@ class LiveRun:
 
     def _at_tick(self, result: StepResult) -> None:
         """Do what is due with the scenario's time."""
-        for event in result.fired:
-            self._node.get_logger().info(
-                f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
         if result.agents_k is not None and result.agents_k < result.k:
             self._diagnostics.late_traffic(result.n, result.k, result.agents_k)
         order = self._inputs.frame_skip_order()

@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""When a run with drivers in cockpits begins: all are there and ready, and 3 s have passed."""
+"""When a run with drivers in cockpits begins: all are there and ready, after a countdown."""
 
 import math
 
@@ -20,8 +20,6 @@ from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.ros.seats import Seats
 
 NS_PER_S = 1_000_000_000
-# Time to put the hands on the controls after the last one has said that they are ready [s].
-COUNTDOWN_S = 3.0
 
 
 class ReadyGate:
@@ -59,7 +57,7 @@ class ReadyGate:
             return begins
         if self._began_ns is None:
             self._began_ns = now_ns
-        left_s = COUNTDOWN_S - (now_ns - self._began_ns) / NS_PER_S
+        left_s = control.countdown_from_s - (now_ns - self._began_ns) / NS_PER_S
         control.countdown_s = max(0, math.ceil(left_s))
         return left_s <= 0.0
 

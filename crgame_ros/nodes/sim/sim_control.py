@@ -34,6 +34,8 @@ from rclpy.parameter import Parameter
 
 # Drivers that do the same wherever they are.
 SCRIPTS = ('keys:', 'joy:')
+# Time to put the hands on the controls after the last one has said that they are ready [s].
+COUNTDOWN_S = 3.0
 OVER = 'the run is over: reset begins it anew'
 
 
@@ -96,6 +98,8 @@ class SimControl:
                        "simulated seconds until the run ends; 0 takes the game's", (0.0, 1e7))
         declare('start_paused', False, ParameterDescriptor(
             description='wait for /sim/start', read_only=True))
+        declare_number(self._node, 'countdown', COUNTDOWN_S, 'seconds from when all drivers at '
+                       'pages are ready to the start of the run', (0.0, 60.0))
         declare('realtime_priority', False, ParameterDescriptor(
             description='run under SCHED_FIFO where the system allows it', read_only=True))
         declare('wait_for', [''], ParameterDescriptor(
@@ -120,6 +124,11 @@ class SimControl:
     def duration_s(self) -> float:
         """Duration from the command line [s]; 0 if none."""
         return float(self._value('duration'))
+
+    @property
+    def countdown_from_s(self) -> float:
+        """How long after all drivers at pages are ready the run begins [s]."""
+        return float(self._value('countdown'))
 
     @property
     def starts_paused(self) -> bool:

@@ -21,6 +21,7 @@ from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatTenant
+from crgame_ros.game.task_documents import parse_report, REPORT_TOPIC, TaskReport
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.messages.request_head import request_head
@@ -38,6 +39,7 @@ if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to
 MAX_TRIGGERS = 10
 # Ticks of the agents' states that are read at one of the simulation's.
 MAX_AGENTS = 10
+MAX_REPORTS = 10
 
 
 class SimInputs:
@@ -76,6 +78,7 @@ class SimInputs:
             '/traffic/agents', depth=SHARED_DEPTH)
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._triggers = endpoints.polled('/trigger')
+        self._task_reports = endpoints.polled(REPORT_TOPIC) if setup.game.tasks else None
         self._drivability = {}
         if setup.game.drivability.stop:
             self._drivability = {human.id: endpoints.polled('/<v>/drivability', human.id)
@@ -145,6 +148,23 @@ class SimInputs:
             names.append(str(message.data))
         return names
 
+    def pass_task_reports(self, take: Callable[[TaskReport], str | None]) -> None:
+        """
+        Hand over what pages have shown of tasks and drivers answered; a flood waits its turn.
+
+        :param take: gives the reason for which it takes none, else None.
+        """
+        for _ in range(MAX_REPORTS):
+            message = None if self._task_reports is None else self._task_reports.take()
+            if message is None:
+                return
+            try:
+                reason = take(parse_report(message.data))
+            except InputError as error:
+                reason = str(error)
+            if reason is not None:
+                self._node.get_logger().warning(reason, throttle_duration_sec=1.0)
+
     def stop_request(self) -> tuple[str, str] | None:
         """Give (vehicle, n) of a violation that asks for a stop, None if there is none."""
         for vehicle_id, slot in self._drivability.items():
@@ -162,7 +182,8 @@ class SimInputs:
         """Release the subscriptions, for a game with other vehicles."""
         slots = [*self.seats.slots, *self._plans.values(),
                  *self._drivability.values(), *self._perceived.values(), self._frame_skip,
-                 self._triggers, *([] if self._agents is None else [self._agents])]
+                 self._triggers, *([] if self._agents is None else [self._agents]),
+                 *([] if self._task_reports is None else [self._task_reports])]
         for slot in slots:
             self._node.destroy_subscription(slot.subscription)
         for service in self._services:

@@ -22,6 +22,7 @@ import time
 from crgame_ros.game.documents import events_document, objects_document
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.game.task_documents import log_document, LOG_TOPIC, state_document, STATE_TOPIC
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.messages.joints import (
@@ -119,7 +120,8 @@ class SimOutputs:
         self._cycle = endpoints.publisher('/timing/cycle')
         self._latched = {name: endpoints.publisher(name) for name in (
             '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
-            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers')}
+            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', STATE_TOPIC)}
+        self._task_log = endpoints.publisher(LOG_TOPIC)
         self._diagnostics = endpoints.diagnostics
         # Where perception stands between, it makes the plan request of the true one.
         self._request_topics = {
@@ -160,6 +162,7 @@ class SimOutputs:
         texts = {'/scenario/xml': setup.loaded.xml_text,
                  '/scenario/objects': objects_document(setup.descriptions),
                  '/scenario/events': events_document(epoch, ()),
+                 STATE_TOPIC: state_document(epoch, (), ()),
                  '/scenario/game': game_document(
                      setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
                      real_time_factor=factor)}
@@ -175,6 +178,12 @@ class SimOutputs:
         """Publish the events that have taken effect so far."""
         self._latched['/scenario/events'].publish(
             String(data=events_document(self._epoch, fired)))
+
+    def publish_tasks(self, simulation: Simulation, result: StepResult) -> None:
+        """Publish what has happened in the game's tasks, and how they stand."""
+        self._latched[STATE_TOPIC].publish(String(data=state_document(
+            self._epoch, simulation.tasks_running, simulation.prompts)))
+        self._task_log.publish(String(data=log_document(self._epoch, result.tasks)))
 
     def shows_vehicles(self, simulation: Simulation) -> bool:
         """Tell whether anybody is to see where the vehicles have moved to, each by itself."""
@@ -193,8 +202,13 @@ class SimOutputs:
         if result.fired:
             # It may change the planner that the request is for.
             self.publish_events(simulation.fired)
+            for event in result.fired:
+                self._node.get_logger().info(
+                    f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
         for av_id, request in result.requests.items():
             self._publish_request(av_id, request)
+        if result.tasks:
+            self.publish_tasks(simulation, result)
         if result.n % self.publish_every and not result.tick:
             return
         stamp_ns = simulation.scheduler.stamp_ns(result.n)
@@ -316,14 +330,15 @@ class SimOutputs:
         """Wait for the subscribers to acknowledge what was published, with a limit."""
         until_s = time.monotonic() + ACKNOWLEDGE_S
         for publisher in (self._cycle, self._state, self._objects,
-                          self._diagnostics.publisher, self._latched['/scenario/events']):
+                          self._diagnostics.publisher, self._latched['/scenario/events'],
+                          self._task_log):
             left_s = max(0.0, until_s - time.monotonic())
             publisher.wait_for_all_acked(Duration(seconds=left_s))
 
     def destroy(self) -> None:
         """Release the publishers, for a game with other vehicles."""
         publishers = [self._clock, self._state, self._tick_state, self._objects, self._cycle,
-                      *self._latched.values(), *self._requests.values()]
+                      self._task_log, *self._latched.values(), *self._requests.values()]
         publishers += [item for vehicle in self._vehicles for item in vehicle.publishers]
         for publisher in publishers:
             self._node.destroy_publisher(publisher)

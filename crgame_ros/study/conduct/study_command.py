@@ -21,12 +21,15 @@ import sys
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory, scenarios_directory
+from crgame_ros.study.data.study_data_command import add_data_arguments
 
 DESCRIPTION = """\
 Plan an experiment with people: who drives which trials in which order, and what is asked.
 
   crgame study new my_study        # a commented study file, with its pages
   crgame study check my_study/study.yaml
+  crgame study data studies/my_study      # tables of what it has found so far
+  crgame study report studies/my_study    # the same for people, one HTML file
 
 docs/studies.md leads through an example."""
 
@@ -39,11 +42,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     new = what.add_parser('new', help='write a commented study file with its pages')
     new.add_argument('folder', type=Path, help='is made')
     new.set_defaults(command=new_command)
+    run = what.add_parser('run', help='lead a participant through a session')
+    run.add_argument('file', type=Path, help='study file')
+    run.add_argument('--participant', required=True, metavar='ID',
+                     help='anonymous id, such as P07; one who has begun goes on where they were')
+    run.add_argument('--out', type=Path, metavar='DIR',
+                     help="folder of the study's data (default: studies/NAME)")
+    run.add_argument('--place', type=int, metavar='N',
+                     help='place in the orders, from 1 on (default: the next free one)')
+    run.add_argument('--port', type=int, default=8090, metavar='P',
+                     help='port of the pages (default: 8090, or the next free one)')
+    run.set_defaults(command=run_command)
     check = what.add_parser('check', help='find mistakes, and print the plan')
     check.add_argument('file', type=Path, help='study file')
     check.add_argument('--participants', type=int, metavar='N',
                        help='print the orders of so many (default: 4)', default=4)
     check.set_defaults(command=check_command)
+    add_data_arguments(what)
 
 
 def new_command(values: argparse.Namespace) -> int:
@@ -95,4 +110,34 @@ def check_command(values: argparse.Namespace) -> int:
     length = length_of(study)
     print(f'a session takes about {(length.driving_s + length.else_s) / 60.0:.0f} min, '
           f'{length.driving_s / 60.0:.0f} of them driving')
+    return 0
+
+
+def run_command(values: argparse.Namespace) -> int:
+    """
+    Lead a participant through a session, or through what is left of it.
+
+    :raises CrgameError: if the study cannot be run, or the participant takes part already.
+    """
+    from crgame_ros.ros.environment import prepare_environment, require_ros
+    from crgame_ros.study.study_file import load_study
+    from crgame_ros.study.study_folder import check_participant, StudyFolder
+    require_ros()
+    prepare_environment()
+    from crgame_ros.launcher.interruption import say
+    from crgame_ros.study.conduct.study_session import conduct, SessionRequest
+    study = load_study(values.file)
+    participant = check_participant(values.participant)
+    if not 1 <= values.port <= 65_000:
+        raise InputError(f'is {values.port}', '--port', 'give 1 to 65000')
+    if values.place is not None and not 1 <= values.place <= 10_000:
+        raise InputError(f'is {values.place}', '--place', 'give 1 to 10000')
+    folder = StudyFolder(values.out or Path('studies') / study.name)
+    folder.keep_study(study, values.file)
+    place = folder.place_of(participant) if values.place is None else values.place - 1
+    say(f'{participant}, place {place + 1} of {study.name}; data go to {folder.root}')
+    over = conduct(SessionRequest(study, folder.participant(participant).resolve(), participant,
+                                  place, values.port), say)
+    say(f'{participant} is done' if over
+        else f'{participant} goes on with the same command')
     return 0

@@ -195,6 +195,25 @@ def test_what_people_in_the_seats_heard_is_told(run: ReportRun) -> None:
             assert ''.join(texts[place + 1:place + 5]).split() == ''.join(row).split()
 
 
+def test_what_people_in_the_seats_saw_is_told(run: ReportRun) -> None:
+    assert run.timing is not None
+    period = {'from_s': 0.0, 'to_s': 4.0, 'shown': 'map', 'inset': False, 'plans': True,
+              'across_deg': None, 'screen_width_m': None, 'eye_distance_m': None,
+              'rate_hz': None, 'renderer': '', 'software': False}
+    driver = period | {
+        'from_s': 4.0, 'to_s': 9.5, 'shown': 'driver', 'inset': True, 'plans': False,
+        'across_deg': 75.2, 'screen_width_m': 0.6, 'eye_distance_m': 0.7, 'rate_hz': 29.7,
+        'renderer': '<b>SwiftShader', 'software': True}
+    words = ['hv0 map from 0.0 to 4.0 s, with the plans of AVs; hv0 driver from 4.0 to 9.5 s, '
+             '75° across, true to scale on a screen of 0.60 m, 0.70 m from the eyes, with the '
+             'small map, 30 pictures/s, drawn by the processor (<b>SwiftShader)']
+    page = Page(report_html([replace(run, timing={
+        **run.timing, 'view': {'hv0': [period, driver]}})]))
+    texts = [text for _, text in page.texts]
+    place = texts.index('view')
+    assert ''.join(texts[place + 1:place + 7]).split() == ''.join(words).split()
+
+
 def test_what_a_recording_does_not_tell_is_left_out(run: ReportRun) -> None:
     """Without cycles there are neither inputs nor timing, and the page says so."""
     bare = replace(run, timing=None, record=replace(

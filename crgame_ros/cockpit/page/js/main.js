@@ -3,6 +3,7 @@
 /** Entry of the page: one store, one connection, the world, and the parts around it. */
 
 import { Connection } from './connection.js';
+import { readStage } from './stage/stage_address.js';
 import { Store } from './store.js';
 import { createWorld } from './world/world.js';
 
@@ -12,6 +13,7 @@ const PARTS = [
   ['./panels/notices.js', 'createNotices', '#notices', 'notices'],
   ['./person.js', 'createPerson', 'body', 'person'],
   ['./driving/driving.js', 'createDriving', '#hud', 'driving'],
+  ['./tasks/tasks.js', 'createTasks', '#stage', 'tasks'],
   ['./lobby.js', 'createLobby', '#stage', 'lobby'],
   ['./people.js', 'createPeople', '#panel-drive', 'people'],
   ['./run_control.js', 'createRunControl', '#bar', 'runControl'],
@@ -22,6 +24,7 @@ const PARTS = [
   ['./panels/tabs.js', 'createTabs', '#panels', 'panels'],
   ['./panels/scenario.js', 'createScenario', '#panel-scenario', 'scenario'],
   ['./panels/events.js', 'createEvents', '#panel-events', 'events'],
+  ['./tasks/task_panel.js', 'createTaskPanel', '#panel-events', 'taskPanel'],
   ['./panels/planners.js', 'createPlanners', '#planners', 'planners'],
   ['./panels/timing.js', 'createTiming', '#timekeeping', 'timing'],
   ['./after/instant_replay.js', 'createInstantReplay', '#last-seconds', 'lastSeconds'],
@@ -32,19 +35,26 @@ const PARTS = [
   ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
   ['./view3d/view3d.js', 'createView3d', '#stage', 'view3d'],
+  ['./view_report.js', 'createViewReport', '#stage', 'viewReport'],
   ['./world/around.js', 'createAround', '#around', 'around'],
   ['./panels/save_panel.js', 'createSaving', '#panels', 'saving'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
+// Of somebody who only drives.
+const STAGE = ['person', 'driving', 'lobby', 'sound', 'view3d', 'viewReport'];
 
+const bare = readStage(window.location.search) !== null;
+document.documentElement.classList.toggle('bare', bare);
+const parts = bare ? [['./stage/stage.js', 'createStage', '#stage', 'stage'],
+  ...PARTS.filter(([, , , name]) => STAGE.includes(name))] : PARTS;
 const store = new Store();
 const connection = new Connection(store);
 const world = createWorld(
   /** @type {HTMLCanvasElement} */ (document.querySelector('#world')), store,
-  { connection, covered: document.querySelector('#hud') });
+  { connection, covered: document.querySelector('#hud'), keys: !bare, toolbar: !bare });
 window.crgame = { store, connection, world };
 
-for (const [path, create, root, name] of PARTS) {
+for (const [path, create, root, name] of parts) {
   try {
     const module = await import(path);
     window.crgame[name] = module[create](document.querySelector(root), store, connection);
@@ -54,5 +64,6 @@ for (const [path, create, root, name] of PARTS) {
     store.receive({ type: 'notice', level: 'error', text });
   }
 }
+await window.crgame.stage?.begin();
 // Every part had its turn.
 window.crgame.ready = true;

@@ -15,6 +15,8 @@
 export {};
 
 /** @import { PeopleMessage, Rights, YouMessage } from './people_messages.js' */
+/** @import { GameTask, TaskReportMessage, TasksMessage } from './tasks/task_messages.js' */
+/** @import { Viewpoint } from './view3d/cameras.js' */
 
 /**
  * @typedef {object} Shape
@@ -153,6 +155,9 @@ export {};
  * @property {Record<string, string>} planners
  * @property {boolean} occupancy whether there is a map of permanent obstacles
  * @property {GameEvent[]} events
+ * @property {GameTask[]} [tasks]
+ * @property {string} [language] of what drivers read
+ * @property {'through'|'stop'} contact what a contact does to a vehicle that a person drives
  * @property {'on'|'none'} sound whether pages may sound and gamepads rumble
  * @property {number} [again] counts how often a recording was played
  */
@@ -301,7 +306,7 @@ export {};
  * What the server sends and the store takes in.
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
- *   version: string, rights: Rights}} HelloMessage
+ *   version: string, rights: Rights, framed_by?: string}} HelloMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
  * @typedef {{type: 'signals', k: number, states: Record<string, string>}} SignalsMessage
@@ -311,7 +316,7 @@ export {};
  * @typedef {{type: 'files'} & Files} FilesMessage
  * @typedef {{type: 'notice', level: NoticeLevel, text: string}} NoticeMessage
  * @typedef {HelloMessage|SceneMessage|SeatsMessage|SignalsMessage|EventsMessage|AlarmsMessage
- *   |StatusMessage|FilesMessage|NoticeMessage|YouMessage|PeopleMessage} StoreMessage
+ *   |StatusMessage|FilesMessage|NoticeMessage|YouMessage|PeopleMessage|TasksMessage} StoreMessage
  */
 
 /**
@@ -326,15 +331,20 @@ export {};
 /**
  * What the page sends.
  *
- * @typedef {{away: true}|{keys: number[], reverse: number, lights: number[]}
- *   |{axes: number[], reverse: number, lights: number[]}} Hands  `lights`: which of LIGHT_BUTTONS
- *   are held
+ * @typedef {{away: true}|({keys: number[]}|{axes: number[]}) & {reverse: number, lights: number[],
+ *   put_back: number}} Hands  `lights`: which of LIGHT_BUTTONS are held; `put_back`: whether the
+ *   vehicle is to be put back on its lane
  * @typedef {'start'|'pause'|'step'|'reset'|'stop'} RunAction
  * @typedef {{type: 'input', seat: string} & Hands} InputMessage
  * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
  *   scans?: boolean}} LayersMessage
  * @typedef {{type: 'sound', on: number, volume: number, rumble: number}} SoundMessage
- * @typedef {InputMessage|LayersMessage|SoundMessage|{type: 'name', name: string}
+ * @typedef {{type: 'view', shown: Viewpoint|'map', inset: number, plans: number,
+ *   mirrors: number, bare: number, across_deg: number|null, screen_width_m: number|null,
+ *   eye_distance_m: number|null, width_px: number, height_px: number, ratio: number,
+ *   rate_hz: number|null, renderer: string, software: number}} ViewMessage
+ * @typedef {InputMessage|LayersMessage|SoundMessage|ViewMessage|TaskReportMessage
+ *   |{type: 'name', name: string}
  *   |{type: 'person', key: string, fresh: boolean}|{type: 'device', device: string}
  *   |{type: 'ping', t: number, round_trip_ms?: number}} TellingMessage
  * @typedef {{type: 'release'|'ask', seat: string}|{type: 'claim', seat: string, device: string}

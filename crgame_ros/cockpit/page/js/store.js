@@ -16,8 +16,9 @@ import { SampleRing } from './samples.js';
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
 /** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
-/** @import { PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
+/** @import { DeviceDelay, PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
+/** @import { TasksMessage } from './tasks/task_messages.js' */
 
 // What the last 10 s can be shown from once more: at 100 Hz, and scenario steps at up to 25 Hz.
 const RAW_SAMPLES = 1020;
@@ -44,6 +45,7 @@ const LATE_S = 0.1;
  * @property {SeatsMessage} seats
  * @property {SignalsMessage} signals
  * @property {EventsMessage} events
+ * @property {TasksMessage} tasks
  * @property {StatusMessage} status
  * @property {AlarmsMessage} alarms
  * @property {FilesMessage} files
@@ -71,6 +73,8 @@ export class Store {
   signals = { k: 0, states: {} };
   /** @type {FiredEvent[]} */
   fired = [];
+  /** @type {Omit<TasksMessage, 'type'>} */
+  tasks = { running: [], open: [] };
   /** @type {Status|null} */
   status = null;
   /** @type {Alarm[]} */
@@ -78,12 +82,16 @@ export class Store {
   me = { id: '', name: '' };
   /** @type {Present[]} */
   people = [];
+  /** @type {DeviceDelay[]} */
+  devices = [];
   /** @type {Rights} */
   rights = { role: '', directs: false, drives: false, seat: '', may_direct: false,
     may_drive: false };
   /** @type {HelloMessage['mode']|null} */
   mode = null;
   version = '';
+  /** Origin of the one page that may show this one within it; empty for none. */
+  framedBy = '';
   connected = false;
   round_trip_ms = NaN;
 
@@ -155,6 +163,7 @@ export class Store {
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
         this.version = message.version;
+        this.framedBy = message.framed_by ?? '';
         this.rights = message.rights ?? this.rights;
         this.#fresh = true;
         break;
@@ -171,10 +180,11 @@ export class Store {
         break;
       }
       case 'you': this.rights = message.rights; break;
-      case 'people': this.people = message.people; break;
+      case 'people': this.people = message.people; this.devices = message.devices; break;
       case 'seats': this.seats = message.seats; break;
       case 'signals': this.signals = message; break;
       case 'events': this.fired = message.fired; break;
+      case 'tasks': this.tasks = message; break;
       case 'alarms': this.alarms = message.active; break;
       case 'status':
         this.status = message;

@@ -162,7 +162,8 @@ export class CalibrationRun {
    * @param {number} index
    */
   #free(index) {
-    const { reverse, lights } = this.profile;
+    const { reverse, lights, put_back } = this.profile;
+    this.profile.put_back = put_back.filter((button) => button !== index);
     for (const group of [reverse, lights]) {
       for (const [name, buttons] of Object.entries(group)) {
         Object.assign(group, { [name]: buttons.filter((button) => button !== index) });

@@ -18,6 +18,9 @@ import { InputSender } from './sender.js';
 /** @import { Hands, Reply } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
+// So long the button asks; a moving vehicle may leave a place free meanwhile [ms].
+const PUT_BACK_MS = 500;
+
 /** What a page does with its hands; in `window.crgame.driving`. */
 export class Driving {
   #store;
@@ -84,6 +87,7 @@ export class Driving {
     const rest = {
       reverse: Number(this.#reverse),
       lights: this.keyboard.lights.map((held, i) => held | this.gamepads.lights[i]),
+      put_back: Number(this.keyboard.putBack || this.gamepads.putBack),
     };
     const axes = this.keyboard.anyHeld ? null : this.gamepads.axes;
     return axes === null ? { keys: this.keyboard.keys, ...rest } : { axes, ...rest };
@@ -104,7 +108,7 @@ export class Driving {
     if (this.seat !== null && this.seat !== seat) {
       await this.release();
     }
-    return this.#connection.request({ type: 'claim', seat, device: this.#device });
+    return this.#connection.request({ type: 'claim', seat, device: this.device });
   }
 
   /**
@@ -120,17 +124,23 @@ export class Driving {
     return reply;
   }
 
+  /** Ask that the vehicle is put back on its lane, as its key does. */
+  putBack() {
+    this.keyboard.press('Backspace');
+    setTimeout(() => this.keyboard.lift('Backspace'), PUT_BACK_MS);
+  }
+
   /** What the hands are on, as the recording names it. */
-  get #device() {
+  get device() {
     const active = this.gamepads?.active;
     return active ? shortName(active.id).slice(0, 60) : 'Keyboard';
   }
 
   /** @param {boolean} [anew] also if the server has heard it before */
   #tellDevice(anew = false) {
-    if (anew || this.#device !== this.#toldDevice) {
-      this.#toldDevice = this.#device;
-      this.#connection.send({ type: 'device', device: this.#device });
+    if (anew || this.device !== this.#toldDevice) {
+      this.#toldDevice = this.device;
+      this.#connection.send({ type: 'device', device: this.device });
     }
   }
 

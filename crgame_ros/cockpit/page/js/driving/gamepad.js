@@ -108,6 +108,11 @@ export class Gamepads {
       this.#active?.profile.lights[name].some((i) => this.#pressed[i]) ?? false));
   }
 
+  /** @returns {boolean} whether the vehicle is to be put back on its lane */
+  get putBack() {
+    return this.#active?.profile.put_back.some((i) => this.#pressed[i]) ?? false;
+  }
+
   /** @returns {boolean} whether the lever of the active device stands in reverse */
   get gateHeld() {
     return this.#active?.profile.reverse.held.some((i) => this.#pressed[i]) ?? false;
@@ -215,7 +220,7 @@ export class Gamepads {
 
   /** @param {Device} device */
   #reportChange({ axes }) {
-    const text = [...axes, ...this.lights].join();
+    const text = [...axes, ...this.lights, this.putBack].join();
     if (text !== this.#last) {
       this.#last = text;
       this.#report.changed();

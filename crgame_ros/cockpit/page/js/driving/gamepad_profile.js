@@ -11,7 +11,7 @@ import { LIGHT_BUTTONS } from '../lights.js';
  * @typedef {{on: number[], off: number[], toggle: number[], held: number[]}} GearButtons
  * @typedef {Record<typeof LIGHT_BUTTONS[number], number[]>} LightButtons
  * @typedef {{steering: Control, throttle: Control, brake: Control, reverse: GearButtons,
- *   lights: LightButtons}} Profile
+ *   lights: LightButtons, put_back: number[]}} Profile
  * @typedef {{axes: number[], buttons: number[]}} Sample  raw values at one time.
  */
 
@@ -43,6 +43,8 @@ export function defaultProfile(pad) {
       lights: {
         left_indicator: [8, 14], right_indicator: [9, 15], hazard: [1], horn: [0],
       },
+      // Y (triangle).
+      put_back: [3],
     };
   }
   const [throttle, brake] = pedalAxes(pad);
@@ -50,6 +52,8 @@ export function defaultProfile(pad) {
     steering: steeringOf(0, 0), throttle: pedalOf(throttle), brake: pedalOf(brake),
     reverse: { on: [5], off: [4], toggle: [], held: isLogitechWithGate(pad) ? [18] : [] },
     lights: lightsOfWheel(pad),
+    // B of the wheels for the Xbox, circle of the others.
+    put_back: [isLogitechForXbox(pad) ? 1 : 2],
   };
 }
 
@@ -126,10 +130,11 @@ export function loadProfile(pad) {
     try {
       const profile = JSON.parse(text);
       if (isProfile(profile)) {
-        // What was kept before there were indicators has none.
-        const { lights } = defaultProfile(pad);
-        return { profile: isLights(profile.lights) ? profile : { ...profile, lights },
-          calibrated: true };
+        // What was kept before there were indicators, or a button to be put back, has none.
+        const { lights, put_back } = defaultProfile(pad);
+        return { profile: { ...profile, lights: isLights(profile.lights) ? profile.lights : lights,
+          put_back: Array.isArray(profile.put_back) ? profile.put_back : put_back },
+        calibrated: true };
       }
     } catch (error) {
       console.warn(`the calibration of ${pad.id} cannot be read and is not used: ${error}`);

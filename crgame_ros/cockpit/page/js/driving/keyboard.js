@@ -7,7 +7,8 @@ import { LIGHT_BUTTONS } from '../lights.js';
 import { isTyping } from './focus.js';
 
 /**
- * @typedef {'throttle'|'brake'|'left'|'right'|'reverse'|typeof LIGHT_BUTTONS[number]} KeyAction
+ * @typedef {'throttle'|'brake'|'left'|'right'|'reverse'|'put_back'
+ *   |typeof LIGHT_BUTTONS[number]} KeyAction
  */
 
 /** What each key does, by its place on the keyboard, so that every layout drives alike. */
@@ -16,7 +17,7 @@ export const ACTIONS = Object.freeze(/** @type {Record<string, KeyAction|undefin
   KeyS: 'brake', ArrowDown: 'brake', Space: 'brake',
   KeyA: 'left', ArrowLeft: 'left',
   KeyD: 'right', ArrowRight: 'right',
-  KeyR: 'reverse',
+  KeyR: 'reverse', Backspace: 'put_back',
   Comma: 'left_indicator', Period: 'right_indicator', KeyJ: 'hazard', KeyG: 'horn',
 }));
 
@@ -58,6 +59,11 @@ export class Keyboard {
   /** @returns {number[]} left and right indicator, hazard, horn: 1 while a key of it is held */
   get lights() {
     return this.#active(LIGHT_BUTTONS);
+  }
+
+  /** @returns {boolean} whether the vehicle is to be put back on its lane */
+  get putBack() {
+    return this.#active(['put_back'])[0] === 1;
   }
 
   /** @returns {boolean} whether any key that steers or moves a pedal is held */

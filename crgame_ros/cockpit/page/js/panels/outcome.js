@@ -5,8 +5,9 @@
 import { fetchScore } from '../after/run_api.js';
 import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
-import { clockTime, errorText, oneLine } from './format.js';
+import { errorText, oneLine } from './format.js';
 import { icon } from './icons.js';
+import { mishapsOf } from './mishaps.js';
 import { figures, fileList, part, table, why } from './outcome_card.js';
 import { TABLE_I, valueOf } from './timing.js';
 
@@ -30,7 +31,7 @@ const FINAL_NAMES = { final_error_ms: 'Lag at the end' };
  * @typedef {{phase: 'driver', seat: string, run: RunState, holder: string|null,
  *   holderName: string, me: string}} Awaiting
  * @typedef {{phase: 'ready'|'none', run: RunState, mine: string|null}} Ready
- * @typedef {{phase: 'mishap', run: RunState, text: string}} Mishap
+ * @typedef {{phase: 'mishap', run: RunState, text: string, stopped: boolean}} Mishap
  * @typedef {{phase: 'none', run?: undefined}|{phase: 'closed'}|Over|Awaiting|Ready|Mishap} Facts
  */
 
@@ -68,6 +69,14 @@ class Outcome {
     }
     store.on('epoch', () => {
       this.#told = 0;
+    });
+    store.on('events', ({ fired }) => {
+      // Back on the lane: the notice of the contact has served.
+      const last = fired.at(-1);
+      if (last?.by === 'driver' && last.name.endsWith(` ${window.crgame.driving?.seat}`)) {
+        this.#dismiss();
+      }
+      this.#show();
     });
     this.#show();
   }
@@ -123,9 +132,11 @@ class Outcome {
       return { phase: 'over', connected, ...this.#result(status, scene) };
     }
     const mine = Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null;
-    const mishaps = mine === null || !connected ? [] : mishapsOf(status, mine);
+    const mishaps = mine === null || !connected ? [] : mishapsOf(this.#store, mine);
     if (mishaps.length > this.#told) {
-      return { phase: 'mishap', run: status.run, text: mishaps[mishaps.length - 1].text };
+      const { text, touched } = mishaps[mishaps.length - 1];
+      return { phase: 'mishap', run: status.run, text,
+        stopped: touched && scene.contact === 'stop' };
     }
     if (!connected || status.n !== 0 || !['waiting', 'paused'].includes(status.run)) {
       return { phase: 'none' };
@@ -192,12 +203,15 @@ class Outcome {
    * @param {Mishap} facts
    * @returns {Node[]}
    */
-  #mishap({ run, text }) {
+  #mishap({ run, text, stopped }) {
     clearTimeout(this.#mishapTimer);
     if (run === 'running') {
       this.#mishapTimer = setTimeout(() => this.#dismiss(), MISHAP_MS);
     }
     return [icon('warn'), element('span', { role: 'status', text }),
+      ...(stopped && run === 'running' ? [this.#button('put_back', 'Put back on the lane',
+        () => window.crgame.driving?.putBack(), 'At rest, where its lane is free (Backspace)',
+        'drive-button primary')] : []),
       this.#button('look', run === 'running' ? 'Pause and look again' : 'Look again',
         () => this.#lookAgain(run), 'The last 10 s once more', 'drive-button'),
       this.#button('again', 'Begin anew', () => this.#order('reset'),
@@ -208,7 +222,7 @@ class Outcome {
   #dismiss() {
     const { status } = this.#store;
     const mine = window.crgame.driving?.seat;
-    this.#told = status === null || !mine ? 0 : mishapsOf(status, mine).length;
+    this.#told = status === null || !mine ? 0 : mishapsOf(this.#store, mine).length;
     this.#show();
   }
 
@@ -331,22 +345,6 @@ class Outcome {
       this.#store.receive({ type: 'notice', level: 'warn', text });
     }
   }
-}
-
-/**
- * What a vehicle has hit and where it left the road, in the order of time.
- *
- * @param {Status} status
- * @param {string} mine
- */
-function mishapsOf({ contacts = [], departures = [] }, mine) {
-  return [
-    ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map((item) => ({
-      t: item.t, text: `You touched ${item.vehicle === mine ? item.with : item.vehicle} at `
-        + `${clockTime(item.t)}.` })),
-    ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
-      t, text: `You left the road at ${clockTime(t)}.` })),
-  ].sort((a, b) => a.t - b.t);
 }
 
 /** @param {Awaiting} facts */

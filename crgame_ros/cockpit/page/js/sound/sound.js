@@ -50,6 +50,8 @@ export class Sound {
   #subject = '';
   #t = NaN;
   #told = '';
+  // Whether M turns it on and off.
+  #keys = true;
 
   /**
    * @param {HTMLElement} root
@@ -60,7 +62,7 @@ export class Sound {
     this.#store = store;
     this.#connection = connection;
     this.#control = createSoundControl(root, this);
-    window.addEventListener('pointerdown', () => this.#gesture(), true);
+    window.addEventListener('pointerdown', () => this.begin(), true);
     window.addEventListener('keydown', (event) => this.#key(event), true);
     document.addEventListener('visibilitychange', () => this.#look(performance.now()));
     store.on('scene', () => this.#tell());
@@ -110,6 +112,24 @@ export class Sound {
     this.#tell();
   }
 
+  /** Begin, where that is wanted: in a gesture, or where the browser allows it without. */
+  begin() {
+    if (this.wanted && this.allowed && !this.#speaker.begun) {
+      this.#speaker.begin();
+    }
+  }
+
+  /**
+   * Choose for this page alone: the browser does not remember it, and M changes nothing.
+   *
+   * @param {boolean} on begins with the next key, click or button of a gamepad
+   */
+  want(on) {
+    this.wanted = on;
+    this.#keys = false;
+    this.#tell();
+  }
+
   /**
    * @param {Amount} amount
    * @param {number} share 0 to 1
@@ -120,21 +140,15 @@ export class Sound {
     this.#tell();
   }
 
-  #gesture() {
-    if (this.wanted && this.allowed && !this.#speaker.begun) {
-      this.#speaker.begin();
-    }
-  }
-
   /** @param {KeyboardEvent} event */
   #key(event) {
     const free = !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey
       && !isTyping(event.target) && !document.querySelector('dialog[open]');
-    if (event.code === KEY && free && this.allowed) {
+    if (event.code === KEY && free && this.#keys && this.allowed) {
       event.preventDefault();
       this.toggle();
     } else {
-      this.#gesture();
+      this.begin();
     }
   }
 
@@ -144,6 +158,10 @@ export class Sound {
    * @param {number} now_ms
    */
   #look(now_ms) {
+    if (!this.on && this.#pads().some(({ buttons }) => buttons.some(({ pressed }) => pressed))) {
+      // Browsers take a gamepad's button for a gesture, and tell nobody.
+      this.begin();
+    }
     const heard = (this.on || this.#drives) && this.#runs ? this.#hear(now_ms) : null;
     this.heard = this.on ? heard : null;
     if (heard === null) {

@@ -29,6 +29,8 @@ export class View3d {
   settings;
   /** What this window shows alone; null in a page with map and panels. */
   window = readViewWindow(window.location.search);
+  /** Whether V and C change the view. */
+  keys = true;
   #viewpoint = this.window?.viewpoint ?? VIEWPOINTS[0];
   #stage;
   #store;
@@ -162,7 +164,7 @@ export class View3d {
 
   /** @param {KeyboardEvent} event */
   #pressed(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat
+    if (!this.keys || event.ctrlKey || event.metaKey || event.altKey || event.repeat
         || isTyping(event.target)) {
       return;
     }

@@ -71,6 +71,21 @@ export class ViewSettings {
     this.#changed();
   }
 
+  /**
+   * Choose for this page alone: the browser does not remember it.
+   *
+   * @param {Record<Switch, boolean>} switches
+   * @param {number|null} fieldOfView_deg null leaves it as it is [deg]
+   */
+  fix(switches, fieldOfView_deg) {
+    this.switches = { ...switches };
+    if (fieldOfView_deg !== null) {
+      this.fieldOfView_deg = fieldOfView_deg;
+      this.seat = null;
+    }
+    this.#changed();
+  }
+
   /** @param {typeof SWITCHES[number]} item */
   #switch({ name, text, on }) {
     const input = element('input', { type: 'checkbox', name,

@@ -28,7 +28,7 @@ const DEGREE = Math.PI / 180;
 export function readViewWindow(query) {
   const values = new URLSearchParams(query);
   const viewpoint = VIEWPOINTS.find((name) => name === values.get('view'));
-  if (viewpoint === undefined) {
+  if (viewpoint === undefined || values.has('stage')) {
     return null;
   }
   const yaw = Number(values.get('yaw') ?? 0);

@@ -1,0 +1,135 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The tasks of a run as rows: what came, what was answered, what lasted how long."""
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+from crgame_ros.analysis.behaviour.driver_controls import DriverControls
+from crgame_ros.analysis.behaviour.reactions import reaction_to
+from crgame_ros.analysis.behaviour.take_overs import hands_on_after
+from crgame_ros.game.task_documents import NOT_MEASURED, PageTimes, TaskEntry
+from crgame_ros.game.task_spec import DetectionResponse, TaskKind
+from crgame_ros.recording.run_record import RunRecord
+
+# What makes a row: it begins something that another entry of the same number ends.
+_BEGINS = ('begin', 'stimulus', 'request', 'unrequested')
+
+
+class TaskEvent(NamedTuple):
+    """
+    One event of a task. Times are of the run's clock, NaN where there is none.
+
+    :param kind: of task: detection_response, take_over or secondary_task.
+    :param name: of the task.
+    :param onset_s: since the run's start [s]
+    :param duration_s: how long the light was on, until a request was obeyed or gone, or until a
+        task ended [s]
+    :param response_time_s: of a stimulus by the page's clock, from the picture that showed it; of
+        a request until the first input with hands or pedals [s]
+    :param outcome: of a stimulus hit, premature, missed, unseen (no page showed it) or open (run
+        or task ended before it was over); unrequested of an answer to none; of a request taken or
+        none; of what lasts begun.
+    :param value: number of the stimulus or request, from 1; 0 of anything else.
+    :param seat: the vehicle whose driver it was for.
+    :param what: stimulus, unrequested, request or span (from beginning to end of a task).
+    :param times: as the page has measured them.
+    """
+
+    kind: TaskKind
+    name: str
+    onset_s: float
+    duration_s: float
+    response_time_s: float
+    outcome: str
+    value: int
+    seat: str = ''
+    what: str = ''
+    times: PageTimes = NOT_MEASURED
+
+
+def task_events(run: RunRecord) -> list[TaskEvent]:
+    """Give the events of a run's tasks, in the order of their onsets."""
+    dt_s = run.log.game.scheduler.dt_s
+    rows = [_row(run, entry, run.tasks[number + 1:], dt_s)
+            for number, entry in enumerate(run.tasks) if entry.what in _BEGINS]
+    return sorted(rows, key=lambda row: row.onset_s)
+
+
+def _row(run: RunRecord, entry: TaskEntry, later: Sequence[TaskEntry], dt_s: float) -> TaskEvent:
+    onset_s = entry.n * dt_s
+    of_it = [each for each in later if each.task == entry.task and each.number == entry.number]
+    last_s = float(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.time_step_s \
+        if len(run.log.ks) else onset_s
+    if entry.what == 'unrequested':
+        return TaskEvent(entry.kind, entry.task, onset_s, 0.0, math.nan, 'unrequested', 0,
+                         entry.seat, 'unrequested', entry.times)
+    if entry.what == 'begin':
+        end = next((each for each in of_it if each.what == 'end'), None)
+        end_s = last_s if end is None else end.n * dt_s
+        return TaskEvent(entry.kind, entry.task, onset_s, end_s - onset_s, math.nan, 'begun', 0,
+                         entry.seat, 'span')
+    shown = next((each.times for each in of_it if each.what == 'shown'), NOT_MEASURED)
+    closed = next((each for each in of_it if each.what in ('answer', 'missed', 'over')), None)
+    duration_s = (last_s if closed is None else closed.n * dt_s) - onset_s
+    if entry.what == 'request':
+        reaction_s = first_input(run, entry.seat, onset_s)
+        return TaskEvent(entry.kind, entry.task, onset_s, duration_s, reaction_s,
+                         'none' if math.isnan(reaction_s) else 'taken', entry.number, entry.seat,
+                         'request', shown)
+    if closed is None or closed.what == 'over':
+        return TaskEvent(entry.kind, entry.task, onset_s, duration_s, math.nan, 'open',
+                         entry.number, entry.seat, 'stimulus', shown)
+    times = closed.times if closed.what == 'answer' else shown
+    response_s = math.nan if times.response_ms is None else times.response_ms / 1e3
+    lit_s = next((spec.task.shown for spec in run.log.game.tasks if spec.name == entry.task
+                  and isinstance(spec.task, DetectionResponse)), duration_s)
+    return TaskEvent(entry.kind, entry.task, onset_s, min(lit_s, duration_s, _or_inf(response_s)),
+                     response_s,
+                     closed.by or 'missed', entry.number, entry.seat, 'stimulus', times)
+
+
+def _or_inf(seconds: float) -> float:
+    return math.inf if math.isnan(seconds) else seconds
+
+
+def controls_of(run: RunRecord, vehicle_id: str) -> DriverControls | None:
+    """Give the commands that a driven vehicle obeyed; None of one that is not in the run."""
+    ids = [item.id for item in run.log.vehicles]
+    if vehicle_id not in ids:
+        return None
+    number = ids.index(vehicle_id)
+    vehicle = run.log.game.vehicles[number].vehicle
+    return DriverControls.of(run.times_s, run.commands[:, number],
+                             vehicle.max_steering_wheel_angle, run.log.game.scheduler.dt_s)
+
+
+def first_input(run: RunRecord, vehicle_id: str, request_s: float) -> float:
+    """
+    Give the time from a request to the first input with hands or pedals.
+
+    Of an AV the first that makes hands on (as of a take-over), of a vehicle that somebody drives
+    already the first response to an event (throttle released, brake pressed, wheel turned).
+
+    :return: NaN without one [s]
+    """
+    controls = controls_of(run, vehicle_id)
+    if controls is None:
+        return math.nan
+    if run.log.game.human(vehicle_id) is None:
+        return hands_on_after(controls, request_s)
+    times_s = [each for each in reaction_to(request_s, controls) if not math.isnan(each)]
+    return min(times_s, default=math.nan)

@@ -1,0 +1,52 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The way between a stage and the page that it lies in: one origin, which the server names. */
+
+/** @import { StageOrder, StageState } from './stage_messages.js' */
+/** @import { Store } from '../store.js' */
+
+/** Tells the page around this one, and hears it. */
+export class FrameLink {
+  #store;
+  #told = '';
+
+  /**
+   * @param {Store} store whose `framedBy` is the origin
+   * @param {(order: StageOrder) => void} ordered called for each order of that page
+   */
+  constructor(store, ordered) {
+    this.#store = store;
+    window.addEventListener('message', ({ source, origin, data }) => {
+      if (source === window.parent && window.parent !== window && origin !== ''
+          && origin === store.framedBy && isOrder(data)) {
+        ordered(data);
+      }
+    });
+  }
+
+  /**
+   * Tell how it is, unless that was told already.
+   *
+   * @param {StageState} state
+   */
+  tell(state) {
+    const { framedBy } = this.#store;
+    const text = JSON.stringify(state);
+    if (window.parent !== window && framedBy !== '' && text !== this.#told) {
+      this.#told = text;
+      window.parent.postMessage({ crgame: 1, kind: 'stage', state }, framedBy);
+    }
+  }
+}
+
+/**
+ * @param {unknown} data
+ * @returns {data is StageOrder}
+ */
+function isOrder(data) {
+  if (typeof data !== 'object' || data === null) {
+    return false;
+  }
+  const { crgame, kind, ready } = /** @type {Record<string, unknown>} */ (data);
+  return crgame === 1 && (kind === 'focus' || (kind === 'ready' && typeof ready === 'boolean'));
+}

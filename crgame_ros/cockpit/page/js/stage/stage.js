@@ -1,0 +1,243 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The bare page of somebody who only drives: it takes its seat and tells the page around it. */
+
+import { element, setAttribute, setText } from '../dom.js';
+import { FrameLink } from './frame_link.js';
+import { readStage } from './stage_address.js';
+import { WORDS } from './stage_words.js';
+
+/** @import { Connection } from '../connection.js' */
+/** @import { Store } from '../store.js' */
+/** @import { StageAddress } from './stage_address.js' */
+/** @import { StageOrder, StageState, StageView } from './stage_messages.js' */
+/** @import { StageTrouble } from './stage_words.js' */
+
+// The page around is told at most so often [ms].
+const EVERY_MS = 100;
+// A seat that was refused is asked for again after so long [ms].
+const CLAIM_EVERY_MS = 1000;
+
+/** A stage; in `window.crgame.stage`. */
+export class Stage {
+  address;
+  #store;
+  #connection;
+  #link;
+  #words;
+  #line = element('div', { class: 'stage-line', role: 'alert', hidden: true });
+  #role = '';
+  #claimed_ms = -Infinity;
+  #refusal = '';
+  #failed = '';
+  #missing3d = false;
+  // Whether the driver has said to be ready, of which epoch.
+  #ready = { wanted: false, epoch: -1, sent: false };
+
+  /**
+   * @param {HTMLElement} root gets the line
+   * @param {Store} store
+   * @param {Connection} connection
+   * @param {StageAddress} address
+   */
+  constructor(root, store, connection, address) {
+    this.address = address;
+    this.#store = store;
+    this.#connection = connection;
+    this.#words = WORDS[address.lang];
+    this.#link = new FrameLink(store, (order) => this.#obey(order));
+    document.documentElement.lang = address.lang;
+    root.append(this.#line);
+    document.addEventListener('contextmenu', (event) => event.preventDefault());
+    store.on('notice', ({ level, text }) => {
+      this.#failed = level === 'error' ? text : this.#failed;
+    });
+    store.on('hello', () => this.#takeRole());
+    store.on('seats', () => this.#look());
+    store.on('connection', () => this.#look());
+    this.#takeRole();
+    setInterval(() => this.#look(), EVERY_MS);
+  }
+
+  /** Show what the address asks for, once all parts are there. */
+  async begin() {
+    const { names, plans, map, mirrors, view, change, fieldOfView_deg, sound } = this.address;
+    const { world, view3d } = window.crgame;
+    for (const [layer, on] of Object.entries({ labels: names, plans, goals: plans })) {
+      world.setLayer(layer, on);
+    }
+    this.#writeLabels();
+    window.crgame.sound?.want(sound);
+    if (view3d !== undefined) {
+      view3d.keys = change;
+      view3d.settings.fix({ plans, mirrors, inset: map, sharp: false }, fieldOfView_deg);
+      if (view !== 'map') {
+        view3d.viewpoint = view;
+        this.#missing3d = !await view3d.show(true);
+      }
+    }
+    this.#look();
+  }
+
+  #writeLabels() {
+    for (const name of /** @type {const} */ (['throttle', 'brake'])) {
+      const label = document.querySelector(`.pedal-${name} .bar-label`);
+      if (label !== null) {
+        setText(label, this.#words[name]);
+      }
+    }
+  }
+
+  /** Who only drives steers nothing: the server is told, and refuses the rest. */
+  #takeRole() {
+    const { me, mode } = this.#store;
+    if (me.id !== '' && mode === 'live' && this.#role !== me.id) {
+      this.#role = me.id;
+      this.#claimed_ms = -Infinity;
+      this.#connection.request({ type: 'role', role: 'drive' }).then(() => this.#look());
+    }
+  }
+
+  /** @param {StageOrder} order */
+  #obey(order) {
+    window.focus();
+    if (order.kind === 'ready') {
+      window.crgame.sound?.begin();
+      this.#ready = { wanted: order.ready, epoch: this.#store.epoch, sent: false };
+      this.#look();
+    }
+  }
+
+  /** Take the seat while it is free, say what is wrong, and tell the page around. */
+  #look() {
+    const seat = this.#store.seats[this.address.seat];
+    if (this.#store.connected && seat !== undefined && seat.holder === null
+        && !this.#store.rights.directs
+        && performance.now() - this.#claimed_ms > CLAIM_EVERY_MS) {
+      this.#claim();
+    }
+    this.#sayReady();
+    const trouble = this.#trouble();
+    const text = trouble === null ? '' : this.#words[trouble];
+    setText(this.#line, text);
+    setAttribute(this.#line, 'hidden', text === '');
+    const state = this.#state(trouble);
+    document.documentElement.dataset.stage = state.view;
+    document.documentElement.toggleAttribute('data-missing3d', state.missing3d);
+    this.#link.tell(state);
+  }
+
+  async #claim() {
+    this.#claimed_ms = performance.now();
+    const { driving } = window.crgame;
+    if (driving !== undefined) {
+      const { ok, text } = await driving.claim(this.address.seat);
+      this.#refusal = ok ? '' : text;
+    }
+  }
+
+  /** A new run asks anew who is ready. */
+  async #sayReady() {
+    const ready = this.#ready;
+    const { epoch, seats } = this.#store;
+    if (ready.epoch !== epoch || ready.sent || !this.#seated
+        || seats[this.address.seat]?.ready === ready.wanted) {
+      return;
+    }
+    ready.sent = true;
+    const { ok, text } = await this.#connection.request(
+      { type: 'ready', seat: this.address.seat, ready: ready.wanted });
+    this.#refusal = ok ? '' : text;
+  }
+
+  get #seated() {
+    return window.crgame.driving?.seat === this.address.seat;
+  }
+
+  /** @returns {StageTrouble|null} what keeps the driver from driving */
+  #trouble() {
+    const { connected, mode, status, scene, seats, me } = this.#store;
+    const { seat } = this.address;
+    const { driving } = window.crgame;
+    if (!connected) {
+      return status?.run === 'ended' ? null : this.#role === '' ? 'connecting' : 'lost';
+    }
+    if (mode === 'replay') {
+      return 'recording';
+    }
+    if (!this.#seated) {
+      const other = seats[seat]?.holder ?? null;
+      const absent = scene !== null && !scene.vehicles.some(({ id }) => id === seat);
+      return absent ? 'no_seat' : other !== null && other !== me.id ? 'taken'
+        : this.#failed !== '' ? 'failed' : 'connecting';
+    }
+    if (status?.run === 'ended') {
+      return null;
+    }
+    const away = driving?.away;
+    return away === 'unplugged' ? away : away === 'focus' ? away
+      : status?.seats_lost?.[seat] && status.run === 'running' ? 'silent' : null;
+  }
+
+  /**
+   * @param {StageTrouble|null} trouble
+   * @returns {StageState}
+   */
+  #state(trouble) {
+    const { connected, status, epoch, seats, people, me, round_trip_ms } = this.#store;
+    const { driving } = window.crgame;
+    const { seat } = this.address;
+    const own = people.find(({ client }) => client === me.id);
+    const time_s = this.#time_s;
+    const more = this.#failed || this.#refusal;
+    return {
+      seat, seated: this.#seated, connected, run: status?.run ?? null,
+      reason: status?.run === 'ended' ? status.reason ?? '' : '', epoch, time_s,
+      ready: this.#seated && Boolean(seats[seat]?.ready),
+      countdown_s: connected ? status?.countdown_s ?? 0 : 0,
+      view: this.#view, missing3d: this.#missing3d, sound: this.#sound,
+      hasInput: this.#seated && driving?.away === null, away: driving?.away ?? '',
+      device: driving?.device ?? '',
+      delay_ms: Number.isFinite(round_trip_ms) ? Math.round(round_trip_ms) : null,
+      input_delay_ms: own?.input_delay_ms ?? null,
+      trouble: trouble === null ? '' : [WORDS.en[trouble], more].filter(Boolean).join(' '),
+    };
+  }
+
+  /** @returns {number|null} of the picture that is shown [s] */
+  get #time_s() {
+    const { view3d, world } = window.crgame;
+    const t = view3d?.on ? view3d.stats?.t : world.shown?.t;
+    return t === undefined || !Number.isFinite(t) ? null : Math.round(1000 * t) / 1000;
+  }
+
+  /** @returns {StageView} */
+  get #view() {
+    const { view3d } = window.crgame;
+    return view3d?.on ? view3d.viewpoint : 'map';
+  }
+
+  /** @returns {StageState['sound']} */
+  get #sound() {
+    const { sound } = window.crgame;
+    return sound === undefined || !sound.wanted ? 'off' : !sound.allowed ? 'none'
+      : sound.on ? 'on' : 'waits';
+  }
+}
+
+/**
+ * Make the page a stage.
+ *
+ * @param {HTMLElement} root
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {Stage}
+ * @throws {Error} if the address asks for none
+ */
+export function createStage(root, store, connection) {
+  const address = readStage(window.location.search);
+  if (address === null) {
+    throw new Error('the address names no seat');
+  }
+  return new Stage(root, store, connection, address);
+}

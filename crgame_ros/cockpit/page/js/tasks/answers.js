@@ -1,0 +1,105 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The ways in which a driver answers: Enter, a free button of gamepad or wheel, a finger. */
+
+import { isTyping } from '../driving/focus.js';
+import { connectedPads } from '../driving/gamepad.js';
+import { LIGHT_BUTTONS } from '../lights.js';
+
+/** @import { Profile } from '../driving/gamepad_profile.js' */
+
+export const ANSWER_KEY = 'Enter';
+// An older time of a gamepad is not that of the press that was just seen [ms].
+const FRESH_MS = 200;
+
+/**
+ * Tell whether a button has another meaning.
+ *
+ * @param {Profile} profile of its device
+ * @param {number} index of the button
+ * @returns {boolean}
+ */
+export function isTaken(profile, index) {
+  const { reverse, lights } = profile;
+  return [reverse.on, reverse.off, reverse.toggle, reverse.held,
+    ...LIGHT_BUTTONS.map((name) => lights[name])].some((list) => list.includes(index))
+    || [profile.throttle, profile.brake, profile.steering].some(
+      (control) => control.kind === 'button' && control.index === index);
+}
+
+/** Listens while answers are wanted. */
+export class Answers {
+  #wanted;
+  #take;
+  /** @type {Map<number, boolean[]>} */
+  #pressed = new Map();
+  #polling = false;
+
+  /**
+   * @param {() => boolean} wanted whether an answer is one now
+   * @param {(at_ms: number) => void} take told when somebody answered, by performance.now
+   */
+  constructor(wanted, take) {
+    this.#wanted = wanted;
+    this.#take = take;
+    window.addEventListener('keydown', (event) => this.#key(event), true);
+  }
+
+  /**
+   * Let a finger or pointer on an element be an answer.
+   *
+   * @param {HTMLElement} node
+   */
+  touch(node) {
+    node.addEventListener('pointerdown', (event) => {
+      if (this.#wanted()) {
+        event.preventDefault();
+        this.#take(event.timeStamp);
+      }
+    });
+  }
+
+  /** Look at the buttons of gamepads in every picture while answers are wanted. */
+  watch() {
+    if (!this.#polling) {
+      this.#polling = true;
+      this.#pressed.clear();
+      requestAnimationFrame(() => this.#poll());
+    }
+  }
+
+  /** @param {KeyboardEvent} event */
+  #key(event) {
+    const free = !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
+      && !document.querySelector('dialog[open]');
+    if (event.key === ANSWER_KEY && free && this.#wanted()) {
+      event.preventDefault();
+      event.stopPropagation();
+      if (!event.repeat) {
+        this.#take(event.timeStamp);
+      }
+    }
+  }
+
+  #poll() {
+    this.#polling = this.#wanted();
+    const now_ms = performance.now();
+    for (const pad of connectedPads()) {
+      const device = window.crgame.driving?.gamepads.devices.find(
+        ({ index }) => index === pad.index);
+      const before = this.#pressed.get(pad.index);
+      const pressed = pad.buttons.map((button) => button.pressed);
+      this.#pressed.set(pad.index, pressed);
+      // Of the first look nobody knows what is pressed newly.
+      const fresh = before !== undefined && device !== undefined && pressed.some(
+        (down, i) => down && !before[i] && !isTaken(device.profile, i));
+      if (fresh && this.#polling) {
+        const age_ms = now_ms - pad.timestamp;
+        this.#take(age_ms >= 0 && age_ms < FRESH_MS ? pad.timestamp : now_ms);
+      }
+    }
+    if (this.#polling) {
+      requestAnimationFrame(() => this.#poll());
+    }
+  }
+}

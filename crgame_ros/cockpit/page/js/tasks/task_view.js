@@ -1,0 +1,72 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The light, the request and the notes of tasks, over the map and the driver's view alike. */
+
+import { element, setText, svg } from '../dom.js';
+
+/** @import { Words } from './task_words.js' */
+
+// A wheel with two hands at it, 24 × 24.
+const WHEEL = 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 2.2a6.8 6.8 0 0 1 6.7 5.6h-4.2a2.8 2.8 0 0 0'
+  + '-5 0H5.3A6.8 6.8 0 0 1 12 5.2M5.3 13h3.9a2.8 2.8 0 0 0 1.7 1.6v4.1A6.8 6.8 0 0 1 5.3 13'
+  + 'm7.8 5.7v-4.1a2.8 2.8 0 0 0 1.7-1.6h3.9a6.8 6.8 0 0 1-5.6 5.7';
+
+/** What a driver sees of tasks. Nothing of it is decided here. */
+export class TaskView {
+  /** @param {HTMLElement} stage over which it lies */
+  constructor(stage) {
+    this.light = element('div', { class: 'task-light', role: 'img', hidden: true });
+    this.title = element('strong', { class: 'task-title' });
+    this.label = element('span', { class: 'task-label' });
+    this.hint = element('span', { class: 'task-hint' });
+    this.takeButton = element('button', { type: 'button', class: 'task-take' });
+    const sign = svg('svg', { viewBox: '0 0 24 24', class: 'task-sign', 'aria-hidden': 'true' },
+      svg('path', { d: WHEEL }));
+    this.request = element('div', { class: 'task-request', role: 'alert', hidden: true }, sign,
+      element('div', { class: 'task-words' }, this.title, this.label, this.hint),
+      this.takeButton);
+    this.frame = element('div', { class: 'task-frame', 'aria-hidden': 'true', hidden: true });
+    this.note = element('p', { class: 'task-note', role: 'status', hidden: true });
+    this.answerButton = element('button', { type: 'button', class: 'task-answer', tabindex: '-1',
+      hidden: true });
+    this.root = element('div', { id: 'tasks' }, this.frame, this.light, this.note, this.request,
+      this.answerButton);
+    stage.append(this.root);
+  }
+
+  /**
+   * Write the words that stay.
+   *
+   * @param {Words} words
+   * @param {string} language
+   */
+  speak(words, language) {
+    this.root.lang = language;
+    this.light.setAttribute('aria-label', words.light);
+    setText(this.answerButton, words.answer);
+    setText(this.title, words.takeOver);
+    setText(this.takeButton, words.takeOver);
+  }
+
+  /**
+   * Show a request, or none.
+   *
+   * @param {{label: string, hint: string, free: boolean}|null} request `free`: nobody has the
+   *   seat, so that it can be taken here
+   */
+  showRequest(request) {
+    this.request.hidden = this.frame.hidden = request === null;
+    if (request !== null) {
+      setText(this.label, request.label);
+      this.label.hidden = request.label === '';
+      setText(this.hint, request.hint);
+      this.takeButton.hidden = !request.free;
+    }
+  }
+
+  /** @param {string} text of the secondary tasks that last; empty for none */
+  showNote(text) {
+    setText(this.note, text);
+    this.note.hidden = text === '';
+  }
+}

@@ -1,0 +1,40 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What drivers read of tasks, in their language. */
+
+const WORDS = {
+  en: {
+    takeOver: 'Take over', takeOverHint: 'Hands on the controls: {key} or this button',
+    hold: 'Drive yourself now', answer: 'Answer', secondary: 'Task', light: 'Light',
+  },
+  de: {
+    takeOver: 'Übernehmen', takeOverHint: 'Hände an die Steuerung: {key} oder diese Taste',
+    hold: 'Fahren Sie jetzt selbst', answer: 'Antworten', secondary: 'Aufgabe', light: 'Licht',
+  },
+};
+
+/** @typedef {keyof typeof WORDS} Language */
+/** @typedef {typeof WORDS['en']} Words */
+
+/**
+ * Choose the language of a page.
+ *
+ * @param {string} search the address's part from ? on, in which `lang` may name one
+ * @param {string|undefined} ofGame language that the game names
+ * @returns {Language}
+ */
+export function languageOf(search, ofGame) {
+  const known = /** @type {Language[]} */ (Object.keys(WORDS));
+  const wanted = [new URLSearchParams(search).get('lang'), ofGame]
+    .map((name) => String(name ?? '').toLowerCase().split('-')[0]);
+  return wanted.map((name) => known.find((code) => code === name))
+    .find((code) => code !== undefined) ?? 'en';
+}
+
+/**
+ * @param {Language} language
+ * @returns {Words}
+ */
+export function wordsIn(language) {
+  return WORDS[language];
+}

@@ -1,0 +1,275 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The tasks of the driver at this page: what is seen of them, and answers timed by its clock. */
+
+import { Answers, ANSWER_KEY } from './answers.js';
+import { inPicture, Prompt } from './prompt.js';
+import { RequestTone } from './request_tone.js';
+import { RunningTime } from './running_time.js';
+import { languageOf, wordsIn } from './task_words.js';
+import { TaskView } from './task_view.js';
+
+/** @import { Connection } from '../connection.js' */
+/** @import { Store } from '../store.js' */
+/** @import { GameTask, OpenPrompt, PageTimes } from './task_messages.js' */
+
+/** The part; in `window.crgame.tasks`. */
+export class Tasks {
+  #store;
+  #connection;
+  #running = new RunningTime();
+  #tone = new RequestTone();
+  #view;
+  #answers;
+  /**
+   * What is open and concerns this page, by task and number.
+   *
+   * @type {Map<string, Prompt>}
+   */
+  #prompts = new Map();
+  #words = wordsIn('en');
+  #looking = false;
+
+  /**
+   * @param {HTMLElement} stage
+   * @param {Store} store
+   * @param {Connection} connection
+   */
+  constructor(stage, store, connection) {
+    this.#store = store;
+    this.#connection = connection;
+    this.#view = new TaskView(stage);
+    this.#answers = new Answers(() => this.#wanted, (at_ms) => this.#answer(at_ms));
+    this.#answers.touch(this.#view.answerButton);
+    this.#answers.touch(this.#view.light);
+    this.#view.takeButton.addEventListener('click', () => this.#takeOver());
+    store.on('scene', () => this.#begin());
+    store.on('epoch', () => this.#forget());
+    store.on('tasks', () => this.#update());
+    store.on('seats', () => this.#update());
+    store.on('connection', () => this.#update());
+    store.on('status', () => {
+      this.#running.note(this.#runs, performance.now());
+      this.#look();
+    });
+    this.#begin();
+  }
+
+  /** @returns {Prompt[]} what is open here now */
+  get prompts() {
+    return [...this.#prompts.values()];
+  }
+
+  get #runs() {
+    return this.#store.connected && this.#store.status?.run === 'running';
+  }
+
+  /** Whether an answer is taken now: a detection task of this driver's lasts, and the run runs. */
+  get #wanted() {
+    return this.#runs && (this.#detecting !== undefined || this.#request?.free === true);
+  }
+
+  /** @returns {GameTask[]} those of the game that this page's driver has to do with */
+  get #mine() {
+    const { mode, scene, seats, me } = this.#store;
+    return mode !== 'live' || me.id === '' ? []
+      : (scene?.tasks ?? []).filter(({ seat }) => seats[seat]?.holder === me.id);
+  }
+
+  /** @returns {GameTask|undefined} the detection task of this driver's that lasts */
+  get #detecting() {
+    const { running } = this.#store.tasks;
+    return this.#mine.find(({ name, kind }) => kind === 'detection_response'
+      && running.includes(name));
+  }
+
+  /** The request that is to be seen here, and whether its seat is free to be taken. */
+  get #request() {
+    const prompt = this.prompts.find(({ task }) => task.kind === 'take_over');
+    return prompt && { prompt, free: this.#mayTake(prompt.task.seat) };
+  }
+
+  /**
+   * An AV that drives itself is asked for at every page whose person drives nothing else.
+   *
+   * @param {string} seat
+   */
+  #mayTake(seat) {
+    const { seats, me, rights } = this.#store;
+    const sits = Object.values(seats).some(({ holder }) => holder === me.id);
+    return !sits && rights.drives && me.id !== '' && seats[seat] !== undefined
+      && !seats[seat].holder && (rights.seat === '' || rights.seat === seat);
+  }
+
+  #begin() {
+    const language = languageOf(window.location.search, this.#store.scene?.language);
+    this.#words = wordsIn(language);
+    this.#view.speak(this.#words, language);
+    this.#update();
+  }
+
+  #forget() {
+    this.#prompts.clear();
+    this.#running = new RunningTime();
+    this.#running.note(this.#runs, performance.now());
+    this.#update();
+  }
+
+  /** Take in what is open, and let go of what is not any more. */
+  #update() {
+    const now_ms = performance.now();
+    const mine = this.#mine;
+    const tasks = this.#store.mode === 'live' ? this.#store.scene?.tasks ?? [] : [];
+    const open = this.#store.connected ? this.#store.tasks.open : [];
+    /** @type {Set<string>} */
+    const kept = new Set();
+    for (const each of open) {
+      const task = tasks.find(({ name }) => name === each.task);
+      if (task && (mine.includes(task)
+          || (task.kind === 'take_over' && this.#mayTake(task.seat)))) {
+        const key = `${each.task}/${each.number}`;
+        kept.add(key);
+        if (!this.#prompts.has(key)) {
+          this.#open(key, each, task, now_ms);
+        }
+      }
+    }
+    for (const key of this.#prompts.keys()) {
+      if (!kept.has(key)) {
+        this.#prompts.delete(key);
+      }
+    }
+    this.#showWhatLasts(mine);
+    this.#look();
+  }
+
+  /**
+   * @param {string} key
+   * @param {OpenPrompt} open
+   * @param {GameTask} task
+   * @param {number} now_ms
+   */
+  #open(key, open, task, now_ms) {
+    const prompt = new Prompt(open, task, this.#running, now_ms, this.#store.round_trip_ms);
+    this.#prompts.set(key, prompt);
+    const light = task.kind === 'detection_response';
+    if (light && open.seen) {
+      // It was shown before this page was loaded anew: nobody could time an answer to it.
+      prompt.answered = true;
+      return;
+    }
+    inPicture(() => {
+      // Until then the picture is the one before.
+      prompt.draw(performance.now());
+      this.#draw();
+    }).then(({ drawn_ms, picture_ms }) => {
+      prompt.draw(drawn_ms);
+      prompt.picture_ms = picture_ms;
+      this.#tell(prompt, 'shown', prompt.times());
+    });
+    if (!light && !open.seen && this.#store.scene?.sound !== 'none') {
+      this.#tone.play(window.crgame.sound?.volume ?? 1);
+    }
+  }
+
+  /** @param {GameTask[]} mine */
+  #showWhatLasts(mine) {
+    const { running } = this.#store.tasks;
+    const shown = this.#store.connected ? mine.filter(({ name, kind, show }) => show
+      && kind === 'secondary_task' && running.includes(name)) : [];
+    this.#view.showNote(shown.map(({ name, label }) => `${this.#words.secondary}: `
+      + `${label || name}`).join(' · '));
+    this.#view.answerButton.hidden = this.#detecting === undefined;
+  }
+
+  /** Look in every picture while there is something to look at. */
+  #look() {
+    if (!this.#looking) {
+      this.#looking = true;
+      requestAnimationFrame(() => this.#frame());
+    }
+    if (this.#wanted) {
+      this.#answers.watch();
+    }
+  }
+
+  #frame() {
+    this.#looking = false;
+    this.#draw();
+    if (this.#prompts.size > 0 && this.#runs) {
+      this.#look();
+    }
+  }
+
+  /** Let be seen what is so now. */
+  #draw() {
+    const now_ms = performance.now();
+    this.#view.light.hidden = !this.prompts.some((prompt) => prompt.task.kind
+      === 'detection_response' && prompt.lit(now_ms));
+    const request = this.#request;
+    if (request === undefined) {
+      this.#tone.stop();
+      this.#view.showRequest(null);
+      return;
+    }
+    const { task } = request.prompt;
+    this.#view.showRequest({
+      label: task.label, free: request.free,
+      hint: request.free ? this.#words.takeOverHint.replace('{key}', ANSWER_KEY)
+        : this.#words.hold,
+    });
+  }
+
+  /** @param {number} at_ms when somebody answered */
+  #answer(at_ms) {
+    const request = this.#request;
+    if (request?.free) {
+      this.#takeOver();
+      return;
+    }
+    const detecting = this.#detecting;
+    const prompt = this.prompts.find((each) => each.task.kind === 'detection_response'
+      && each.takes(at_ms));
+    if (prompt !== undefined) {
+      const times = prompt.times(at_ms);
+      prompt.answered = true;
+      this.#tell(prompt, 'answer', times);
+      this.#look();
+    } else if (detecting !== undefined) {
+      this.#connection.send({ type: 'task', seat: detecting.seat, task: detecting.name, number: 0,
+        what: 'answer' });
+    }
+  }
+
+  async #takeOver() {
+    const request = this.#request;
+    if (request?.free) {
+      await window.crgame.driving?.claim(request.prompt.task.seat);
+    }
+  }
+
+  /**
+   * @param {Prompt} prompt
+   * @param {'shown'|'answer'} what
+   * @param {PageTimes} times
+   */
+  #tell({ open }, what, times) {
+    const known = Object.fromEntries(Object.entries(times)
+      .filter(([, value]) => Number.isFinite(value))
+      .map(([name, value]) => [name, Math.round(1000 * value) / 1000]));
+    this.#connection.send({ type: 'task', seat: open.seat, task: open.task, number: open.number,
+      what, ...known });
+  }
+}
+
+/**
+ * Show the tasks of the game to whose driver sits at this page.
+ *
+ * @param {HTMLElement} root `#stage`
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {Tasks}
+ */
+export function createTasks(root, store, connection) {
+  return new Tasks(root, store, connection);
+}

@@ -1,0 +1,103 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What this page shows its person, told to the server, which records it of those who drive. */
+
+/** @import { Connection } from './connection.js' */
+/** @import { ViewMessage } from './messages.js' */
+/** @import { Store } from './store.js' */
+
+const LOOK_EVERY_MS = 100;
+// How often pictures come is told once a second [ms].
+const TELL_EVERY_MS = 1000;
+const DEGREES = 180 / Math.PI;
+
+/** Looks again and again what is shown; in `window.crgame.viewReport`. */
+class ViewReport {
+  #connection;
+  #store;
+  #stage;
+  #told = '';
+  #told_ms = -Infinity;
+  #pictures = 0;
+
+  /**
+   * @param {HTMLElement} stage that holds the picture
+   * @param {Store} store
+   * @param {Connection} connection
+   */
+  constructor(stage, store, connection) {
+    this.#stage = stage;
+    this.#store = store;
+    this.#connection = connection;
+    store.on('hello', () => {
+      this.#told = '';
+    });
+    setInterval(() => this.#look(), LOOK_EVERY_MS);
+  }
+
+  #look() {
+    const now_ms = performance.now();
+    const since_ms = now_ms - this.#told_ms;
+    const text = JSON.stringify(this.#choice);
+    if (this.#store.mode !== 'live' || window.crgame.ready !== true
+        || (text === this.#told && since_ms < TELL_EVERY_MS)) {
+      return;
+    }
+    const pictures = this.#count;
+    // Of a view that was just opened nobody knows yet how often it is drawn.
+    const rate_hz = text === this.#told ? 1000 * (pictures - this.#pictures) / since_ms : null;
+    if (this.#connection.send({ ...this.#choice, ratio: this.#ratio, rate_hz })) {
+      this.#told = text;
+      this.#told_ms = now_ms;
+      this.#pictures = pictures;
+    }
+  }
+
+  /** @returns {Omit<ViewMessage, 'ratio'|'rate_hz'>} what changes at a choice alone */
+  get #choice() {
+    const { view3d, world, stage } = window.crgame;
+    const { clientWidth: width_px, clientHeight: height_px } = this.#stage;
+    const rest = { width_px, height_px, bare: Number(stage !== undefined) };
+    const picture = view3d?.on ? view3d.picture : null;
+    if (view3d === undefined || picture === null) {
+      return { type: 'view', shown: 'map', inset: 0, mirrors: 0, across_deg: null,
+        plans: Number(world.showsPlans), screen_width_m: null, eye_distance_m: null,
+        renderer: '', software: 0, ...rest };
+    }
+    const { inset, plans, mirrors } = view3d.settings.switches;
+    const { fov, aspect } = picture.camera;
+    const across = 2 * Math.atan(Math.tan(fov / DEGREES / 2) * aspect);
+    const seat = view3d.settings.seat;
+    return {
+      type: 'view', shown: view3d.viewpoint, inset: Number(inset),
+      plans: Number(plans || (inset && world.showsPlans)),
+      mirrors: Number(mirrors && view3d.viewpoint === 'driver'),
+      across_deg: Math.round(across * DEGREES * 10) / 10,
+      screen_width_m: seat?.screen_width_m ?? null, eye_distance_m: seat?.eye_distance_m ?? null,
+      renderer: picture.stats.renderer, software: Number(picture.stats.software), ...rest,
+    };
+  }
+
+  get #ratio() {
+    const { view3d } = window.crgame;
+    return view3d?.on && view3d.picture !== null ? view3d.picture.stats.ratio
+      : window.devicePixelRatio;
+  }
+
+  get #count() {
+    const { view3d, world } = window.crgame;
+    return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
+  }
+}
+
+/**
+ * Tell the server what this page shows.
+ *
+ * @param {HTMLElement} root the stage, which holds the picture
+ * @param {Store} store
+ * @param {Connection} connection
+ * @returns {ViewReport}
+ */
+export function createViewReport(root, store, connection) {
+  return new ViewReport(root, store, connection);
+}

@@ -1,0 +1,146 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What every server here asks of a request before it is answered, and the headers of answers."""
+
+from collections.abc import Awaitable, Callable
+
+from aiohttp import hdrs, web
+from aiohttp.typedefs import Handler, Middleware
+from crgame_ros.cockpit.access import Access, is_own_origin
+from crgame_ros.cockpit.doorkeeper import Doorkeeper
+from crgame_ros.cockpit.page_files import PageFile
+from crgame_ros.cockpit.request_rights import RIGHTS
+from crgame_ros.cockpit.rights import ALL_RIGHTS
+from crgame_ros.errors import InputError
+
+KEEPER = web.AppKey('keeper', Doorkeeper)
+ACCESS = web.AppKey('access', Access)
+# How long a browser keeps what it got for its token [s].
+COOKIE_S = 12 * 3600
+
+_POLICY = 'Content-Security-Policy'
+_FRAMED_BY = 'frame-ancestors'
+_HEADERS = {
+    _POLICY: (
+        "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+        f"connect-src 'self'; {_FRAMED_BY} 'none'; base-uri 'none'; form-action 'none'"),
+    'X-Content-Type-Options': 'nosniff',
+    'Referrer-Policy': 'no-referrer',
+    'Cross-Origin-Resource-Policy': 'same-origin',
+    'Server': 'crgame_ros',
+}
+
+
+def guard(access: Access, keeper: Doorkeeper,
+          also: Callable[[web.Request], bool] = lambda _: False) -> Middleware:
+    """
+    Give what lets requests through.
+
+    :param access: who is let in.
+    :param keeper: counts the connections.
+    :param also: whether somebody is let in for another reason.
+    """
+    @web.middleware
+    async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
+        transport = request.transport
+        keeper.begins(transport)
+        try:
+            return await _answer(access, request, handler, also)
+        finally:
+            keeper.ends(transport)
+    return guarded
+
+
+def header_writer(is_static: Callable[[str], bool], frames: Callable[[web.Request], str] | None
+                  = None, framed_by: str = ''
+                  ) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
+    """
+    Give what writes the headers of every answer.
+
+    :param is_static: whether the answer to a path stays the same while its tag does.
+    :param frames: addresses of pages that a page may show inside itself; None for none.
+    :param framed_by: origin of the one page that may show this one within it; empty for none.
+    """
+    headers = dict(_HEADERS)
+    if framed_by:
+        headers[_POLICY] = _HEADERS[_POLICY].replace(
+            f"{_FRAMED_BY} 'none'", f'{_FRAMED_BY} {framed_by}')
+
+    async def write(request: web.Request, response: web.StreamResponse) -> None:
+        own = response.headers.get(_POLICY)
+        response.headers.update(headers)
+        if own is not None:
+            response.headers[_POLICY] = own
+        elif frames is not None:
+            response.headers[_POLICY] += f'; frame-src {frames(request)}'
+        response.headers[hdrs.CACHE_CONTROL] = 'no-cache' if is_static(request.path) \
+            else 'no-store'
+    return write
+
+
+def file_answer(request: web.Request, file: PageFile | None) -> web.Response:
+    """Answer with a file of a page, or that the browser has it already."""
+    if file is None:
+        return web.Response(status=404, text='There is no such file.\n')
+    if request.headers.get(hdrs.IF_NONE_MATCH) == f'"{file.tag}"':
+        return web.Response(status=304, headers={hdrs.ETAG: f'"{file.tag}"'})
+    return web.Response(body=file.body, content_type=file.content_type,
+                        charset='utf-8' if file.is_text else None,
+                        headers={hdrs.ETAG: f'"{file.tag}"'})
+
+
+async def _answer(access: Access, request: web.Request,
+                  handler: Handler,
+                  also: Callable[[web.Request], bool]) -> web.StreamResponse:
+    sockname = request.get_extra_info('sockname')
+    if sockname is None:
+        raise ConnectionResetError
+    refusal = _refusal(access, request, sockname[1])
+    if refusal:
+        return web.Response(status=403, text=f'{refusal}\n')
+    name = f'crgame-{sockname[1]}'
+    cookie = request.cookies.get(name)
+    if access.asks and request.path == '/' and 'token' in request.query:
+        try:
+            cookie = access.exchange(request.query['token'], cookie)
+        except InputError as error:
+            return web.Response(status=403, text=f'{error}\n')
+        rest = request.url.without_query_params('token').relative()
+        answer = web.Response(status=303, headers={'Location': str(rest)})
+        answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
+                          secure=access.tls is not None, max_age=COOKIE_S)
+        return answer
+    rights = access.rights(cookie)
+    if rights is None and also(request):
+        rights = ALL_RIGHTS
+    if rights is None:
+        return web.Response(status=403, text=f'{access.refusal}\n')
+    request[RIGHTS] = rights
+    return await handler(request)
+
+
+def _refusal(access: Access, request: web.Request, port: int) -> str:
+    """Say why a request is refused whatever its token, empty if it is not."""
+    host = request.headers.get(hdrs.HOST, '')
+    if not access.allows_host(host, port):
+        return f'This is not the name of this server: open http://127.0.0.1:{port}/'
+    if not is_own_origin(request.headers.get(hdrs.ORIGIN), host):
+        return 'Pages of other sites cannot use this one.'
+    foreign = request.headers.get('Sec-Fetch-Site') in ('cross-site', 'same-site')
+    if foreign and request.path != '/':
+        return 'Pages of other sites cannot use this one.'
+    if request.method == hdrs.METH_POST and request.headers.get('X-Crgame') != '1':
+        return 'The header X-Crgame: 1 is missing.'
+    return ''

@@ -1,0 +1,95 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What people in the cockpit's seats saw, from when to when, as cockpit_node told of it."""
+
+from collections.abc import Iterable, Mapping
+import math
+import re
+import statistics
+from typing import Any, NamedTuple
+
+from crgame_ros.messages.status_values import Status, status_truth
+
+_NAME = re.compile(r'cockpit_node: ((?:hv|av)[0-9]{1,3}) view')
+_SHOWN = ('map', 'driver', 'chase', 'bird')
+_FLAGS = ('inset', 'plans', 'mirrors', 'bare', 'software')
+_MEASURES = ('across_deg', 'screen_width_m', 'eye_distance_m', 'width_px', 'height_px')
+
+
+class _Told(NamedTuple):
+    time_s: float
+    # What makes a new period when it changes, by key.
+    choice: dict[str, Any]
+    ratio: float | None
+    rate_hz: float | None
+
+
+class SeatView:
+    """Sums up the statuses of each seat's view, which come once a second and at each change."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, list[_Told]] = {}
+
+    def take(self, status: Status, time_s: float) -> None:
+        """
+        Take a status; one of something else, or of a page that has told nothing yet, is no news.
+
+        :param time_s: of the run's clock [s]
+        """
+        found = _NAME.fullmatch(status.name)
+        values = status.values
+        if found is None or values.get('shown') not in _SHOWN:
+            return
+        choice = {
+            'shown': values['shown'], **{key: status_truth(values, key) for key in _FLAGS},
+            **{key: _number(values, key) for key in _MEASURES},
+            'renderer': values.get('renderer', '')}
+        self._told.setdefault(found[1], []).append(
+            _Told(time_s, choice, _number(values, 'ratio'), _number(values, 'rate_hz')))
+
+    def as_dict(self) -> dict[str, list[dict[str, Any]]]:
+        """
+        Give by seat the periods in which one thing was shown in one way.
+
+        :return: of each period `from_s` and `to_s` (the run's clock; that of the next, or of the
+            last word), what was chosen, and the medians of `ratio` and `rate_hz`.
+        """
+        return {seat: list(_periods(told)) for seat, told in sorted(self._told.items())}
+
+
+def _periods(told: list[_Told]) -> Iterable[dict[str, Any]]:
+    first = 0
+    for last in range(1, len(told) + 1):
+        if last < len(told) and told[last].choice == told[first].choice:
+            continue
+        within = told[first:last]
+        yield {'from_s': round(within[0].time_s, 3),
+               'to_s': round(told[min(last, len(told) - 1)].time_s, 3), **within[0].choice,
+               'ratio': _median(item.ratio for item in within),
+               'rate_hz': _median(item.rate_hz for item in within)}
+        first = last
+
+
+def _median(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return round(statistics.median(known), 3) if known else None
+
+
+def _number(values: Mapping[str, str], key: str) -> float | None:
+    try:
+        number = float(values.get(key, ''))
+    except ValueError:
+        return None
+    return number if math.isfinite(number) and number >= 0.0 else None

@@ -1,0 +1,276 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The tasks of one run: when stimuli and requests come, and what becomes of them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from crgame_ros.game.events import AtStep, AtTime, FiredEvent
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.game.task_documents import (
+    NOT_MEASURED,
+    OpenPrompt,
+    PageTimes,
+    TaskEntry,
+    TaskHappening,
+    TaskReport,
+)
+from crgame_ros.game.task_spec import (
+    DetectionResponse,
+    OnEvent,
+    TakeOver,
+    TaskCondition,
+    TaskSpec,
+)
+from crgame_ros.simulation.condition_check import ConditionCheck
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.simulation.stimulus_schedule import StimulusSchedule
+from crgame_ros.simulation.task_check import task_seat
+from crgame_ros.vehicle.state import VehicleState
+
+# A page's answer may come so long after the last that counts: the picture and the way back [s].
+GRACE_S = 0.5
+# More reports in a second are no person's.
+REPORTS_PER_S = 20
+
+
+@dataclass
+class _Course:
+    """How one task stands."""
+
+    spec: TaskSpec
+    seat: str
+    when: TaskCondition | None
+    running: bool = False
+    begun: bool = False
+    pressed: bool = False
+    may_end: bool = True
+    number: int = 0
+    schedule: StimulusSchedule | None = None
+    prompt: OpenPrompt | None = None
+    # Step at which what a request is about is triggered.
+    due_n: int | None = None
+
+
+class RunTasks:
+    """
+    Lets tasks begin and end, makes their stimuli and requests, and takes answers.
+
+    Conditions and buttons take effect at the scenario's ticks, stimuli come and go between them
+    too.
+
+    :param setup: the run.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._courses = {spec.name: _Course(spec, task_seat(spec, setup.vehicle_ids),
+                                            self._begins(spec)) for spec in setup.game.tasks}
+        self._columns = {item.id: column
+                         for column, item in enumerate(setup.obstacles.descriptions)}
+        self._timed = {event.name for event in setup.game.events
+                       if isinstance(event.when, AtTime | AtStep)}
+        self._happened: set[str] = set()
+        self._entries: list[TaskEntry] = []
+        self._reports: list[TaskReport] = []
+        self._taken = (0, 0)
+        self._n = 0
+
+    def _begins(self, spec: TaskSpec) -> TaskCondition | None:
+        """Give when a task begins by itself: a request also by the time of its event."""
+        if spec.when is not None or not isinstance(spec.task, TakeOver):
+            return spec.when
+        about = next((event.when for event in self._setup.game.events
+                      if event.name == spec.task.before), None)
+        scheduler = self._setup.scheduler
+        if isinstance(about, AtStep):
+            about = AtTime((about.step - scheduler.k0) * scheduler.time_step_s)
+        return AtTime(about.time - spec.task.lead) if isinstance(about, AtTime) else None
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """Names of the tasks that last now."""
+        return tuple(name for name, course in self._courses.items() if course.running)
+
+    @property
+    def prompts(self) -> tuple[OpenPrompt, ...]:
+        """What is neither answered nor over."""
+        return tuple(course.prompt for course in self._courses.values() if course.prompt)
+
+    def trigger(self, name: str) -> str | None:
+        """
+        Let a task begin at the next tick, or end if it lasts.
+
+        :return: None if it will, else the reason why not.
+        """
+        course = self._courses[name]
+        if course.prompt is not None and isinstance(course.spec.task, TakeOver):
+            return f'"{name}" is being shown'
+        course.pressed = True
+        return None
+
+    def report(self, report: TaskReport) -> str | None:
+        """
+        Take what a page has shown or its driver answered; it takes effect at the next step.
+
+        :return: None if it is taken, else the reason why not.
+        """
+        course = self._courses.get(report.task)
+        if course is None or course.seat != report.seat:
+            return f'there is no task "{report.task}" for {report.seat}'
+        second = int(self._n * self._setup.scheduler.dt_s)
+        count = self._taken[1] if self._taken[0] == second else 0
+        if count == REPORTS_PER_S:
+            return f'{report.seat}: more than {REPORTS_PER_S} reports in a second'
+        self._taken = (second, count + 1)
+        self._reports.append(report)
+        return None
+
+    def due_events(self, n: int) -> list[str]:
+        """Name the events that requests have announced and that are to happen by now."""
+        due: list[str] = []
+        for course in self._courses.values():
+            task = course.spec.task
+            if course.due_n is not None and n >= course.due_n and isinstance(task, TakeOver):
+                course.due_n = None
+                due.append(str(task.before))
+        return due
+
+    def at_tick(self, n: int, k: int, states: Sequence[VehicleState], objects: ObjectStates,
+                fired: Sequence[FiredEvent]) -> None:
+        """
+        Let tasks begin and end.
+
+        :param states: of the driven vehicles at n.
+        :param objects: at k.
+        :param fired: events that have taken effect at this tick.
+        """
+        self._n = n
+        self._happened |= {event.name for event in fired}
+        conditions = ConditionCheck(self._setup, k, states, objects, self._columns)
+
+        def holds(condition: TaskCondition | None) -> bool:
+            if isinstance(condition, OnEvent):
+                return condition.event in self._happened
+            return condition is not None and conditions.holds(condition)
+        for course in self._courses.values():
+            by = 'trigger' if course.pressed else 'condition'
+            if course.running:
+                if course.pressed or (course.may_end and holds(course.spec.until)):
+                    self._end(course, by)
+            elif course.pressed or (not course.begun and holds(course.when)):
+                self._begin(course, by)
+                # Begun by the button after that, it is ended by the button.
+                course.may_end = not holds(course.spec.until)
+            course.pressed = False
+
+    def at_step(self, n: int, driven: Mapping[str, bool]) -> tuple[TaskEntry, ...]:
+        """
+        Let stimuli come, take reports, and let pass what nobody has answered.
+
+        :param driven: whether somebody drives a vehicle, by its id.
+        :return: what has happened since the last step.
+        """
+        self._n = n
+        for report in self._reports:
+            self._take(self._courses[report.task], report)
+        self._reports.clear()
+        for course in self._courses.values():
+            task = course.spec.task
+            if isinstance(task, DetectionResponse):
+                self._detect(course, task)
+            elif isinstance(task, TakeOver) and course.prompt is not None:
+                self._request(course, task, driven[course.seat])
+        entries, self._entries = tuple(self._entries), []
+        return entries
+
+    def _begin(self, course: _Course, by: str) -> None:
+        task = course.spec.task
+        course.begun = True
+        if isinstance(task, TakeOver):
+            course.number += 1
+            self._note(course, 'request', course.number, by)
+            course.prompt = OpenPrompt(course.spec.name, course.seat, course.number, self._n)
+            if task.before is not None and task.before not in self._happened | self._timed:
+                course.due_n = self._n + self._steps(task.lead)
+            return
+        course.running = True
+        self._note(course, 'begin', 0, by)
+        if isinstance(task, DetectionResponse):
+            # Begun again it goes on with other times, which are the same on every machine too.
+            name = f'{course.spec.name}/{course.number}'
+            course.schedule = StimulusSchedule(
+                task, name, self._setup.game.seed, self._setup.scheduler, self._n)
+
+    def _end(self, course: _Course, by: str) -> None:
+        course.running, course.schedule = False, None
+        if course.prompt is not None:
+            # It could not be answered for as long as others: it does not count.
+            self._close(course, 'over', 'end')
+        self._note(course, 'end', 0, by)
+
+    def _detect(self, course: _Course, task: DetectionResponse) -> None:
+        schedule, prompt = course.schedule, course.prompt
+        comes = schedule is not None and self._n >= schedule.next_n
+        if prompt is not None and (
+                comes or self._n - prompt.n >= self._steps(task.latest + GRACE_S)):
+            self._close(course, 'missed', '' if prompt.seen else 'unseen')
+        if schedule is not None and comes:
+            schedule.advance()
+            course.number += 1
+            course.prompt = OpenPrompt(course.spec.name, course.seat, course.number, self._n)
+            self._note(course, 'stimulus', course.number)
+
+    def _request(self, course: _Course, task: TakeOver, driven: bool) -> None:
+        autonomous = course.seat not in {human.id for human in self._setup.humans}
+        if autonomous and driven:
+            self._close(course, 'over', 'driven')
+        elif course.prompt and self._n - course.prompt.n >= self._steps(task.lead + task.shown):
+            self._close(course, 'over', 'time')
+
+    def _take(self, course: _Course, report: TaskReport) -> None:
+        task, prompt, times = course.spec.task, course.prompt, report.times
+        concerns = prompt is not None and prompt.number == report.number
+        if report.what == 'shown':
+            # What a page has shown before another one does is seen already.
+            if prompt is not None and concerns and not prompt.seen:
+                course.prompt = replace(prompt, seen=True)
+                self._note(course, 'shown', report.number, times=times)
+            return
+        if not isinstance(task, DetectionResponse) or not (course.running or prompt):
+            return
+        since_ms = times.response_ms
+        if not concerns or since_ms is None or not 0.0 <= since_ms <= 1e3 * task.latest:
+            if not any(entry.task == report.task and entry.what == 'unrequested'
+                       for entry in self._entries):
+                # One a step: nobody is quicker.
+                self._note(course, 'unrequested', 0, times=times)
+        else:
+            outcome = 'premature' if since_ms < 1e3 * task.earliest else 'hit'
+            self._close(course, 'answer', outcome, times)
+
+    def _close(self, course: _Course, what: TaskHappening, by: str = '',
+               times: PageTimes = NOT_MEASURED) -> None:
+        if course.prompt is not None:
+            self._note(course, what, course.prompt.number, by, times)
+            course.prompt = None
+
+    def _note(self, course: _Course, what: TaskHappening, number: int, by: str = '',
+              times: PageTimes = NOT_MEASURED) -> None:
+        self._entries.append(TaskEntry(self._n, course.spec.name, course.spec.kind, course.seat,
+                                       what, number, by, times))
+
+    def _steps(self, seconds: float) -> int:
+        return round(seconds / self._setup.scheduler.dt_s)

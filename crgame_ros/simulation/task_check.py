@@ -1,0 +1,77 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Comparing a game's tasks with its vehicles, objects and events."""
+
+from collections.abc import Sequence
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.events import AtTime, Between, EventSpec, Near
+from crgame_ros.game.task_spec import OnEvent, TakeOver, TaskSpec
+
+
+def task_seat(spec: TaskSpec, vehicles: Sequence[str]) -> str:
+    """Name the vehicle whose driver a task is for: the first where the game does not say it."""
+    return spec.seat or vehicles[0]
+
+
+def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: str,
+                vehicles: Sequence[str], objects: Sequence[str]) -> None:
+    """
+    Refuse tasks of or about what is not there.
+
+    :param where: file name for messages.
+    :param vehicles: ids of the driven vehicles, humans first.
+    :param objects: ids of everything else that moves or stands.
+    :raises InputError: naming the task and what there is.
+    """
+    by_name = {event.name: event for event in events}
+    for spec in tasks:
+        place = f'{where}: task {spec.name}'
+        if spec.name in by_name:
+            raise InputError('an event of the game has the same name', place, 'rename one of them')
+        if not vehicles or task_seat(spec, vehicles) not in vehicles:
+            raise InputError(f'there is no vehicle "{spec.seat}"' if spec.seat
+                             else 'nobody drives in this game', place, _listed(vehicles))
+        for condition in (spec.when, spec.until):
+            named: Sequence[str] = ()
+            if isinstance(condition, OnEvent):
+                _check_event(condition.event, by_name, place)
+            elif isinstance(condition, Near):
+                named = (condition.vehicle,)
+            elif isinstance(condition, Between):
+                named = condition.between
+            for name in named:
+                if name not in (*vehicles, *objects):
+                    raise InputError(f'there is no vehicle or object "{name}"', place,
+                                     _listed(vehicles))
+        if isinstance(spec.task, TakeOver) and spec.task.before is not None:
+            _check_event(spec.task.before, by_name, place)
+            _check_lead(spec, spec.task, by_name[spec.task.before], place)
+
+
+def _check_event(name: str, events: dict[str, EventSpec], place: str) -> None:
+    if name not in events:
+        raise InputError(f'there is no event "{name}"', place, _listed(list(events)))
+
+
+def _check_lead(spec: TaskSpec, task: TakeOver, event: EventSpec, place: str) -> None:
+    """Refuse a request that would have to come before the run."""
+    if spec.when is None and isinstance(event.when, AtTime) and event.when.time < task.lead:
+        raise InputError(f'"{event.name}" is at {event.when.time:g} s, before the lead of '
+                         f'{task.lead:g} s is over', place, 'let it happen later')
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f'there is {", ".join(names[:12])}' if names else 'the game has none'

@@ -1,0 +1,137 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The study's node in the graph: it chooses games, starts and stops runs, and follows them."""
+
+from pathlib import Path
+
+from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.errors import CrgameError
+from crgame_ros.game.documents import GameDocument, MALFORMED, parse_game_document
+from crgame_ros.messages.status_values import read_status
+from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.ros_messages import from_time
+from diagnostic_msgs.msg import DiagnosticStatus
+import rclpy
+from rclpy.context import Context
+
+NS_PER_S = 1_000_000_000
+_QUEUE = 100
+
+
+class Director:
+    """
+    Directs one graph. It is polled, and never waits but where it is awaited.
+
+    :param domain_id: of the graph.
+    :ivar status: how the run is doing.
+    """
+
+    def __init__(self, domain_id: int) -> None:
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain_id)
+        self._node = rclpy.create_node('study_node', context=self._context)
+        endpoints = Endpoints(self._node)
+        self._endpoints = endpoints
+        self._orders = CockpitOrders(self._node, endpoints)
+        self._clock = endpoints.polled('/clock')
+        self._games = endpoints.polled('/scenario/game')
+        self._diagnostics = endpoints.polled('/diagnostics', depth=_QUEUE)
+        self._verdicts: PolledSubscription | None = None
+        self._seat = ''
+        self._stamp_ns = 0
+        self.status = RunStatus()
+        self.game: GameDocument | None = None
+
+    @property
+    def epoch(self) -> int:
+        """Count the games that have begun in this graph, from 0 on; -1 before the first."""
+        return -1 if self.game is None else self.game.epoch
+
+    @property
+    def time_s(self) -> float:
+        """Give the run's clock [s]."""
+        offset_ns = 0 if self.game is None else self.game.scheduler.clock_offset_ns
+        return max(0, self._stamp_ns - offset_ns) / NS_PER_S
+
+    def poll(self) -> None:
+        """Take what has come."""
+        self._take_game()
+        self._take_clock()
+        for slot in (self._diagnostics, self._verdicts):
+            for _ in range(_QUEUE):
+                message = None if slot is None else slot.take()
+                if message is None:
+                    break
+                stamp_ns = from_time(message.header.stamp)
+                if self.game is not None and stamp_ns >= self.game.scheduler.clock_offset_ns:
+                    for status in message.status:
+                        self.status.take(read_status(status), self.time_s)
+
+    async def load(self, game: Path) -> None:
+        """
+        Choose another game.
+
+        :raises CrgameError: if the simulation refuses it.
+        """
+        await self._orders.set_parameter('game', str(game))
+        await self._orders.control('reset')
+
+    async def start(self) -> None:
+        """Begin the run once its driver is there."""
+        await self._orders.control('start')
+
+    async def stop(self) -> None:
+        """End the run."""
+        await self._orders.control('stop')
+
+    def tell(self, subject: str, text: str, **values: object) -> None:
+        """Say something that the recording is to keep."""
+        self._endpoints.diagnostics.publish(
+            f'study_node: {subject}', DiagnosticStatus.OK, text, values, self._stamp_ns)
+
+    def watch(self, seat: str) -> None:
+        """Follow the verdicts on a vehicle."""
+        if self._verdicts is not None and seat != self._seat:
+            self._endpoints.release(self._verdicts)
+            self._verdicts = None
+        if self._verdicts is None:
+            self._verdicts = self._endpoints.polled('/<v>/drivability', seat)
+        self._seat = seat
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._orders.close()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def _take_game(self) -> None:
+        try:
+            message = self._games.latest()
+            game = None if message is None else parse_game_document(message.data)
+        except (CrgameError, *MALFORMED):
+            # Of another program: sim_node's own can be read.
+            return
+        if game is not None and (self.game is None or game.epoch != self.game.epoch):
+            self.game = game
+            self._stamp_ns = game.scheduler.clock_offset_ns
+            self.status.begin([vehicle.id for vehicle in game.vehicles])
+
+    def _take_clock(self) -> None:
+        message = self._clock.latest()
+        if message is not None:
+            stamp_ns = from_time(message.clock)
+            if self.game is None or stamp_ns >= self.game.scheduler.clock_offset_ns:
+                self._stamp_ns = stamp_ns

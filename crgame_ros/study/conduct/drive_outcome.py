@@ -1,0 +1,54 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What became of a drive, from what the nodes told while it went on."""
+
+from typing import Any
+
+from crgame_ros.cockpit.run_status import RunStatus
+
+# What ended a run, in the words of trials' tables.
+_OUTCOMES = {'duration': 'time', 'stop': 'stopped', 'reset': 'stopped', 'signal': 'stopped'}
+
+
+def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:
+    """
+    Tell what became of a drive.
+
+    :param status: at its end.
+    :param seat: vehicle of the participant.
+    :param end_time_s: the run's clock then [s].
+    :return: `outcome`: time, collision, off_road, or stopped; `end_time_s`; and how often the
+        vehicle touched something, and left the road.
+    """
+    contacts, departures = _times(status, seat)
+    outcome = _OUTCOMES.get(status.reason, '')
+    if not outcome:
+        # Its own drivability ended it: whichever came last.
+        outcome = 'collision' if contacts and contacts[-1] >= max(departures, default=0.0) \
+            else 'off_road'
+    return {'outcome': outcome, 'end_time_s': round(end_time_s, 6), 'contacts': len(contacts),
+            'departures': len(departures)}
+
+
+def clean_s(status: RunStatus, seat: str, end_time_s: float) -> float:
+    """Give the longest time of a drive without a contact or leaving the road [s]."""
+    contacts, departures = _times(status, seat)
+    times = [0.0, *sorted((*contacts, *departures)), end_time_s]
+    return max(later - sooner for sooner, later in zip(times, times[1:], strict=False))
+
+
+def _times(status: RunStatus, seat: str) -> tuple[list[float], list[float]]:
+    return ([entry['t'] for entry in status.contacts if seat in (entry['vehicle'], entry['with'])],
+            [entry['t'] for entry in status.departures if entry['vehicle'] == seat])

@@ -1,0 +1,312 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Drives of a session in the live graph: prepared while people answer, started when ready."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+import time
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.recording.metadata import METADATA_FILE
+from crgame_ros.recording.run_folder import bags_of, run_folder
+from crgame_ros.study.conduct.director import Director
+from crgame_ros.study.conduct.disturbance import Disturbance
+from crgame_ros.study.conduct.drive_outcome import clean_s, outcome_of
+from crgame_ros.study.conduct.study_drive import settings_of, StudyDrive, write_drive
+from crgame_ros.study.conduct.study_graph import StudyGraph
+from crgame_ros.study.drive_state import DrivePhase, DriveState
+from crgame_ros.study.participant_session import ParticipantSession
+from crgame_ros.study.session_script import PracticeDrives, SessionItem
+
+LOOK_S = 0.02
+# A recording is closed within it, and a game loaded [s].
+CLOSES_S = 20.0
+LOADS_S = 60.0
+# Whose page is gone for so long has not driven the trial [s].
+LOST_S = 2.0
+# A graph that dies so often, in so short a time, is left alone [s].
+MAX_DEATHS, DEATHS_S = 3, 120.0
+
+
+class _LostGraphError(Exception):
+    """The graph has ended by itself."""
+
+
+class LiveDrives:
+    """
+    Lets a participant drive, in one graph as long as it lives.
+
+    :param session: whose items are driven.
+    :param folder: of the participant.
+    :param language: gives that of the participant.
+    :param port: of the cockpit.
+    :param more: gives further arguments of the launcher.
+    """
+
+    def __init__(self, session: ParticipantSession, folder: Path, language: Callable[[], str],
+                 port: int, more: Callable[[], Sequence[str]] = tuple) -> None:
+        self._session, self._folder, self._language = session, folder, language
+        self._port, self._more = port, more
+        self._graph: StudyGraph | None = None
+        self._director: Director | None = None
+        # What the graph has loaded and not yet driven.
+        self._loaded: StudyDrive | None = None
+        self._state = DriveState()
+        self._changed: list[Callable[[], None]] = []
+        self._news = asyncio.Event()
+        self._ready = ''
+        self._abort: str | None = None
+        self._deaths_s: list[float] = []
+
+    @property
+    def state(self) -> DriveState:
+        """Tell of the drive that goes on or comes next."""
+        if self._director is None or self._state.phase not in (
+                DrivePhase.DRIVING, DrivePhase.ENDED):
+            return self._state
+        return replace(self._state, time_s=self._director.time_s)
+
+    def watch(self, changed: Callable[[], None]) -> None:
+        """Name who is told whenever the state or the session has changed."""
+        self._changed.append(changed)
+
+    def wake(self) -> None:
+        """Say that the session has moved on."""
+        self._news.set()
+
+    def ready(self, item: str) -> None:
+        """Take the participant's word that a drive may begin."""
+        if self._state.phase is DrivePhase.READY and self._state.item == item:
+            self._ready = item
+            self._news.set()
+
+    def abort(self, reason: str) -> None:
+        """End the drive that goes on; it comes again."""
+        if self._state.phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING):
+            self._abort = reason
+            self._news.set()
+
+    def mark(self, subject: str, text: str) -> None:
+        """Let the recording keep a note or marker, if one goes on."""
+        if self._director is not None and self._state.phase is DrivePhase.DRIVING:
+            self._director.tell(subject, text)
+
+    async def run(self) -> None:
+        """Prepare and conduct drives until the session is over."""
+        while self._session.next_item is not None:
+            item = self._next()
+            if item is None:
+                # Recordings are finished while people answer what is left.
+                self._tell(DrivePhase.NONE)
+                await self.close()
+                await self._wait()
+                continue
+            try:
+                await self._conduct(item)
+            except _LostGraphError:
+                await self._lose()
+            except CrgameError as error:
+                await self._fail(item, str(error))
+        self._tell(DrivePhase.NONE)
+        await self.close()
+
+    async def close(self) -> None:
+        """End the graph; a drive that goes on counts for nothing."""
+        if self._is_under_way:
+            self._session.abort('the study was ended', self._state.item)
+        self._state, self._loaded = DriveState(), None
+        graph, self._graph = self._graph, None
+        if self._director is not None:
+            self._director.close()
+            self._director = None
+        if graph is not None:
+            await asyncio.to_thread(graph.end)
+
+    @property
+    def _is_under_way(self) -> bool:
+        return self._state.phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
+
+    def _next(self) -> SessionItem | None:
+        """Give what is driven next, however much is asked before it."""
+        if self._session.next_item is None:
+            return None
+        done = self._session.done
+        return next((item for item in self._session.items
+                     if item.id not in done and settings_of(item) is not None), None)
+
+    def _is_due(self, item: SessionItem) -> bool:
+        now = self._session.next_item
+        return now is not None and now.id == item.id
+
+    async def _conduct(self, item: SessionItem) -> None:
+        """Prepare an item, and drive it once it is its turn and somebody is ready."""
+        drive = await self._prepare(item)
+        self._ready = ''
+        while self._next() is item:
+            due = self._is_due(item)
+            # The page may load its frame while people still answer.
+            self._tell(DrivePhase.READY if due else DrivePhase.NONE, item.id, drive=drive)
+            if due and self._ready == item.id:
+                await self._drive(drive)
+                return
+            await self._wait()
+
+    async def _prepare(self, item: SessionItem) -> StudyDrive:
+        if self._loaded is not None and self._loaded.item.id == item.id:
+            return self._loaded
+        if self._is_due(item):
+            self._tell(DrivePhase.PREPARING, item.id, 'the game is loaded')
+        drive = write_drive(item, self._folder / 'games')
+        assert drive is not None
+        if self._graph is None:
+            director = await self._start_graph(drive)
+        else:
+            director = self._directs()
+            epoch = director.epoch
+            await director.load(drive.game)
+            await self._until(lambda: director.epoch > epoch, LOADS_S, 'the game does not begin')
+        director.watch(drive.seat)
+        await self._until(lambda: director.status.run == 'paused', LOADS_S,
+                          'the simulation does not get ready')
+        self._loaded = drive
+        return drive
+
+    async def _start_graph(self, drive: StudyDrive) -> Director:
+        runs = self._folder / 'runs'
+        number = 1 + max((int(path.name) for path in runs.glob('*') if path.name.isdecimal()),
+                         default=0)
+        graph = self._graph = StudyGraph(drive.game, runs / str(number), self._port, self._more())
+        director = self._director = Director(graph.domain_id)
+        await self._until(lambda: bool(graph.cockpit) and director.game is not None, LOADS_S,
+                          'the simulation does not start')
+        return director
+
+    async def _drive(self, drive: StudyDrive) -> None:
+        """Drive once, from the start to a closed recording."""
+        item, director, session = drive.item, self._directs(), self._session
+        assert self._graph is not None
+        folder = run_folder(self._graph.folder, director.epoch)
+        run = str(folder.relative_to(self._folder))
+        self._loaded, self._abort = None, None
+        asked_at_s = time.time()
+        attempt = session.start(run)
+        self._tell(DrivePhase.COUNTDOWN, item.id, attempt=attempt, drive=drive)
+        await director.start()
+        began_at_s = 0.0
+        disturbance = Disturbance(LOST_S)
+        while director.status.run != 'ended':
+            if director.status.run == 'running' and not began_at_s:
+                began_at_s = time.time()
+                self._tell(DrivePhase.DRIVING, item.id, attempt=attempt, drive=drive)
+            if began_at_s and self._abort is None:
+                self._abort = disturbance.look(director.status.seats_lost.get(drive.seat, False))
+            if self._abort is not None or not self._is_due(item):
+                await self._break_off(item, self._abort)
+                return
+            await self._look()
+        self._tell(DrivePhase.ENDED, item.id, attempt=attempt, drive=drive)
+        told = {'run': run, 'attempt': attempt, 'asked_at': asked_at_s, 'start_at': began_at_s,
+                **outcome_of(director.status, drive.seat, director.time_s)}
+        await self._until(lambda: _is_closed(folder), CLOSES_S, 'the recording is not closed')
+        if isinstance(item.what, PracticeDrives):
+            wanted_s = item.what.practice.seconds
+            told['clean_s'] = clean_s(director.status, drive.seat, director.time_s)
+            session.practised(told['clean_s'] >= wanted_s, **told)
+        else:
+            session.finish(**told)
+        self._tell(DrivePhase.NONE)
+
+    async def _break_off(self, item: SessionItem, reason: str | None) -> None:
+        """End a run that counts for nothing: aborted, or its item was skipped."""
+        director = self._directs()
+        self._session.abort(reason or 'the session went on with something else', item.id)
+        self._tell(DrivePhase.PREPARING, item.id, 'the drive was ended')
+        await director.stop()
+        await self._until(lambda: director.status.run == 'ended', CLOSES_S,
+                          'the run does not end')
+
+    async def _lose(self) -> None:
+        """Take note that the graph is gone; another one is started for the same drive."""
+        graph, words = self._graph, 'it was killed'
+        if graph is not None and not graph.was_killed:
+            words = graph.last_words()
+        item = self._state.item
+        if self._is_under_way:
+            self._session.abort(f'the simulation ended by itself: {words}', item)
+        self._tell(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
+        await self.close()
+        self._tell(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
+        now_s = time.monotonic()
+        self._deaths_s = [at for at in self._deaths_s if now_s - at < DEATHS_S] + [now_s]
+        if len(self._deaths_s) >= MAX_DEATHS:
+            self._deaths_s.clear()
+            self._tell(DrivePhase.FAILED, item, f'the simulation does not start: {words}')
+            await self._wait()
+
+    async def _fail(self, item: SessionItem, text: str) -> None:
+        """Tell the experimenter what keeps an item from being driven, and wait for them."""
+        if self._graph is not None and self._graph.has_ended:
+            await self._lose()
+            return
+        if self._is_under_way:
+            self._session.abort(text, item.id)
+        self._loaded = None
+        self._tell(DrivePhase.FAILED, item.id, text)
+        await self._wait()
+
+    def _directs(self) -> Director:
+        if self._director is None:
+            raise _LostGraphError
+        return self._director
+
+    async def _look(self, pause_s: float = LOOK_S) -> None:
+        """Follow the graph for a moment."""
+        graph, director = self._graph, self._director
+        if graph is not None and director is not None:
+            if graph.has_ended:
+                raise _LostGraphError
+            graph.look()
+            director.poll()
+        await asyncio.sleep(pause_s)
+
+    async def _until(self, condition: Callable[[], bool], patience_s: float, what: str) -> None:
+        until_s = time.monotonic() + patience_s
+        while not condition():
+            if time.monotonic() > until_s:
+                raise CrgameError(f'{what} in {patience_s:g} s')
+            await self._look()
+
+    async def _wait(self) -> None:
+        """Follow the graph until something is new."""
+        self._news.clear()
+        while not self._news.is_set():
+            await self._look()
+
+    def _tell(self, phase: DrivePhase, item: str = '', text: str = '', *, attempt: int = 0,
+              drive: StudyDrive | None = None) -> None:
+        link = '' if drive is None or self._graph is None \
+            else drive.link(self._graph.cockpit, self._language())
+        state = DriveState(phase, item, attempt, link, None, text)
+        if state != self._state:
+            self._state = state
+            for changed in self._changed:
+                changed()
+
+
+def _is_closed(folder: Path) -> bool:
+    bags = bags_of(folder)
+    return bool(bags) and (bags[-1] / METADATA_FILE).is_file()

@@ -1,0 +1,108 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The graph in which participants drive, as a child process with a DDS domain of its own."""
+
+from collections.abc import Sequence
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+from crgame_ros.ros.environment import free_domain_id
+
+_AT = 'the cockpit is at '
+# Recordings are finished within it [s].
+_END_S = 90.0
+
+
+class StudyGraph:
+    """
+    A launcher with its nodes.
+
+    :param game: file that it begins with; later ones may come from the same folder.
+    :param folder: of its runs; is made.
+    :param port: of its cockpit; the next free one where it is taken.
+    :param more: further arguments of the launcher.
+    :ivar domain_id: its `ROS_DOMAIN_ID`.
+    """
+
+    def __init__(self, game: Path, folder: Path, port: int, more: Sequence[str] = ()) -> None:
+        self.folder = folder
+        self.domain_id = free_domain_id()
+        self._log = folder.with_suffix('.log')
+        self._read = 0
+        self._rest = b''
+        self.cockpit = ''
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with self._log.open('wb') as log:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', 'crgame_ros.study.conduct.watched_launcher',
+                 str(os.getpid()), str(game), '--out', str(folder), '--port', str(port),
+                 '--no-report', *more],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain_id)},
+                # Ctrl-C is for the study, which ends the graph when it has ended its drive.
+                start_new_session=True)
+
+    @property
+    def pid(self) -> int:
+        """Give the process id of the launcher."""
+        return self._process.pid
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the launcher has ended, for whatever reason."""
+        return self._process.poll() is not None
+
+    @property
+    def was_killed(self) -> bool:
+        """Whether a signal ended the launcher."""
+        return (self._process.poll() or 0) < 0
+
+    def look(self) -> None:
+        """Read what it has said since: where the cockpit is."""
+        with self._log.open('rb') as log:
+            log.seek(self._read)
+            text = self._rest + log.read()
+            self._read = log.tell()
+        *lines, self._rest = text.split(b'\n')
+        for line in lines:
+            _, found, address = line.decode('utf-8', 'replace').partition(_AT)
+            if found:
+                self.cockpit = address.strip()
+
+    def last_words(self) -> str:
+        """Give its last line that tells of an error, or its last one."""
+        lines = [line for line in self._log.read_text('utf-8', 'replace').splitlines()
+                 if line.strip()]
+        errors = [line for line in lines if 'error' in line.lower() or ' died ' in line]
+        return (errors or lines or ['it said nothing'])[-1].strip()[:300]
+
+    def ask_to_end(self) -> None:
+        """Ask it to end in good order."""
+        if not self.has_ended:
+            self._process.send_signal(signal.SIGINT)
+
+    def end(self) -> None:
+        """End it, and wait until its recordings are finished."""
+        self.ask_to_end()
+        until_s = time.monotonic() + _END_S
+        while not self.has_ended and time.monotonic() < until_s:
+            time.sleep(0.05)
+        if not self.has_ended:
+            self._process.kill()
+        self._process.wait()

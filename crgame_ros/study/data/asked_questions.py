@@ -1,0 +1,121 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Which questions a study asks where, and the columns in which their answers stand."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+import json
+from typing import Any
+
+from crgame_ros.analysis.tables.column import Column
+from crgame_ros.study.data.study_column import (
+    plain_name,
+    question_column,
+    score_columns,
+    unlike,
+)
+from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire
+from crgame_ros.study.session_script import session_of, SessionItem
+from crgame_ros.study.study_file import Questions, StudyFile
+from crgame_ros.study.study_pages import questionnaire_name
+from crgame_ros.study.trial_plan import PlannedTrial
+
+
+@dataclass(frozen=True)
+class AskedScale:
+    """
+    A questionnaire where it is asked.
+
+    :param prefix: of its columns.
+    :param scale: the questionnaire.
+    """
+
+    prefix: str
+    scale: Questionnaire
+
+    def columns(self, language: str) -> list[Column]:
+        """Declare its columns: answers, then scores."""
+        return [*(question_column(question, f'{self.prefix}{question.name}', language)
+                  for question in self.scale.questions),
+                *score_columns(self.scale, self.prefix)]
+
+    def values(self, answers: Mapping[str, Any]) -> dict[str, Any]:
+        """Give the values of its columns."""
+        return {**{f'{self.prefix}{question.name}': plain_answer(answers.get(question.name))
+                   for question in self.scale.questions},
+                **{f'{self.prefix}{name}': value
+                   for name, value in self.scale.score(answers).items()}}
+
+
+class AskedQuestions:
+    """
+    All questionnaires of a study, where they are asked.
+
+    :param study: the study.
+    :ivar after_trials: by the columns' prefix, those that come after trials.
+    :ivar else_where: the same of all others.
+    :raises InputError: if a questionnaire cannot be read.
+    """
+
+    def __init__(self, study: StudyFile) -> None:
+        self.study = study
+        self.after_trials: dict[str, AskedScale] = {}
+        self.else_where: dict[str, AskedScale] = {}
+        self._by_item: dict[str, AskedScale] = {}
+        # All participants answer the same, whatever the order of their trials.
+        for item, step, before in _questions(study):
+            scale = load_questionnaire(questionnaire_name(study, step))
+            place = '' if item.trial is not None else f'{plain_name(_place(item.id))}_'
+            known = self.after_trials if item.trial is not None else self.else_where
+            prefix = f'{place}{scale.name}_'
+            if before:
+                prefix = f'{place}{scale.name}_{before + 1}_'
+            if prefix in known and known[prefix].scale != scale:
+                prefix = unlike(prefix.rstrip('_'), (name.rstrip('_') for name in known)) + '_'
+            self._by_item[item.id] = known.setdefault(prefix, AskedScale(prefix, scale))
+
+    def of(self, item: SessionItem) -> AskedScale | None:
+        """Give the questionnaire of an item; None where none is."""
+        return self._by_item.get(item.id)
+
+    def scales(self) -> list[Questionnaire]:
+        """Give each questionnaire once."""
+        return list({asked.scale.name: asked.scale for asked in self._by_item.values()}.values())
+
+
+def plain_answer(answer: Any) -> Any:
+    """Give an answer as a table's cell: several choices as a JSON array."""
+    return json.dumps(answer, ensure_ascii=False) if isinstance(answer, list) else answer
+
+
+def _place(item: str) -> str:
+    """Name where an item stands, without its number there."""
+    return item.rpartition('/')[0]
+
+
+def _questions(study: StudyFile) -> Iterator[tuple[SessionItem, Questions, int]]:
+    """Give the items with questionnaires, and how often each was asked there before."""
+    seen: dict[tuple[str, str], int] = {}
+    for item in session_of(study, 0):
+        if isinstance(item.what, Questions):
+            place = _place(item.id), item.what.name
+            yield item, item.what, seen.get(place, 0)
+            seen[place] = seen.get(place, 0) + 1
+
+
+def trials_by_number(items: Mapping[str, SessionItem]) -> dict[int, PlannedTrial]:
+    """Give the trials of a session by their numbers."""
+    return {item.what.number: item.what for item in items.values()
+            if isinstance(item.what, PlannedTrial)}

@@ -1,0 +1,173 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A study's events and participants as the Brain Imaging Data Structure has them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+import csv
+import io
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from crgame_ros import __version__
+from crgame_ros.analysis.tables.column import Column, FLAG
+from crgame_ros.errors import InputError
+from crgame_ros.recording.export import prepare_folder, write_text
+from crgame_ros.study.data.participant_record import ParticipantRecord
+from crgame_ros.study.data.session_events_table import EVENTS_OF_SESSIONS
+from crgame_ros.study.data.study_data import StudyData
+
+# https://bids-specification.readthedocs.io/en/v1.10.0/
+VERSION = '1.10.0'
+MISSING = 'n/a'
+ESCAPED = (
+    'Texts are exact: a backslash, tab, newline and carriage return in them are written as '
+    r'\\, \t, \n and \r, and a text that is n/a as n\/a. A field with a double quote '
+    'in it stands between double quotes, those in it doubled.')
+_ESCAPES = {'\\': '\\\\', '\t': '\\t', '\n': '\\n', '\r': '\\r'}
+_WRITTEN = re.compile(r'[\\\t\n\r]')
+_EVENT_COLUMNS = {
+    'onset': ('s', "when it began, since the beginning of the participant's session, on the wall "
+              'clock'),
+    'duration': ('s', 'how long it took; of a trial from its start to the note of its end'),
+    'trial_type': ('', 'what it is, as `kind` in events.csv; a trial that was driven is one '
+                   'event, named trial'),
+    'condition': ('', 'of the trial'),
+    'trial': ('', 'number of the trial among all of the participant'),
+    'attempt': ('', 'at the trial'),
+    'item': ('', 'of the session'),
+    'name': ('', 'of a marker, of a game event, or outcome of the trial'),
+    'value': ('', 'a note, a reason, or what else was told'),
+    'run_time': ('s', "when, on the run's clock")}
+
+
+def write_bids(data: StudyData, out: Path) -> None:
+    """
+    Write the data set: description, participants, events of each, with their sidecars.
+
+    :raises InputError: if the folder cannot be written, or two participants get one label.
+    """
+    labels = _labels(data.records)
+    task = _label(data.folder.study.name) or 'study'
+    prepare_folder(out)
+    _json(out / 'dataset_description.json', {
+        'Name': data.folder.study.title.in_language(data.folder.study.language)
+        or data.folder.study.name, 'BIDSVersion': VERSION, 'DatasetType': 'raw',
+        'GeneratedBy': [{'Name': 'crgame_ros', 'Version': __version__}]})
+    write_text('Events and participants of a study in the driving simulator crgame_ros. The '
+               f'tables that these are made of are in the folder above.\n\n{ESCAPED}\n',
+               out / 'README')
+    people = data.people_table.declaration.columns
+    rows = data.tables['participants'].to_pylist()
+    _tsv(out / 'participants.tsv', ['participant_id', *(column.name for column in people)],
+         [[f'sub-{labels[row["participant"]]}', *(row[column.name] for column in people)]
+          for row in rows])
+    _json(out / 'participants.json', {
+        'participant_id': {'Description': f'label of the participant. {ESCAPED}'},
+        **{column.name: _described(column) for column in people}})
+    events = data.tables['events'].to_pylist()
+    for record in data.records:
+        folder = out / f'sub-{labels[record.id]}' / 'beh'
+        prepare_folder(folder)
+        name = f'sub-{labels[record.id]}_task-{task}_events'
+        mine = [row for row in events if row['participant'] == record.id]
+        _tsv(folder / f'{name}.tsv', list(_EVENT_COLUMNS), list(_events(record, mine)))
+        _json(folder / f'{name}.json', _sidecar())
+
+
+def escaped(value: Any) -> str:
+    """Write a value as a cell: texts with escapes, what is missing as n/a."""
+    if value is None:
+        return MISSING
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, float):
+        return repr(value)
+    text = _WRITTEN.sub(lambda found: _ESCAPES[found[0]], str(value))
+    return 'n\\/a' if text == MISSING else text
+
+
+def _events(record: ParticipantRecord,
+            rows: Sequence[Mapping[str, Any]]) -> Iterator[list[Any]]:
+    """Give the rows: a driven trial with its duration, everything else as a moment."""
+    ends = {(each.item, each.attempt): each for each in record.attempts}
+    for row in rows:
+        attempt = ends.get((row['item'], row['attempt']))
+        onset = row['wall_s'] - record.begun_at
+        kind, name, value = row['kind'], row['name'], row['text']
+        duration: float | None = row['duration_s'] or 0.0
+        if kind in ('trial_finished', 'trial_aborted') and attempt is not None:
+            # It is told where it began.
+            continue
+        if kind == 'trial_started' and attempt is not None:
+            kind = 'trial'
+            duration = None if attempt.ended_at is None \
+                else attempt.ended_at - attempt.started_at
+            name = attempt.says('outcome') or attempt.ending
+            value = attempt.says('reason')
+        yield [onset, duration, kind, None if attempt is None else
+               attempt.trial.condition.name, row['trial'], row['attempt'], row['item'], name,
+               value, row['time_s']]
+
+
+def _sidecar() -> dict[str, Any]:
+    found: dict[str, Any] = {
+        name: {'Description': what} | ({'Units': unit} if unit else {})
+        for name, (unit, what) in _EVENT_COLUMNS.items()}
+    found['value']['Description'] += f'. {ESCAPED}'
+    kind = next(each for each in EVENTS_OF_SESSIONS.columns if each.name == 'kind')
+    found['trial_type']['LongName'] = kind.definition
+    return found
+
+
+def _described(column: Column) -> dict[str, Any]:
+    notes = {'Description': column.definition}
+    if column.variant:
+        notes['Description'] += f'; {column.variant}'
+    if column.unit and column.unit != '1':
+        notes['Units'] = column.unit
+    if column.values or column.type == FLAG:
+        levels = column.values or ('true', 'false')
+        return notes | {'Levels': {value: value for value in levels}}
+    return notes
+
+
+def _label(text: str) -> str:
+    """Give a label as BIDS has them: letters and digits."""
+    return re.sub(r'[^A-Za-z0-9]', '', text)
+
+
+def _labels(records: Sequence[ParticipantRecord]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for record in records:
+        label = _label(record.id)
+        if not label or label in found.values():
+            raise InputError(f'{record.id} has no label of letters and digits of its own',
+                             '--bids', 'name participants by letters and digits')
+        found[record.id] = label
+    return found
+
+
+def _tsv(path: Path, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    stream = io.StringIO(newline='')
+    writer = csv.writer(stream, dialect='excel-tab', lineterminator='\n')
+    writer.writerow(head)
+    writer.writerows([escaped(value) for value in row] for row in rows)
+    write_text(stream.getvalue(), path)
+
+
+def _json(path: Path, content: Mapping[str, Any]) -> None:
+    write_text(json.dumps(content, indent=2, ensure_ascii=False) + '\n', path)

@@ -1,0 +1,135 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Means of conditions and their intervals, corrected for who takes part in all of them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class ConditionMean:
+    """
+    A condition's mean over participants.
+
+    :param condition: name of it.
+    :param mean: of the participants' means.
+    :param half: half of the interval's width; NaN where there is none.
+    :param points: the participants' means, by their ids.
+    """
+
+    condition: str
+    mean: float
+    half: float
+    points: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ConditionMeans:
+    """
+    The means of all conditions.
+
+    :param conditions: in the order of the study.
+    :param within: whether the intervals are those within participants; otherwise each is that
+        of its own participants alone.
+    :param used: ids of whom intervals within participants are of.
+    """
+
+    conditions: tuple[ConditionMean, ...]
+    within: bool
+    used: tuple[str, ...]
+
+
+def condition_means(values: Mapping[tuple[str, str], float],
+                    conditions: Sequence[str]) -> ConditionMeans:
+    """
+    Take the means of conditions over participants, with 95 % intervals.
+
+    Where two participants or more have a value in each condition, means and intervals are those
+    of these participants, the intervals Cousineau's (2005) with Morey's (2008) correction: the
+    values less the participant's mean plus the grand mean, variances times C / (C - 1). Elsewhere
+    they are Student's intervals of each condition by itself.
+
+    :param values: of participants in conditions; NaN and infinite ones count as missing.
+    :param conditions: in their order.
+    """
+    people = sorted({person for person, _ in values})
+    table = np.array([[values.get((person, condition), math.nan) for condition in conditions]
+                      for person in people], dtype=np.float64).reshape(len(people),
+                                                                       len(conditions))
+    table[~np.isfinite(table)] = math.nan
+    whole = np.asarray(~np.isnan(table).any(axis=1))
+    within = len(conditions) > 1 and int(whole.sum()) >= 2
+    used = tuple(person for person, has in zip(people, whole.tolist(), strict=True) if has) \
+        if within else ()
+    halves = within_halves(table[whole]) if within else [
+        _half(column[~np.isnan(column)]) for column in table.T]
+    return ConditionMeans(tuple(ConditionMean(
+        condition, _mean(table[whole, place] if within else table[:, place]), float(half),
+        {person: float(value) for person, value in zip(people, table[:, place], strict=True)
+         if not math.isnan(value)})
+        for place, (condition, half) in enumerate(zip(conditions, halves, strict=True))),
+        within, used)
+
+
+def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    Give half of the widths of the 95 % intervals within participants.
+
+    :param table: (N, C) of N >= 2 participants in C >= 2 conditions, without gaps.
+    :return: (C)
+    """
+    people, conditions = table.shape
+    normed = table - table.mean(axis=1, keepdims=True) + table.mean()
+    variances = normed.var(axis=0, ddof=1) * conditions / (conditions - 1)
+    return np.asarray(_t(people - 1) * np.sqrt(variances / people))
+
+
+def participant_means(rows: Iterable[Mapping[str, Any]],
+                      column: str) -> dict[tuple[str, str], float]:
+    """
+    Take the mean of a column of each participant in each condition, over repetitions.
+
+    :param rows: of the table of trials; what is missing or infinite is left out.
+    """
+    found: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        value = row.get(column)
+        if value is not None and math.isfinite(value):
+            found.setdefault((row['participant'], row['condition']), []).append(float(value))
+    return {key: sum(values) / len(values) for key, values in found.items()}
+
+
+def _half(values: NDArray[np.float64]) -> float:
+    count = len(values)
+    return math.nan if count < 2 else float(
+        _t(count - 1) * values.std(ddof=1) / math.sqrt(count))
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _t(freedom: int) -> float:
+    # It takes a while to load.
+    from scipy.stats import t
+    return float(t.ppf(0.5 + LEVEL / 2.0, freedom))

@@ -1,0 +1,65 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The folder of a study that is going on or over: its file, its participants, its data."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.study.data.participant_record import ParticipantRecord, read_participant
+from crgame_ros.study.study_file import load_study, StudyFile
+
+STUDY, PARTICIPANTS, DATA = 'study', 'participants', 'data'
+
+
+class ConductedStudy:
+    """
+    A study's folder, as `crgame study run` makes it.
+
+    :param path: of the folder.
+    :ivar study_path: of the copied study file.
+    :raises InputError: if it holds no study.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.study_path = path / STUDY / 'study.yaml'
+        if not self.study_path.is_file():
+            raise InputError('holds no study' if path.exists() else 'there is no such folder',
+                             str(path), 'name the folder that `crgame study run` has made')
+        self.study: StudyFile = load_study(self.study_path)
+
+    @property
+    def data(self) -> Path:
+        """Give the folder of what has been found."""
+        return self.path / DATA
+
+    def participants(self) -> list[ParticipantRecord]:
+        """
+        Read the journals of all who have begun, in the order of their names.
+
+        :raises InputError: if somebody began another study.
+        """
+        return list(self._participants())
+
+    def relative(self, path: Path) -> str:
+        """Write a file's name as the tables do, from the study's folder on."""
+        return path.relative_to(self.path).as_posix()
+
+    def _participants(self) -> Iterator[ParticipantRecord]:
+        folder = self.path / PARTICIPANTS
+        for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+            if path.is_dir() and (found := read_participant(self.study, path)) is not None:
+                yield found

@@ -1,0 +1,150 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""All tables of a run, measured once and kept by what its recording holds."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+import hashlib
+import json
+import math
+import os
+from pathlib import Path
+import shutil
+from typing import Any
+
+from crgame_ros.analysis.behaviour.task_events import task_events
+from crgame_ros.analysis.tables.recorded_run import tabulated_runs
+from crgame_ros.analysis.tables.run_tables import tables_of
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.source_digest import engine_digest
+from crgame_ros.recording.run_folder import bags_of
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+SUMMARY = 'run.json'
+_PIECE = 1 << 20
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """
+    A run whose tables are kept.
+
+    :param key: of everything that they depend on.
+    :param folder: in which they are.
+    :param summary: what else is told of it: humans, planners, seed, drivers with input delays,
+        the events of tasks.
+    """
+
+    key: str
+    folder: Path
+    summary: Mapping[str, Any]
+
+    def table(self, name: str) -> pa.Table:
+        """Read one of its tables."""
+        return pq.read_table(self.folder / f'{name}.parquet')
+
+    def row(self, name: str, **equal: Any) -> dict[str, Any]:
+        """Give the first row of a table with such values; empty without one."""
+        for row in self.table(name).to_pylist():
+            if all(row[column] == value for column, value in equal.items()):
+                return dict(row)
+        return {}
+
+
+class MeasuredRuns:
+    """
+    Measures runs, and keeps what came out.
+
+    :param folder: that keeps it; is made.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._used: set[str] = set()
+
+    def measured(self, run: Path, name: str,
+                 progress: Callable[[str, float], object]) -> MeasuredRun:
+        """
+        Give a run's tables; they are computed if nobody has before.
+
+        :param run: folder of the run, complete.
+        :param name: of it in the tables.
+        :raises InputError: if it cannot be measured, or nothing can be written.
+        """
+        key = _key(run, name)
+        self._used.add(key)
+        folder = self._folder / key
+        if not (folder / SUMMARY).exists():
+            self._measure(run, name, folder, progress)
+        return MeasuredRun(key, folder, json.loads((folder / SUMMARY).read_text('utf-8')))
+
+    def forget_others(self) -> None:
+        """Remove what no run of the study has asked for, and what a killed process left."""
+        for path in self._folder.iterdir() if self._folder.is_dir() else ():
+            if path.name not in self._used:
+                shutil.rmtree(path, ignore_errors=True)
+
+    def _measure(self, run: Path, name: str, folder: Path,
+                 progress: Callable[[str, float], object]) -> None:
+        tabulated = next(tabulated_runs([run], None, progress))
+        tabulated.id = name
+        tables = tables_of([tabulated])
+        part = folder.with_name(f'.{folder.name}.{os.getpid()}.part')
+        try:
+            shutil.rmtree(part, ignore_errors=True)
+            part.mkdir(parents=True)
+            for table, rows in tables.items():
+                pq.write_table(rows, part / f'{table}.parquet', compression='zstd')
+            text = json.dumps(_summary(tabulated), indent=1, ensure_ascii=False)
+            (part / SUMMARY).write_text(text + '\n', encoding='utf-8')
+            shutil.rmtree(folder, ignore_errors=True)
+            part.rename(folder)
+        except OSError as error:
+            raise InputError(f'cannot be written ({error.strerror})', str(self._folder),
+                             'make room, or make the folder writable') from error
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+
+
+def _summary(run: TabulatedRun) -> dict[str, Any]:
+    game = run.record.log.game
+    return {
+        'benchmark_id': game.benchmark_id, 'seed': game.seed, 'epoch': game.epoch,
+        'humans': {item.id: item.driver for item in game.humans},
+        'planners': {item.id: item.planner for item in game.avs},
+        'input_delay_ms': {item.spell.seat: item.input_delay_ms for item in run.record.drivers},
+        'tasks': [{
+            'kind': str(each.kind), 'what': each.what, 'name': each.name, 'seat': each.seat,
+            'outcome': each.outcome, 'onset_s': each.onset_s,
+            'duration_s': _known(each.duration_s),
+            'response_time_s': _known(each.response_time_s)} for each in task_events(run.record)]}
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _key(run: Path, name: str) -> str:
+    """Hash what a run's tables depend on: the recording, and the code that measures it."""
+    digest = hashlib.sha256(f'{engine_digest()}\n{name}\n'.encode())
+    for bag in bags_of(run):
+        for file in sorted(bag.iterdir()):
+            digest.update(f'{bag.name}/{file.name}\n'.encode())
+            with file.open('rb') as stream:
+                while piece := stream.read(_PIECE):
+                    digest.update(piece)
+    return digest.hexdigest()[:32]

@@ -1,0 +1,91 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a paper has to say of a study, put together."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from crgame_ros.analysis.report.report_text import free, note, number, plain, table
+from crgame_ros.study.data.provenance import provenance_of
+from crgame_ros.study.data.study_data import StudyData
+from crgame_ros.study.data.trials_table import measure_columns
+
+_VIEWS = {'driver': "from the driver's seat", 'chase': 'from behind the vehicle',
+          'map': 'from above, on the map', 'bird': 'from above'}
+
+
+def paper_section(data: StudyData) -> str:
+    """Say which software and machine, delays, views, reference points and questionnaires."""
+    told = provenance_of(data)
+    html = note('The same stands in <code>provenance.json</code>, with the SHA-256 of every file '
+                'of the study, and the definition of every column in '
+                '<code>datapackage.json</code>.')
+    html += table('Study', (), list(_study(data, told)), 'facts paper')
+    software = told['data_written_by']
+    html += table('Software and machine that measured', (), [
+        (plain(name), free(value or 'unknown')) for name, value in software.items()],
+        'facts paper')
+    html += table('Delays, medians of each trial', (
+        '', 'least [ms]', 'median [ms]', 'greatest [ms]', 'trials'),
+        [_delay(words, told['delays_s'][name]) for name, words in (
+            ('input_delay_s', 'from the hand to the picture'),
+            ('link_delay_s', 'of the link between page and simulation'))], 'numbers')
+    html += table('Reference points', (), [
+        (plain(what[:1].upper() + what[1:]), plain(point))
+        for what, point in told['reference_points'].items()], 'facts paper')
+    if told['questionnaires']:
+        html += table('Questionnaires', ('', 'title', 'source', 'scores'), [
+            (free(scale['name']), free(scale['title']), free(scale['citation'] or 'of the study'),
+             free(', '.join(score['name'] for score in scale['scores'])))
+            for scale in told['questionnaires']], 'paper')
+    return html + _definitions()
+
+
+def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
+    study = data.folder.study
+    yield 'File', f'<code>{plain(told["file"])}</code>, SHA-256 ' \
+        f'<code>{plain(told["files"][told["file"]][:16])}…</code>'
+    yield 'Seed of the orders', plain(study.seed)
+    yield 'Seeds of the drives', plain(', '.join(map(str, told['random_seeds'])) or 'none yet')
+    for block in study.blocks:
+        order = 'given sequences' if block.sequences else block.order
+        factors = ' × '.join(f'{factor.name} ({len(factor.levels)})'
+                             for factor in study.factors_of(block)) or 'one condition'
+        yield f'Block {free(block.name)}', free(
+            f'{factors}, {block.repetitions} times each, order: {order}')
+    views = dict.fromkeys(str(settings.get('view')) for settings in told['conditions'].values())
+    yield 'View at the start', ', '.join(plain(_VIEWS.get(view, view)) for view in views)
+    yield 'Geometry of the view', ('eyes, field of view and mirrors: docs/driver_view.md and the '
+                                   'vehicle’s file; add width of the screen and distance of the '
+                                   'eyes from it')
+    if told['view']['recorded']:
+        yield 'Views as recorded', free(told['view']['recorded'])
+
+
+def _delay(words: str, spread: Mapping[str, float] | None) -> Sequence[str]:
+    if spread is None:
+        return (plain(words), 'not measured', '', '', '0')
+    return (plain(words), *(number(1e3 * spread[key], 1) for key in ('min', 'median', 'max')),
+            str(spread['of']))
+
+
+def _definitions() -> str:
+    """Define the measures, as the dictionary does."""
+    rows = [(f'<code>{plain(column.name)}</code>', plain(column.unit), plain(column.definition),
+             plain(column.reference_point), plain(column.variant))
+            for column in measure_columns().values()]
+    return ('<details class="file"><summary>Definitions of the measures of driving</summary>'
+            + table('Measures of the participant’s vehicle', (
+                'column', 'unit', 'what', 'of', 'variant'), rows, 'definitions') + '</details>')

@@ -1,0 +1,234 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a participant's journal tells: which attempts were driven, which count, what was said."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from crgame_ros.errors import InputError
+from crgame_ros.study.participant_session import SessionEvent
+from crgame_ros.study.session_journal import read_journal
+from crgame_ros.study.session_script import session_of, SessionItem
+from crgame_ros.study.study_file import StudyFile
+from crgame_ros.study.trial_plan import PlannedTrial
+
+Ending = Literal['finished', 'aborted', 'lost', 'open']
+
+
+@dataclass(frozen=True)
+class TrialAttempt:
+    """
+    A trial that was started.
+
+    :param item: id of it in the session.
+    :param trial: that it is.
+    :param attempt: at it, from 1 on.
+    :param folder: of its recording; None where the journal names none.
+    :param started_at: wall clock [s since 1970]
+    :param ended_at: likewise; None without an end.
+    :param ending: `lost` has no end, but something came after it.
+    :param told: what the entry of its end says.
+    """
+
+    item: str
+    trial: PlannedTrial
+    attempt: int
+    folder: Path | None
+    started_at: float
+    ended_at: float | None = None
+    ending: Ending = 'open'
+    told: Mapping[str, Any] | None = None
+
+    def says(self, key: str) -> Any:
+        """Give what the entry of its end says under a key; None if nothing."""
+        return None if self.told is None else self.told.get(key)
+
+
+@dataclass(frozen=True)
+class AnsweredItem:
+    """
+    Questions that were answered, for the last time.
+
+    :param item: of the session.
+    :param answers: by question.
+    :param at: wall clock [s since 1970]
+    :param attempt: at the trial before it that had finished last; None elsewhere.
+    """
+
+    item: SessionItem
+    answers: Mapping[str, Any]
+    at: float
+    attempt: int | None
+
+
+@dataclass(frozen=True)
+class ParticipantRecord:
+    """
+    A participant's journal, read.
+
+    :param id: anonymous.
+    :param place: among all participants, from 0 on.
+    :param folder: of the participant.
+    :param items: of the session.
+    :param entries: of the journal.
+    """
+
+    id: str  # noqa: A003
+    place: int
+    folder: Path
+    items: Mapping[str, SessionItem]
+    entries: tuple[Mapping[str, Any], ...]
+
+    @cached_property
+    def attempts(self) -> tuple[TrialAttempt, ...]:
+        """Give all attempts at trials, in their order."""
+        return tuple(self._attempts())
+
+    @cached_property
+    def counted(self) -> dict[str, TrialAttempt]:
+        """
+        Give the attempts that count, by item: the last that finished.
+
+        One that was left out in the end does not count, whatever was driven of it before.
+        """
+        found = {each.item: each for each in self.attempts if each.ending == 'finished'}
+        for entry in self.entries:
+            if entry['entry'] == SessionEvent.SKIPPED:
+                last = found.get(entry.get('item', ''))
+                if last is not None and (last.ended_at or 0.0) <= entry['at']:
+                    del found[last.item]
+        return dict(sorted(found.items(), key=lambda each: each[1].trial.number))
+
+    @cached_property
+    def to_repeat(self) -> frozenset[str]:
+        """Name the items that are to be driven again and have not been yet."""
+        found: set[str] = set()
+        for entry in self.entries:
+            if entry['entry'] == SessionEvent.REPEATED:
+                found.add(entry['item'])
+            elif entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
+                found.discard(entry['item'])
+        return frozenset(found)
+
+    @cached_property
+    def answered(self) -> tuple[AnsweredItem, ...]:
+        """Give what was answered, each item's last answers, in the order of the session."""
+        found: dict[str, AnsweredItem] = {}
+        driven: dict[int, int] = {}
+        numbers = {each.item: each for each in self.attempts if each.ending == 'finished'}
+        for entry in self.entries:
+            item = self.items.get(entry.get('item', ''))
+            if entry['entry'] != SessionEvent.FINISHED or item is None:
+                continue
+            if item.id in numbers and isinstance(item.what, PlannedTrial):
+                driven[item.what.number] = self._attempt_of(entry, item.id)
+            elif entry.get('answers'):
+                attempt = None if item.trial is None else driven.get(item.trial)
+                found[item.id] = AnsweredItem(item, entry['answers'], entry['at'], attempt)
+        return tuple(found[name] for name in self.items if name in found)
+
+    @property
+    def begun_at(self) -> float:
+        """Give when the session began [s since 1970]."""
+        return float(self.entries[0]['at'])
+
+    @property
+    def ended_at(self) -> float:
+        """Give when the last entry was made [s since 1970]."""
+        return float(self.entries[-1]['at'])
+
+    @property
+    def complete(self) -> bool:
+        """Tell whether every item is finished or left out."""
+        done: set[str] = set()
+        for entry in self.entries:
+            if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
+                done.add(entry['item'])
+            elif entry['entry'] == SessionEvent.REPEATED:
+                done.discard(entry['item'])
+        return done >= self.items.keys()
+
+    @property
+    def language(self) -> str | None:
+        """Give the language that the participant chose last; None where nobody told."""
+        return next((entry['language'] for entry in reversed(self.entries)
+                     if isinstance(entry.get('language'), str)), None)
+
+    def _attempt_of(self, entry: Mapping[str, Any], item: str) -> int:
+        told = entry.get('attempt')
+        before = [each for each in self.attempts if each.item == item and
+                  each.started_at <= entry['at']]
+        return told if isinstance(told, int) else before[-1].attempt if before else 1
+
+    def _attempts(self) -> Iterator[TrialAttempt]:
+        openly: TrialAttempt | None = None
+        for entry in self.entries:
+            item = self.items.get(entry.get('item', ''))
+            if item is None or not isinstance(item.what, PlannedTrial):
+                continue
+            kind = entry['entry']
+            if kind == SessionEvent.STARTED:
+                if openly is not None:
+                    yield _ended(openly, 'lost', None, None)
+                openly = TrialAttempt(item.id, item.what, int(entry.get('attempt', 1)),
+                                      self._run(entry), float(entry['at']))
+            elif openly is not None and openly.item == item.id and kind in (
+                    SessionEvent.FINISHED, SessionEvent.ABORTED):
+                folder = self._run(entry) or openly.folder
+                yield _ended(openly, 'finished' if kind == SessionEvent.FINISHED else 'aborted',
+                             entry, folder)
+                openly = None
+        if openly is not None:
+            yield openly
+
+    def _run(self, entry: Mapping[str, Any]) -> Path | None:
+        """Give the folder of a recording, if it is one of the participant's."""
+        name = entry.get('run')
+        if not isinstance(name, str) or not name or '..' in Path(name).parts \
+                or Path(name).is_absolute():
+            return None
+        return self.folder / name
+
+
+def _ended(attempt: TrialAttempt, ending: Ending, entry: Mapping[str, Any] | None,
+           folder: Path | None) -> TrialAttempt:
+    return TrialAttempt(attempt.item, attempt.trial, attempt.attempt, folder or attempt.folder,
+                        attempt.started_at, None if entry is None else float(entry['at']), ending,
+                        entry)
+
+
+def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None:
+    """
+    Read a participant's journal, also while the session goes on.
+
+    :return: None of one that has not begun.
+    :raises InputError: if it is of another study.
+    """
+    entries = tuple(entry for entry in read_journal(folder)
+                    if isinstance(entry.get('entry'), str)
+                    and isinstance(entry.get('at'), int | float))
+    begun = next((entry for entry in entries if entry['entry'] == SessionEvent.BEGUN), None)
+    if begun is None:
+        return None
+    place = begun.get('place')
+    items = session_of(study, place) if isinstance(place, int) and place >= 0 else ()
+    if [item.id for item in items] != begun.get('items'):
+        raise InputError('began with another plan than that of the study file', str(folder),
+                         'put back the study file that the sessions were run with')
+    return ParticipantRecord(str(begun.get('participant') or folder.name), int(place or 0), folder,
+                             {item.id: item for item in items}, entries)

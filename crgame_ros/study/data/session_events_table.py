@@ -1,0 +1,143 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The table of events: everything that happened in sessions, on both clocks."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
+from crgame_ros.study.data.measured_run import MeasuredRun
+from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.trials_table import PARTICIPANT, utc, WALL
+from crgame_ros.study.participant_session import SessionEvent
+from crgame_ros.study.session_script import PracticeDrives, SessionItem
+from crgame_ros.study.trial_plan import PlannedTrial
+
+# Entries of the journal that have other names here, and those that say of what they are.
+_OF_SESSION = {SessionEvent.BEGUN: 'session_begun', SessionEvent.ENDED: 'session_ended'}
+_OF_ITEM = (SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
+            SessionEvent.SKIPPED, SessionEvent.REPEATED)
+GAME_EVENT = 'game_event'
+EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
+    'participant', 'number'), (
+        PARTICIPANT, Column('number', INTEGER, '1', 'among those of the participant, from 1 on, '
+                            'in the order of the wall clock'),
+        Column('kind', TEXT, '', 'what it is: of the journal, or game_event and what tasks tell'),
+        Column('item', TEXT, '', 'of the session', empty='it is of none'),
+        Column('trial', INTEGER, '1', 'during which, or of which, it was', empty='of none'),
+        Column('attempt', INTEGER, '1', 'at the trial', empty='of none'),
+        Column('name', TEXT, '', 'of a marker, a game event, a task or an outcome',
+               empty='it has none'),
+        Column('text', TEXT, '', 'a reason, a note, outcome of a task, or what else was told',
+               empty='nothing was'),
+        Column('time_s', NUMBER, 's', "when, on the run's clock", empty='no run went on'),
+        Column('duration_s', NUMBER, 's', 'how long what a task did lasted',
+               empty='it is no event of a task'),
+        Column('response_time_s', NUMBER, 's', 'of an event of a task, as task_events has it',
+               empty='there was no response, or it is no event of a task'),
+        Column('wall_s', NUMBER, 's', 'when', variant=f'{WALL}; of events of a run it is when '
+               "the trial's drive began plus the run's clock, without pauses",
+               empty='only the clock of the run is known'),
+        Column('wall', TEXT, '', 'when, ISO 8601, UTC', empty='likewise'),
+        Column('recording', TEXT, '', "folder of the run, from the participant's on",
+               empty='no run went on')))
+
+
+def event_rows(record: ParticipantRecord,
+               runs: Mapping[str, MeasuredRun]) -> list[dict[str, Any]]:
+    """
+    Give everything that happened in a participant's session.
+
+    :param runs: measures of the trials that count, by item.
+    """
+    rows = list(_of_journal(record))
+    for item, run in runs.items():
+        rows += _of_run(record.counted[item], run, record)
+    # Equal times stay in the order of the journal.
+    rows.sort(key=lambda row: row['wall_s'])
+    for number, row in enumerate(rows, 1):
+        row |= {'participant': record.id, 'number': number, 'wall': utc(row['wall_s'])}
+    return rows
+
+
+def _of_journal(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
+    attempts = {(each.item, each.attempt): each for each in record.attempts}
+    running: TrialAttempt | None = None
+    for entry in record.entries:
+        kind, item = entry['entry'], record.items.get(entry.get('item', ''))
+        driven = item is not None and isinstance(item.what, PlannedTrial)
+        row = {'kind': _kind(kind, item),
+               'item': None if item is None else item.id, 'wall_s': float(entry['at']),
+               'name': _text(entry, 'name') or _text(entry, 'outcome'),
+               'text': _text(entry, 'text') or _text(entry, 'reason'),
+               'recording': _text(entry, 'run'), 'time_s': _number(entry, 'time_s')}
+        if driven and item is not None and isinstance(item.what, PlannedTrial):
+            row['trial'] = item.what.number
+            if kind == SessionEvent.STARTED:
+                running = attempts.get((item.id, int(entry.get('attempt', 1))))
+            row['attempt'] = running.attempt if running and running.item == item.id else None
+            if kind == SessionEvent.FINISHED:
+                row['time_s'] = _number(entry, 'end_time_s')
+        elif item is not None:
+            row['trial'] = item.trial
+        elif running is not None and kind in (SessionEvent.NOTE, SessionEvent.MARKER):
+            row |= {'trial': running.trial.number, 'attempt': running.attempt,
+                    'item': running.item}
+        yield row
+        if driven and kind in (SessionEvent.FINISHED, SessionEvent.ABORTED, SessionEvent.SKIPPED):
+            running = None
+
+
+def _kind(kind: str, item: SessionItem | None) -> str:
+    """Name an entry of the journal: trial_finished, practice_started, item_skipped, note."""
+    if item is None or kind not in _OF_ITEM:
+        return _OF_SESSION.get(SessionEvent(kind), kind) if kind in set(SessionEvent) else kind
+    what = 'trial' if isinstance(item.what, PlannedTrial) else \
+        'practice' if isinstance(item.what, PracticeDrives) else 'item'
+    return f'{what}_{kind}'
+
+
+def _of_run(attempt: TrialAttempt, run: MeasuredRun,
+            record: ParticipantRecord) -> Iterator[dict[str, Any]]:
+    start_s = drive_start_s(attempt)
+    folder = None if attempt.folder is None else attempt.folder.relative_to(
+        record.folder).as_posix()
+    of_trial = {'item': attempt.item, 'trial': attempt.trial.number, 'attempt': attempt.attempt,
+                'recording': folder}
+    for event in run.table('events').to_pylist():
+        yield of_trial | {'kind': GAME_EVENT, 'name': event['name'], 'text': event['label'],
+                          'time_s': event['time_s'], 'wall_s': start_s + event['time_s']}
+    for task in run.summary['tasks']:
+        yield of_trial | {'kind': f'{task["kind"]}_{task["what"]}', 'name': task['name'],
+                          'text': task['outcome'], 'time_s': task['onset_s'],
+                          'duration_s': task['duration_s'],
+                          'response_time_s': task['response_time_s'],
+                          'wall_s': start_s + task['onset_s']}
+
+
+def drive_start_s(attempt: TrialAttempt) -> float:
+    """Give when the run's clock began [s since 1970]."""
+    told = attempt.says('start_at')
+    return float(told) if isinstance(told, int | float) and told else attempt.started_at
+
+
+def _text(entry: Mapping[str, Any], key: str) -> str | None:
+    value = entry.get(key)
+    return value if isinstance(value, str) and value else None
+
+
+def _number(entry: Mapping[str, Any], key: str) -> float | None:
+    value = entry.get(key)
+    return float(value) if isinstance(value, int | float) else None

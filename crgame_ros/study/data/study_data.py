@@ -1,0 +1,143 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a study has found, so far: its tables, written again and again while it goes on."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.errors import CrgameError
+from crgame_ros.study.data.answers_table import answer_rows, ANSWERS
+from crgame_ros.study.data.asked_questions import AskedQuestions, trials_by_number
+from crgame_ros.study.data.conducted_study import ConductedStudy
+from crgame_ros.study.data.measured_run import MeasuredRun, MeasuredRuns
+from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.participants_table import ParticipantsTable
+from crgame_ros.study.data.run_finishing import finished_recording
+from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
+from crgame_ros.study.data.study_row_table import table_of_rows
+from crgame_ros.study.data.trials_table import TrialsTable
+import pyarrow as pa
+
+KEPT = '.runs'
+
+
+@dataclass
+class CountedTrial:
+    """
+    A trial that counts.
+
+    :param record: of who drove it.
+    :param attempt: that counts.
+    :param run: its measures; None where there are none.
+    :param row: of it in the table of trials.
+    """
+
+    record: ParticipantRecord
+    attempt: TrialAttempt
+    run: MeasuredRun | None
+    row: dict[str, Any]
+
+
+@dataclass
+class StudyData:
+    """
+    A study's data, read and measured.
+
+    :param folder: of the study.
+    :param asked: its questionnaires.
+    :param trials_table: how trials become rows.
+    :param people_table: how participants do.
+    :param records: of all participants.
+    :param trials: that count, in the order of participants and trials.
+    :param tables: by name: trials, participants, answers, events.
+    """
+
+    folder: ConductedStudy
+    asked: AskedQuestions
+    trials_table: TrialsTable
+    people_table: ParticipantsTable
+    records: list[ParticipantRecord]
+    trials: list[CountedTrial] = field(default_factory=list)
+    tables: dict[str, pa.Table] = field(default_factory=dict)
+
+    @property
+    def declarations(self) -> tuple[TableDeclaration, ...]:
+        """Give the declarations of the tables, in their order."""
+        return (self.trials_table.declaration, self.people_table.declaration, ANSWERS,
+                EVENTS_OF_SESSIONS)
+
+    @property
+    def problems(self) -> list[str]:
+        """Say which trials have no measures, and why."""
+        return [f'{each.record.id}, trial {each.attempt.trial.number}: {each.row["problem"]}'
+                for each in self.trials if each.row['problem']]
+
+
+def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
+                    progress: Callable[[str, float], object] = lambda _what, _share: None,
+                    ) -> StudyData:
+    """
+    Read what a study has found; runs that were not measured before are.
+
+    :param say: takes one line for people.
+    :param progress: is told what is under way, and how much of it is done, 0 to 1.
+    :raises InputError: if the study cannot be read, or its folder not be written.
+    """
+    asked = AskedQuestions(folder.study)
+    records = folder.participants()
+    people = ParticipantsTable(folder.study, asked)
+    data = StudyData(folder, asked, TrialsTable(folder, asked), people, records)
+    runs = MeasuredRuns(folder.data / KEPT)
+    events: list[dict[str, Any]] = []
+    for record in records:
+        measured: dict[str, MeasuredRun] = {}
+        for item, attempt in record.counted.items():
+            run, problem = _run(folder, record, attempt, runs, say, progress)
+            if run is not None:
+                measured[item] = run
+            data.trials.append(CountedTrial(record, attempt, run, data.trials_table.row(
+                record, attempt, run, problem)))
+        events += event_rows(record, measured)
+    runs.forget_others()
+    data.tables = {
+        'trials': table_of_rows(data.trials_table.declaration, (each.row for each in data.trials)),
+        'participants': table_of_rows(people.declaration, (
+            people.row(record, len(trials_by_number(record.items))) for record in records)),
+        'answers': table_of_rows(ANSWERS, _answers(data)),
+        'events': table_of_rows(EVENTS_OF_SESSIONS, events)}
+    return data
+
+
+def _answers(data: StudyData) -> Iterator[dict[str, Any]]:
+    for record in data.records:
+        yield from answer_rows(record, data.asked)
+
+
+def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttempt,
+         runs: MeasuredRuns, say: Callable[[str], object],
+         progress: Callable[[str, float], object]) -> tuple[MeasuredRun | None, str]:
+    """Measure a trial's run; or say why it cannot be."""
+    if attempt.folder is None:
+        return None, 'the journal names no recording'
+    problem = finished_recording(attempt.folder, record.folder, say)
+    if problem:
+        return None, problem
+    name = f'{record.id}/{attempt.folder.relative_to(record.folder).as_posix()}'
+    try:
+        return runs.measured(attempt.folder, name, progress), ''
+    except CrgameError as error:
+        return None, str(error)

@@ -1,0 +1,129 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The commands `crgame study data`, `report` and `rerun`: what a study has found."""
+
+import argparse
+from pathlib import Path
+import sys
+from typing import Any, TYPE_CHECKING
+
+if TYPE_CHECKING:  # Other commands do not wait for it.
+    from crgame_ros.study.data.study_data import StudyData
+
+
+def add_data_arguments(what: Any) -> None:
+    """
+    Declare the commands.
+
+    :param what: of `crgame study`, which takes them.
+    """
+    data = what.add_parser('data', help='write the tables of what the study has found so far')
+    data.add_argument('folder', type=Path, help='of the study')
+    data.add_argument('--bids', action='store_true',
+                      help='events and participants as BIDS has them, too')
+    data.set_defaults(command=data_command)
+    report = what.add_parser('report', help='write one HTML file about the study')
+    report.add_argument('folder', type=Path, help='of the study')
+    report.add_argument('--out', type=Path, metavar='FILE.html',
+                        help='file to write (default: data/report.html in the folder)')
+    report.set_defaults(command=report_command)
+    rerun = what.add_parser('rerun', help='the recorded people against another planner')
+    rerun.add_argument('folder', type=Path, help='of the study')
+    rerun.add_argument('--planner', action='append', required=True, metavar='NAME',
+                       help='planner of all AVs, or FILE.py:Class; may be repeated')
+    rerun.add_argument('--out', type=Path, metavar='DIR', help='folder of the evaluation '
+                       '(default: data/rerun in the folder)')
+    rerun.add_argument('--workers', type=int, metavar='N',
+                       help='processes (default: one for each processor)')
+    rerun.set_defaults(command=rerun_command)
+
+
+def data_command(values: argparse.Namespace) -> int:
+    """
+    Write the tables.
+
+    :raises InputError: if the folder holds no study, or cannot be written.
+    """
+    from crgame_ros.study.data.conducted_study import ConductedStudy
+    from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
+    folder = ConductedStudy(values.folder)
+    with only_writer(folder.data):
+        data = _read(folder)
+        rows = write_study_data(data)
+        if values.bids:
+            from crgame_ros.study.data.bids_folder import write_bids
+            write_bids(data, folder.data / 'bids')
+    width = max(map(len, rows))
+    for name, count in rows.items():
+        print(f'{name:<{width}} {count:>9} rows')
+    print(folder.data)
+    return 0
+
+
+def report_command(values: argparse.Namespace) -> int:
+    """
+    Write the report.
+
+    :raises InputError: if the folder holds no study, or the file cannot be written.
+    """
+    from crgame_ros.analysis.report.report_file import check_report_path
+    from crgame_ros.study.data.conducted_study import ConductedStudy
+    from crgame_ros.study.data.study_data_folder import only_writer
+    from crgame_ros.study.data.study_report import write_study_report
+    folder = ConductedStudy(values.folder)
+    with only_writer(folder.data):
+        out = values.out or folder.data / 'report.html'
+        check_report_path(out)
+        write_study_report(_read(folder), out)
+    print(out)
+    return 0
+
+
+def rerun_command(values: argparse.Namespace) -> int:
+    """
+    Let recorded people drive again, against other planners.
+
+    :raises InputError: if nothing can be repeated, or a planner is none.
+    """
+    from crgame_ros.study.data.conducted_study import ConductedStudy
+    from crgame_ros.study.data.study_data_folder import only_writer
+    from crgame_ros.study.data.study_rerun import rerun_study
+    folder = ConductedStudy(values.folder)
+    with only_writer(folder.data):
+        data = _read(folder)
+        out = values.out or folder.data / 'rerun'
+        told = rerun_study(data, values.planner, out, values.workers, _say)
+    print('\n'.join(told))
+    print(out)
+    return 0
+
+
+def _read(folder: Any) -> 'StudyData':
+    from crgame_ros.recording.progress import Progress
+    from crgame_ros.study.data.study_data import read_study_data
+    progress = Progress(_say, '')
+
+    def tell(what: str, share: float) -> None:
+        progress.what = what
+        progress(share)
+
+    data = read_study_data(folder, _say, tell)
+    for problem in data.problems:
+        _say(f'note: {problem}')
+    return data
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

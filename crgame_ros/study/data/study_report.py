@@ -1,0 +1,154 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The report of a study: one HTML file, for people and for papers."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.analysis.report.report_document import plain_document
+from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain, table
+from crgame_ros.recording.export import write_text
+from crgame_ros.study.data.condition_section import condition_section
+from crgame_ros.study.data.paper_section import paper_section
+from crgame_ros.study.data.study_data import CountedTrial, StudyData
+from crgame_ros.study.data.timing_quality import bounds_told
+
+_STYLE = Path(__file__).resolve().parent / 'page' / 'study.css'
+_TROUBLES = {
+    'trial_aborted': 'trial aborted', 'trial_skipped': 'trial left out',
+    'trial_repeated': 'trial repeated', 'practice_skipped': 'practice left out',
+    'practice_aborted': 'practice aborted', 'item_skipped': 'left out',
+    'item_repeated': 'asked again', 'session_ended': 'session ended early'}
+_TIMES = (('max_cumulative_error_s', 'greatest error [ms]', 1e3, 1),
+          ('timeout_ratio', 'timeouts [%]', 100.0, 2),
+          ('real_time_ratio_final', 'real-time ratio', 1.0, 4),
+          ('resets', 'drift resets', 1.0, 0), ('gaps', 'cycles lost', 1.0, 0),
+          ('input_delay_s', 'input delay [ms]', 1e3, 1),
+          ('link_delay_s', 'link delay [ms]', 1e3, 1))
+
+
+def write_study_report(data: StudyData, path: Path) -> None:
+    """
+    Write the report; the file is there whole or not at all.
+
+    :raises InputError: if it cannot be written.
+    """
+    write_text(study_html(data), path)
+
+
+def study_html(data: StudyData) -> str:
+    """Write the page."""
+    study = data.folder.study
+    title = study.title.in_language(study.language) or study.name
+    sections = [('conditions', 'Conditions', condition_section(data)),
+                ('people', 'Who took part', _people(data)),
+                ('troubles', 'Left out, aborted, repeated', _troubles(data)),
+                ('timing', 'Timing of each trial', _timing(data)),
+                ('paper', 'What to report in a paper', paper_section(data))]
+    links = ''.join(f'<li><a href="#{key}">{words}</a></li>' for key, words, _ in sections)
+    body = [f'<header><h1>{free(title)}</h1><p class="lead">study {free(study.name)}</p>'
+            f'{_chips(data)}</header>',
+            f'<nav aria-label="Parts of the report"><ul>{links}</ul></nav>', '<main>',
+            *(f'<section id="{key}"><h2>{words}</h2>{html}</section>'
+              for key, words, html in sections), '</main>']
+    return plain_document(title, '\n'.join(body), _STYLE.read_text(encoding='utf-8'))
+
+
+def _chips(data: StudyData) -> str:
+    complete = sum(record.complete for record in data.records)
+    planned = sum(row['trials_planned'] for row in _rows(data, 'participants'))
+    flagged = sum(trial.row['timing_flag'] for trial in data.trials)
+    facts = {'participants': f'{len(data.records)}', 'of them complete': f'{complete}',
+             'planned': f'{data.folder.study.participants}',
+             'trials that count': f'{len(data.trials)} <small>of {planned}</small>',
+             'without measures': str(len(data.problems)),
+             'beyond a bound of timing': str(flagged)}
+    return '<dl class="chips">' + ''.join(
+        f'<div><dt>{words}</dt><dd>{value}</dd></div>' for words, value in facts.items()) + '</dl>'
+
+
+def _people(data: StudyData) -> str:
+    fields = [column for column in data.people_table.fields if column.kind != 'string']
+    head = ('', 'order', *(free(column.name) for column in fields), 'begun', 'minutes', 'starts',
+            'trials', 'complete')
+    rows = [(free(row['participant']), str(row['place']),
+             *(number(row[column.name], 0 if column.kind == 'integer' else 2)
+               for column in fields),
+             plain(row['begun'][:16].replace('T', ' ')),
+             number((row['ended_s'] - row['begun_s']) / 60.0, 0), str(row['sessions']),
+             f'{row["trials"]} of {row["trials_planned"]}', 'yes' if row['complete'] else 'no')
+            for row in _rows(data, 'participants')]
+    if not rows:
+        return note('Nobody has begun yet.')
+    means = [(column.name, [row[column.name] for row in _rows(data, 'participants')
+                            if row[column.name] is not None]) for column in fields]
+    told = '; '.join(f'{plain(name)}: mean {number(sum(values) / len(values), 1)}, '
+                     f'{number(min(values), 0)} to {number(max(values), 0)}'
+                     for name, values in means if values)
+    return table('Participants; times are UTC', head, rows, 'people') + (
+        note(f'{told}.') if told else '')
+
+
+def _troubles(data: StudyData) -> str:
+    rows = [(free(row['participant']), plain(_TROUBLES[row['kind']]),
+             plain(row['item'] or NOTHING), str(row['attempt'] or NOTHING),
+             plain(row['wall'][:16].replace('T', ' ')), free(row['text'] or NOTHING))
+            for row in _rows(data, 'events') if row['kind'] in _TROUBLES]
+    html = table('What did not go as planned', (
+        '', 'what', 'item', 'attempt', 'when (UTC)', 'why'), rows, 'troubles') if rows else note(
+            'Nothing was left out, aborted or repeated.')
+    lost = [(free(record.id), plain(each.item), str(each.attempt))
+            for record in data.records for each in record.attempts if each.ending == 'lost']
+    if lost:
+        html += table('Attempts without an end: the program was ended while they were driven', (
+            '', 'item', 'attempt'), lost, 'troubles')
+    if data.problems:
+        html += table('Trials without measures', ('', 'trial', 'why'), [
+            (free(trial.record.id), str(trial.attempt.trial.number), free(trial.row['problem']))
+            for trial in data.trials if trial.row['problem']], 'troubles')
+    return html
+
+
+def _timing(data: StudyData) -> str:
+    if not data.trials:
+        return note('No trial counts yet.')
+    bounds = '; '.join(f'{words} {plain(bound)}' for words, bound in bounds_told())
+    html = note(f'Bounds: {bounds}. They are marked with ‼ and said at the end of the row; such '
+                'trials stay in the tables, where timing_flag tells them. What is not known is '
+                'not judged.')
+    return html + table('Timing of the trials that count', (
+        '', 'trial', 'condition', *(words for _, words, _, _ in _TIMES), 'beyond'),
+        list(_timed(data.trials)), 'numbers trials')
+
+
+def _timed(trials: Sequence[CountedTrial]) -> Iterator[Sequence[str]]:
+    for trial in trials:
+        row = trial.row
+        reason = row['timing_reason']
+        beyond = f'<strong class="critical">{free(reason)}<span class="sign"> ‼</span></strong>' \
+            if reason else free(row['problem']) if row['problem'] else ''
+        yield (free(row['participant']), str(row['trial']), free(row['condition']),
+               *(_value(row.get(name), factor, digits) for name, _, factor, digits in _TIMES),
+               beyond)
+
+
+def _value(value: float | None, factor: float, digits: int) -> str:
+    return NOTHING if value is None else number(factor * value, digits)
+
+
+def _rows(data: StudyData, name: str) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = data.tables[name].to_pylist()
+    return rows

@@ -1,0 +1,188 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A study's recorded people again, against other planners, beside what they drove against."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
+from crgame_ros.analysis.tables.data_package import data_package, PACKAGE_FILE, WrittenTable
+from crgame_ros.analysis.tables.vehicles_table import VEHICLES
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
+from crgame_ros.recording.run_cycles import replay_inputs
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.study.data.study_column import with_unit
+from crgame_ros.study.data.study_data import CountedTrial, StudyData
+from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows
+from crgame_ros.study.data.trials_table import PARTICIPANT, TRIAL
+import pyarrow.parquet as pq
+
+# Of the vehicles' tables, compared as they are.
+COMPARED = ('distance', 'mean_speed', 'max_speed', 'min_acceleration', 'worst_gap', 'worst_ttc',
+            'worst_thw', 'worst_drac', 'worst_min_distance', 'worst_pet_s', 'tet_s', 'tit',
+            'score_nuplan', 'score_no_collision_at_fault', 'score_progress', 'score_comfort')
+RECORDED, RERUN = 'recorded', 'rerun'
+COMPARISON = 'comparison'
+FILE = f'{COMPARISON}.csv'
+
+
+def comparison_declaration() -> TableDeclaration:
+    """Declare the table of the comparison."""
+    known = {column.name: column for column in VEHICLES.columns}
+    pairs = [with_unit(known[name], f'{when}_') for name in COMPARED
+             for when in (RECORDED, RERUN)]
+    return TableDeclaration(
+        COMPARISON, 'a vehicle of a trial, driven again against a planner',
+        ('participant', 'trial', 'vehicle', 'planner'), (
+            PARTICIPANT, TRIAL, Column('condition', TEXT, '', 'of the trial'),
+            Column('vehicle', TEXT, '', 'id of the vehicle'),
+            Column('role', TEXT, '', 'who drives it', values=('human', 'autonomous')),
+            Column('recorded_planner', TEXT, '', 'planner of the AVs when it was driven'),
+            Column('planner', TEXT, '', 'label of the planner of the AVs now'),
+            Column('random_seed', INTEGER, '1', 'of everything random'),
+            Column('cell', TEXT, '', 'key in the evaluation',
+                   empty='it was not computed'),
+            Column('status', TEXT, '', 'how the run ended now, as in the evaluation'),
+            Column('reason', TEXT, '', 'why it failed', empty='it did not'),
+            *pairs, Column('recorded_duration_s', NUMBER, 's', 'of the recorded run'),
+            Column('rerun_duration_s', NUMBER, 's', 'simulated now', empty='it failed')))
+
+
+def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: int | None,
+                say: Callable[[str], object]) -> list[str]:
+    """
+    Let the people of all trials that count drive again as they did, against each planner.
+
+    :param planners: of all AVs.
+    :param out: folder of the evaluation, with a folder for each seed where trials differ in it.
+    :param workers: processes; None for one for each processor.
+    :param say: takes one line for people.
+    :return: what came of it, one line each.
+    :raises InputError: if there is nothing to repeat, or a planner or folder cannot be used.
+    """
+    from crgame_ros.evaluation.dask_cluster import require_dask
+    require_dask()
+    trials = [trial for trial in data.trials if _can_be_repeated(trial, say)]
+    if not trials:
+        raise InputError('no trial of a person and an AV can be repeated', str(data.folder.path),
+                         'run some first')
+    by_seed: dict[int, list[CountedTrial]] = {}
+    for trial in trials:
+        by_seed.setdefault(int(trial.row['random_seed']), []).append(trial)
+    rows: list[dict[str, Any]] = []
+    for seed, of_seed in sorted(by_seed.items()):
+        folder = out if len(by_seed) == 1 else out / f'seed-{seed}'
+        labels = _evaluated(of_seed, planners, seed, folder, workers)
+        rows += _compared(of_seed, labels, folder)
+    rows.sort(key=lambda row: (row['participant'], row['trial'], row['planner'], row['vehicle']))
+    _write(rows, out, data.folder.study.name)
+    return [_told(rows, planner) for planner in dict.fromkeys(row['planner'] for row in rows)]
+
+
+def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
+    """Tell whether everything that a person did in a trial is known; say why not."""
+    reason = trial.row['problem']
+    if trial.run is not None and not trial.run.summary['humans']:
+        reason = 'nobody drove in it'
+    elif trial.run is not None and not trial.run.summary['planners']:
+        reason = 'no AV takes part'
+    elif trial.attempt.folder is not None and not reason:
+        try:
+            replay_inputs(recording_in(trial.attempt.folder))
+        except CrgameError as error:
+            reason = str(error)
+    if reason:
+        say(f'note: {trial.record.id}, trial {trial.attempt.trial.number} is left out: {reason}')
+    return not reason
+
+
+def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: int, folder: Path,
+               workers: int | None) -> list[str]:
+    """Evaluate, or go on; give the evaluation's names of the recorded runs."""
+    from crgame_ros.evaluation.dask_cluster import default_workers
+    from crgame_ros.evaluation.evaluation import Computing, evaluate
+    from crgame_ros.evaluation.evaluation_folder import GRID_FILE
+    from crgame_ros.evaluation.evaluation_plan import parse_plan
+    from crgame_ros.evaluation.evaluation_progress import EvaluationProgress
+    humans = [str(trial.attempt.folder.resolve()) for trial in trials
+              if trial.attempt.folder is not None]
+    plan = parse_plan({'humans': humans, 'planners': list(planners), 'seeds': [seed]},
+                      '--planner', Path.cwd())
+    evaluate(plan, folder, Computing(workers=default_workers() if workers is None else workers),
+             EvaluationProgress())
+    grid = json.loads((folder / GRID_FILE).read_text('utf-8'))['grid']
+    return [scene['human'] for scene in grid['scenes']]
+
+
+def _compared(trials: Sequence[CountedTrial], labels: Sequence[str],
+              folder: Path) -> Iterator[dict[str, Any]]:
+    """Put what was recorded and what came now side by side."""
+    cells = _parts(folder, 'cells')
+    vehicles: dict[str, list[dict[str, Any]]] = {}
+    for row in _parts(folder, 'vehicles'):
+        vehicles.setdefault(row['cell'], []).append(row)
+    by_label = dict(zip(labels, trials, strict=True))
+    for cell in cells:
+        trial = by_label.get(cell['human'])
+        if trial is None or trial.run is None:
+            continue
+        now = {row['vehicle']: row for row in vehicles.get(cell['cell'], ())}
+        for recorded in trial.run.table('vehicles').to_pylist():
+            yield _row(trial, cell, recorded, now.get(recorded['id'], {}))
+
+
+def _row(trial: CountedTrial, cell: Mapping[str, Any], recorded: Mapping[str, Any],
+         now: Mapping[str, Any]) -> dict[str, Any]:
+    known = {column.name: column for column in VEHICLES.columns}
+    values = {with_unit(known[name], f'{when}_').name: row.get(name) for name in COMPARED
+              for when, row in ((RECORDED, recorded), (RERUN, now))}
+    return {'participant': trial.record.id, 'trial': trial.attempt.trial.number,
+            'condition': trial.attempt.trial.condition.name, 'vehicle': recorded['id'],
+            'role': recorded['role'], 'recorded_planner': trial.row['av_planner'],
+            'planner': cell['planner'], 'random_seed': cell['seed'], 'cell': cell['cell'],
+            'status': cell['status'], 'reason': cell['reason'], **values,
+            'recorded_duration_s': trial.row['duration_s'],
+            'rerun_duration_s': cell['simulated_s']}
+
+
+def _parts(folder: Path, name: str) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for part in sorted((folder / name).glob('part-*.parquet')):
+        rows += pq.read_table(part).to_pylist()
+    return rows
+
+
+def _write(rows: Sequence[Mapping[str, Any]], out: Path, study: str) -> None:
+    """Write the table, and its dictionary in a folder of its own beside the evaluation's."""
+    folder = out / COMPARISON
+    prepare_folder(folder)
+    declaration = comparison_declaration()
+    table = table_of_rows(declaration, rows)
+    path = folder / FILE
+    write_bytes(csv_of_table(table), path)
+    package = data_package([WrittenTable(declaration, path, path.name, len(table))], 'csv',
+                           f'{study}-{RERUN}')
+    package['resources'][0]['schema'].pop('foreignKeys', None)
+    write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n', folder / PACKAGE_FILE)
+
+
+def _told(rows: Sequence[Mapping[str, Any]], planner: str) -> str:
+    mine = [row for row in rows if row['planner'] == planner]
+    runs = {(row['participant'], row['trial']): row['status'] for row in mine}
+    ok = sum(status == 'ok' for status in runs.values())
+    return f'{planner}: {ok} of {len(runs)} trials driven again'

@@ -1,0 +1,81 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Whether a trial was true to the clock: table I and the input's delay, against bounds."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class TimingBounds:
+    """
+    Beyond which the timing of a trial is told.
+
+    :param max_cumulative_error_s: of the greatest cumulative error [s]
+    :param timeout_ratio: of the share of cycles that took longer than a step.
+    :param real_time_ratio_final: least of simulated over wall time, over the whole run.
+    :param resets: of drift resets.
+    :param gaps: of cycles that were not recorded.
+    :param input_delay_s: of the median delay from the hand to the picture [s]
+    """
+
+    max_cumulative_error_s: float = 0.1
+    timeout_ratio: float = 0.01
+    real_time_ratio_final: float = 0.99
+    resets: float = 0.0
+    gaps: float = 0.0
+    input_delay_s: float = 0.1
+
+    def as_dict(self) -> dict[str, float]:
+        """Say them as JSON does."""
+        return asdict(self)
+
+
+BOUNDS = TimingBounds()
+# Words, unit, factor and digits of each value.
+_WORDS = {
+    'max_cumulative_error_s': ('greatest cumulative error', 'ms', 1e3, 0),
+    'timeout_ratio': ('cycles that took longer than a step', '%', 100.0, 1),
+    'real_time_ratio_final': ('real-time ratio', '', 1.0, 3),
+    'resets': ('drift resets', '', 1.0, 0),
+    'gaps': ('cycles not recorded', '', 1.0, 0),
+    'input_delay_s': ('input delay', 'ms', 1e3, 0)}
+
+
+def timing_faults(row: Mapping[str, Any], bounds: TimingBounds = BOUNDS) -> list[str]:
+    """
+    Say what of a trial's timing is beyond the bounds, one text each; none if all is within.
+
+    :param row: values by the bounds' names; what is missing is not judged.
+    """
+    found = []
+    for name, (words, unit, factor, digits) in _WORDS.items():
+        value, bound = row.get(name), getattr(bounds, name)
+        if value is None:
+            continue
+        below = name == 'real_time_ratio_final'
+        if value < bound if below else value > bound:
+            unit = f' {unit}' if unit else ''
+            found.append(f'{words} {factor * value:.{digits}f}{unit} instead of '
+                         f'{"at least" if below else "at most"} {factor * bound:.{digits}f}{unit}')
+    return found
+
+
+def bounds_told(bounds: TimingBounds = BOUNDS) -> list[tuple[str, str]]:
+    """Give each bound for people: what of, and how much."""
+    return [(words, f'{"at least" if name == "real_time_ratio_final" else "at most"} '
+                    f'{factor * getattr(bounds, name):g}{f" {unit}" if unit else ""}')
+            for name, (words, unit, factor, _) in _WORDS.items()]

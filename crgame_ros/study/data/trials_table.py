@@ -1,0 +1,227 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The table of trials: a row is a trial that counts, with everything that is known of it."""
+
+from collections.abc import Mapping
+from datetime import datetime, UTC
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.analysis.tables.column import (
+    Column,
+    FLAG,
+    INTEGER,
+    NUMBER,
+    TableDeclaration,
+    TEXT,
+)
+from crgame_ros.analysis.tables.runs_table import RUNS
+from crgame_ros.analysis.tables.vehicles_table import VEHICLES
+from crgame_ros.errors import InputError
+from crgame_ros.study.data.asked_questions import AskedQuestions
+from crgame_ros.study.data.conducted_study import ConductedStudy
+from crgame_ros.study.data.measured_run import MeasuredRun
+from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.study_column import flag_column, unlike, with_unit
+from crgame_ros.study.data.timing_quality import timing_faults
+from crgame_ros.study.trial_plan import PlannedTrial
+
+WALL = 'wall clock, seconds since 1970-01-01 UTC'
+UNMEASURED = 'the recording could not be measured'
+PARTICIPANT = Column('participant', TEXT, '', 'anonymous id')
+TRIAL = Column('trial', INTEGER, '1', 'number among all of the participant, from 1 on')
+_FIRST = (
+    PARTICIPANT, TRIAL,
+    Column('place', INTEGER, '1', 'of the participant among all, from 1 on: says the order'),
+    Column('block', TEXT, '', 'name of its block'),
+    Column('place_in_block', INTEGER, '1', 'number in its block, from 1 on'),
+    Column('repetition', INTEGER, '1', 'of the condition in the block, from 1 on'),
+    Column('condition', TEXT, '', 'levels of all factors, with / between them'))
+_DRIVE = (
+    Column('attempt', INTEGER, '1', 'which attempt counts, from 1 on', variant='the last that '
+           'finished'),
+    flag_column('to_repeat', 'whether it is to be driven again and has not been yet'),
+    Column('game', TEXT, '', 'name of the game file, or of the scenario where there is none'),
+    Column('vehicle', TEXT, '', 'id of the vehicle that the participant drove'),
+    Column('av_planner', TEXT, '', 'planner of the AVs, with + between them if they differ',
+           empty=UNMEASURED),
+    Column('random_seed', INTEGER, '1', 'of everything random'),
+    Column('outcome', TEXT, '', 'how the drive ended', empty='nobody told'),
+    Column('own_contacts', INTEGER, '1', "how often the participant's vehicle touched something",
+           empty='nobody told'),
+    Column('own_departures', INTEGER, '1', 'how often it left the road', empty='nobody told'),
+    Column('started', TEXT, '', 'when it was started, ISO 8601, UTC'),
+    Column('started_s', NUMBER, 's', 'when it was started', variant=WALL),
+    Column('ended_s', NUMBER, 's', 'when its end was noted', variant=WALL),
+    Column('run_end_s', NUMBER, 's', "time of its end on the run's clock", empty='nobody told'),
+    Column('recording', TEXT, '', "folder of the run, from the study's on", empty='none is known'),
+    Column('scenario', TEXT, '', 'the run as a CommonRoad scenario', empty='there is none'),
+    Column('report', TEXT, '', 'report of the run', empty='there is none'),
+    Column('game_file', TEXT, '', 'the game as it was driven', empty='there is none'),
+    Column('run', TEXT, '', 'its name in the tables in runs/', empty=UNMEASURED),
+    Column('problem', TEXT, '', 'why it has no measures', empty='it has some'))
+# Of the table of runs.
+_RUN_COLUMNS = ('benchmark_id', 'scenario_sha256', 'game_sha256', 'duration_s',
+                'contacts', 'violations', 'final_error_s', 'mean_step_error_s',
+                'max_cumulative_error_s', 'timeout_ratio', 'real_time_ratio_final',
+                'real_time_ratio_mean', 'real_time_ratio_min', 'time_efficiency',
+                'precision_ratio', 'resets', 'gaps', 'catch_up_steps')
+_TIMING = (
+    Column('input_delay_s', NUMBER, 's', "median from the participant's hand to the page's "
+           'picture', empty='nobody measured it'),
+    Column('link_delay_s', NUMBER, 's', 'of the link between page and simulation',
+           empty='nobody measured it'),
+    flag_column('timing_flag', 'whether its timing is beyond a bound'),
+    Column('timing_reason', TEXT, '', 'what of its timing is beyond which bound',
+           empty='nothing is'))
+_ANSWERED = Column('answered_attempt', INTEGER, '1', 'the attempt after which its questions were '
+                   'answered', empty='there are no answers')
+_LEFT_OUT = ('run', 'id', 'role', 'driver', 'vehicle_model', 'planning_problem', 'length', 'width',
+             'wheelbase', 'rear_to_center')
+_PLANNING = ('plan', 'fallbacks', 'latency', 'requests', 'skipped', 'timed_out',
+             'steps_without_plan', 'score_accepted', 'score_age')
+
+
+def measure_columns() -> dict[str, Column]:
+    """Give the measures of the participant's vehicle, by their names in the table `vehicles`."""
+    return {column.name: with_unit(column) for column in VEHICLES.columns
+            if column.name not in _LEFT_OUT and not column.name.startswith(_PLANNING)
+            and column.type in (NUMBER, INTEGER, FLAG)
+            and not (column.name.startswith('worst_') and column.name.endswith('_time_s'))}
+
+
+class TrialsTable:
+    """
+    The declaration of the table, and its rows.
+
+    :param folder: of the study.
+    :param asked: its questionnaires.
+    :ivar factors: the columns of the factors, by their names.
+    """
+
+    def __init__(self, folder: ConductedStudy, asked: AskedQuestions) -> None:
+        self._folder, self._asked = folder, asked
+        study = folder.study
+        self._measures = measure_columns()
+        runs = {column.name: column for column in RUNS.columns}
+        fixed = [*_DRIVE, *(runs[name] for name in _RUN_COLUMNS), *_TIMING,
+                 *self._measures.values(), _ANSWERED]
+        taken = {column.name for column in (*_FIRST, *fixed)}
+        self.factors: dict[str, Column] = {}
+        for factor in study.factors:
+            name = unlike(factor.name, taken, '_level')
+            taken.add(name)
+            self.factors[factor.name] = Column(
+                name, TEXT, '', f'level of the factor {factor.name}', empty='its block does not '
+                'cross it', values=tuple(level.name for level in factor.levels))
+        answers = [column for scale in asked.after_trials.values()
+                   for column in scale.columns(study.language)]
+        self.declaration = TableDeclaration(
+            'trials', 'a trial that counts', ('participant', 'trial'),
+            (*_FIRST, *self.factors.values(), *fixed, *_apart(answers, taken)))
+
+    def row(self, record: ParticipantRecord, attempt: TrialAttempt, run: MeasuredRun | None,
+            problem: str) -> dict[str, Any]:
+        """
+        Give the row of a trial.
+
+        :param run: its measures; None where there are none.
+        :param problem: why there are none.
+        """
+        trial = attempt.trial
+        row = {**_identity(record, trial), **{
+            self.factors[name].name: level.name for name, level in trial.condition.levels},
+            **self._drive(record, attempt), 'problem': problem or None}
+        if run is not None:
+            row |= self._measured(attempt, run)
+        link_ms = attempt.says('link_delay_ms')
+        row['link_delay_s'] = 1e-3 * link_ms if isinstance(link_ms, int | float) else None
+        faults = timing_faults(row)
+        row |= {'timing_flag': bool(faults), 'timing_reason': '; '.join(faults)}
+        return row | self._answers(record, trial)
+
+    def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, Any]:
+        settings, folder = attempt.trial.condition.settings, attempt.folder
+        end_s = attempt.says('end_time_s')
+        place = settings.game or settings.scenario or ''
+        row = {'attempt': attempt.attempt, 'to_repeat': attempt.item in record.to_repeat,
+               'game': Path(place).name, 'random_seed': settings.seed,
+               'vehicle': settings.seat, 'outcome': attempt.says('outcome'),
+               'own_contacts': _count(attempt.says('contacts')),
+               'own_departures': _count(attempt.says('departures')),
+               'started': utc(attempt.started_at), 'started_s': attempt.started_at,
+               'ended_s': attempt.ended_at,
+               'run_end_s': end_s if isinstance(end_s, int | float) else None}
+        if folder is not None and folder.is_dir():
+            row['recording'] = self._folder.relative(folder)
+            for name, pattern in (('scenario', '*.xml'), ('report', 'report.html'),
+                                  ('game_file', 'game.yaml')):
+                found = sorted(folder.glob(pattern))
+                row[name] = self._folder.relative(found[0]) if found else None
+        return row
+
+    def _measured(self, attempt: TrialAttempt, run: MeasuredRun) -> dict[str, Any]:
+        summary = run.summary
+        humans = list(summary['humans'])
+        seat = attempt.trial.condition.settings.seat
+        vehicle = seat if seat in humans else humans[0] if humans else None
+        told = run.row('runs')
+        measures = run.row('vehicles', id=vehicle)
+        delay_ms = summary['input_delay_ms'].get(vehicle)
+        return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],
+                'av_planner': '+'.join(dict.fromkeys(summary['planners'].values())),
+                'input_delay_s': None if delay_ms is None else 1e-3 * delay_ms,
+                **{name: told[name] for name in _RUN_COLUMNS},
+                **{column.name: measures.get(name) for name, column in self._measures.items()}}
+
+    def _answers(self, record: ParticipantRecord, trial: PlannedTrial) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for answered in record.answered:
+            scale = self._asked.of(answered.item)
+            if answered.item.trial == trial.number and scale is not None:
+                found |= scale.values(answered.answers)
+                found['answered_attempt'] = answered.attempt
+        return found
+
+
+def utc(at_s: float) -> str:
+    """Write a time as ISO 8601 does, to the millisecond."""
+    return datetime.fromtimestamp(at_s, UTC).isoformat(timespec='milliseconds').replace(
+        '+00:00', 'Z')
+
+
+def _count(value: Any) -> int | None:
+    return value if isinstance(value, int) else None
+
+
+def _identity(record: ParticipantRecord, trial: PlannedTrial) -> Mapping[str, Any]:
+    return {'participant': record.id, 'trial': trial.number, 'place': record.place + 1,
+            'block': trial.block, 'place_in_block': trial.place, 'repetition': trial.repetition,
+            'condition': trial.condition.name}
+
+
+def _apart(columns: list[Column], taken: set[str]) -> list[Column]:
+    """
+    Give the columns of questions.
+
+    :raises InputError: if one of them is called like another column.
+    """
+    known = set(taken)
+    for column in columns:
+        if column.name in known:
+            raise InputError(f'the column {column.name} is there already', 'questionnaire',
+                             'rename the questionnaire or its question')
+        known.add(column.name)
+    return columns

@@ -1,0 +1,234 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The desk of a session: what participant and experimenter may do now, and who has to know."""
+
+from collections.abc import Callable, Mapping, Sequence
+import logging
+import time
+from typing import Any
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.study.desk.drives import Drives
+from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.participant_session import ParticipantSession, SessionEvent
+from crgame_ros.study.session_script import PracticeDrives, SessionItem
+from crgame_ros.study.study_file import Break, Page
+from crgame_ros.study.trial_plan import PlannedTrial
+
+# Why a session ends that nobody has agreed to.
+DECLINED = 'consent was not given'
+MARKERS = ('marker',)
+# While a drive is in one of these nothing else can come before it.
+UNDER_WAY = (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
+
+_log = logging.getLogger(__name__)
+
+
+class Desk:
+    """
+    Takes what both pages ask for, and tells whoever watches when anything has changed.
+
+    :param session: of the participant.
+    :param drives: lets the participant drive.
+    :param markers: names of the markers that the experimenter sets by a key.
+    :param clock_s: seconds since 1970.
+    """
+
+    def __init__(self, session: ParticipantSession, drives: Drives, *,
+                 markers: Sequence[str] = MARKERS,
+                 clock_s: Callable[[], float] = time.time) -> None:
+        self.session, self.drives, self.markers = session, drives, tuple(markers)
+        self.clock_s = clock_s
+        self.ending = ''
+        self._watchers: list[Callable[[], None]] = []
+        drives.watch(self._drive_changed)
+        self._begin_break()
+
+    def watch(self, changed: Callable[[], None]) -> None:
+        """Name who is told of every change."""
+        self._watchers.append(changed)
+
+    @property
+    def language(self) -> str:
+        """Give the language of the participant's page."""
+        return self.session.language or self.session.study.language
+
+    @property
+    def asks_language(self) -> bool:
+        """Tell whether the participant has to choose a language first."""
+        return self.session.language is None and len(self.session.study.all_languages) > 1
+
+    @property
+    def is_driving(self) -> bool:
+        """Tell whether a drive is under way, from its countdown until it is recorded."""
+        return self.drives.state.phase in UNDER_WAY
+
+    @property
+    def waits(self) -> bool:
+        """Tell whether the experimenter holds the session before its present item."""
+        held_at, item = self.session.held_at, self.session.next_item
+        if held_at is None or item is None or self.is_driving:
+            return False
+        return is_driven(item) or item.id != held_at
+
+    @property
+    def break_left_s(self) -> float:
+        """Give how long the present break lasts at least [s]; 0 where there is none."""
+        item = self.session.next_item
+        if item is None or not isinstance(item.what, Break):
+            return 0.0
+        began = next((entry for entry in reversed(self.session.journal.entries)
+                      if entry['entry'] == SessionEvent.STARTED and entry['item'] == item.id),
+                     None)
+        at = self.clock_s() if began is None else began['at']
+        return max(0.0, at + 60.0 * item.what.minutes - self.clock_s())
+
+    # What the participant does.
+
+    def choose_language(self, language: str) -> None:
+        """Take the participant's language."""
+        self.session.choose_language(language)
+        self._moved()
+
+    def finish(self, item: str, answers: Mapping[str, Any] | None = None,
+               agreed: bool | None = None, **told: Any) -> None:
+        """
+        Take what the participant says to an item that is not driven.
+
+        Nothing happens if it is not the present one, or the experimenter holds the session: a
+        second click, or another page, does nothing twice.
+
+        :param item: id of it.
+        :param answers: to its questions.
+        :param agreed: to a consent; False ends the session.
+        :param told: when it was shown and answered, and how long it took.
+        :raises InputError: if an answer cannot be taken, or it is too early.
+        """
+        now = self.session.next_item
+        if now is None or now.id != item or self.waits or self.ending or is_driven(now):
+            return
+        if self.break_left_s > 0.5:
+            raise InputError('is not over', 'the break', 'wait until it is')
+        if isinstance(now.what, Page) and now.what.consent:
+            if agreed is False:
+                self.session.end(DECLINED)
+                self._moved()
+                return
+            told['agreed'] = agreed
+        self.session.finish(answers, **told)
+        self._moved()
+
+    def ready(self, item: str) -> None:
+        """Take the participant's word that a drive may begin."""
+        state = self.drives.state
+        if state.phase == DrivePhase.READY and state.item == item and not self.waits \
+                and not self.ending:
+            self.drives.ready(item)
+
+    # What the experimenter does.
+
+    def note(self, text: str) -> None:
+        """Keep a remark, with the run and its clock."""
+        self.session.note(text, **self.moment())
+        self._tell()
+
+    def mark(self, name: str) -> None:
+        """Set a marker, with the run and its clock."""
+        self.session.mark(name, **self.moment())
+        self._tell()
+
+    def repeat(self, item: str, reason: str) -> None:
+        """Let a finished item come again, now."""
+        self._refuse_while_driving()
+        self.session.repeat(item, reason)
+        self._moved()
+
+    def skip(self, item: str, reason: str) -> None:
+        """Leave the present item out."""
+        self._refuse_while_driving()
+        now = self.session.next_item
+        if now is None or now.id != item:
+            raise InputError('is not on now', item[:60], 'look at what is')
+        self.session.skip(reason)
+        self._moved()
+
+    def abort(self, item: str, reason: str) -> None:
+        """End the drive that is under way; it comes again."""
+        if not self.is_driving or self.drives.state.item != item:
+            raise InputError('is not driven now', item[:60], 'look at what is')
+        self.drives.abort(reason)
+        self._tell()
+
+    def end(self, reason: str) -> None:
+        """End the session; a drive that is under way is aborted first."""
+        if self.session.next_item is None:
+            raise InputError('is over already', 'the session', '')
+        self.ending = reason
+        if self.is_driving:
+            self.drives.abort(reason)
+        self._drive_changed()
+
+    def hold(self, held: bool) -> None:
+        """Hold the session before the next item, or let it go on."""
+        self.session.hold(held)
+        self._moved()
+
+    def moment(self) -> dict[str, Any]:
+        """Give the run and its clock [s]; None between drives."""
+        state = self.drives.state
+        run = next((entry.get('run', '') for entry in reversed(self.session.journal.entries)
+                    if entry['entry'] == SessionEvent.STARTED and entry['item'] == state.item),
+                   '') if state.time_s is not None else ''
+        return {'run': run, 'time_s': state.time_s}
+
+    def _refuse_while_driving(self) -> None:
+        if self.is_driving:
+            raise InputError('is under way', 'a drive', 'wait for its end, or abort it first')
+
+    def _drive_changed(self) -> None:
+        """Go on with what had to wait for the end of a drive, and tell those who watch."""
+        if self.ending and not self.is_driving and self.session.next_item is not None:
+            self.session.end(self.ending)
+            self.drives.wake()
+        self._begin_break()
+        self._tell()
+
+    def _moved(self) -> None:
+        self._begin_break()
+        self.drives.wake()
+        self._tell()
+
+    def _begin_break(self) -> None:
+        """Start the clock of a break once, when nothing keeps it from beginning."""
+        item = self.session.next_item
+        if item is None or not isinstance(item.what, Break) or self.waits:
+            return
+        last = next((entry['entry'] for entry in reversed(self.session.journal.entries)
+                     if entry.get('item') == item.id and entry['entry'] != SessionEvent.HELD),
+                    None)
+        if last != SessionEvent.STARTED:
+            self.session.start()
+
+    def _tell(self) -> None:
+        for changed in self._watchers:
+            try:
+                changed()
+            except CrgameError:
+                _log.exception('somebody who watches the desk')
+
+
+def is_driven(item: SessionItem) -> bool:
+    """Tell whether an item is a drive, or several."""
+    return isinstance(item.what, PlannedTrial | PracticeDrives)

@@ -1,0 +1,230 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The web server of a desk: its two pages, their files and sockets, who is let in."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Mapping
+import contextlib
+from itertools import count
+import json
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from aiohttp import hdrs, web, WSCloseCode
+from aiohttp.typedefs import Handler
+from crgame_ros.cockpit.access import Access, is_loopback
+from crgame_ros.cockpit.doorkeeper import Doorkeeper
+from crgame_ros.cockpit.invitations import Invitations
+from crgame_ros.cockpit.page_files import PageFile, read_files
+from crgame_ros.cockpit.request_guard import (
+    ACCESS,
+    COOKIE_S,
+    file_answer,
+    guard,
+    header_writer,
+    KEEPER,
+)
+from crgame_ros.cockpit.server import listen
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.desk_pages import DeskPages, TOLD_EVERY_S
+from crgame_ros.study.desk.desk_socket import DeskSocket
+from crgame_ros.study.desk.page_markdown import picture
+
+PACKAGE = Path(__file__).resolve().parents[2]
+# Modules name each other by their place in the package.
+SHARED = ('cockpit/page', 'study/desk/page')
+PAGES = {'/': 'study/desk/page/participant.html',
+         '/experimenter': 'study/desk/page/experimenter.html'}
+LINKS = 'desk_links.json'
+MAX_PAGES = 12
+_STALL_CHECK_S = 0.5
+_ONLY_EXPERIMENTER = "This page is the experimenter's: its address stands on the terminal."
+_LOOPBACK = ('127.0.0.1', 'localhost')
+
+
+def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> web.Application:
+    """
+    Make the server's application.
+
+    :param desk: whose pages are served.
+    :param access: who is let in as the participant.
+    :param experimenters: links by which alone experimenters are let in, one browser each.
+    :raises CrgameError: if the pages are not installed.
+    """
+    keeper, pages = Doorkeeper(), DeskPages(desk)
+    sockets: set[DeskSocket] = set()
+    numbers = count(1)
+    app = web.Application(middlewares=[
+        guard(access, keeper, lambda request: _is_experimenter(request, experimenters)
+              or (request.path == '/experimenter' and 'token' in request.query))])
+    app[KEEPER], app[ACCESS] = keeper, access
+    app.cleanup_ctx.append(_telling(pages))
+    app.on_response_prepare.append(header_writer(
+        lambda path: path.startswith('/static/'), lambda request: _frames(request, desk)))
+
+    def connector(*, experimenter: bool) -> Handler:
+        async def connect(request: web.Request) -> web.StreamResponse:
+            if experimenter and not _is_experimenter(request, experimenters):
+                return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
+            if len(sockets) >= MAX_PAGES:
+                return web.Response(status=503, text='Too many pages are open.\n')
+            socket = DeskSocket(pages, experimenter=experimenter)
+            sockets.add(socket)
+            try:
+                who = 'experimenter' if experimenter else 'participant'
+                return await socket.run(request, f'{who} {next(numbers)}')
+            finally:
+                sockets.discard(socket)
+        return connect
+
+    async def close_all(_: web.Application) -> None:
+        await asyncio.gather(*(socket.close(WSCloseCode.GOING_AWAY, 'the session ends')
+                               for socket in sockets))
+
+    app.on_shutdown.append(close_all)
+    app.router.add_get('/ws/participant', connector(experimenter=False))
+    app.router.add_get('/ws/experimenter', connector(experimenter=True))
+    _add_pages(app, desk, access, experimenters)
+    return app
+
+
+async def serve_desk(desk: Desk, access: Access, private: Path
+                     ) -> tuple[web.AppRunner, list[str]]:
+    """
+    Serve a desk until the runner that is given back is cleaned up.
+
+    :param access: with the address, and the first port to try.
+    :param private: folder where what lets experimenters in is kept: links of an earlier process
+        of the same session stay good.
+    :return: the runner, and the lines that tell where the pages are.
+    :raises InputError: if no port can be used.
+    """
+    experimenters = Invitations(private / LINKS)
+    runner, port = await listen(create_desk_app(desk, access, experimenters), access.host,
+                                access.port)
+    here = access.at_port(port)
+    first, *others = here.urls
+    own = here.link(experimenters.make('direct')).replace('/?', '/experimenter?')
+    return runner, [f'participant: {first}', *(f'  also: {other}' for other in others),
+                    f'experimenter, in one browser alone: {own}']
+
+
+def _add_pages(app: web.Application, desk: Desk, access: Access,
+               experimenters: Invitations) -> None:
+    table = _read_files()
+
+    async def participant(request: web.Request) -> web.Response:
+        return file_answer(request, table['/'])
+
+    async def experimenter(request: web.Request) -> web.Response:
+        if 'token' in request.query:
+            return _exchange(request, access, experimenters)
+        if not _is_experimenter(request, experimenters):
+            return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
+        return file_answer(request, table['/experimenter'])
+
+    async def journal(request: web.Request) -> web.Response:
+        if not _is_experimenter(request, experimenters):
+            return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
+        lines = ''.join(f'{json.dumps(entry)}\n' for entry in desk.session.journal.entries)
+        name = f'{desk.session.study.name}_{desk.session.participant}.jsonl'
+        return web.Response(text=lines, content_type='application/jsonl', headers={
+            hdrs.CONTENT_DISPOSITION: f'attachment; filename="{name}"'})
+
+    async def static(request: web.Request) -> web.Response:
+        return file_answer(request, table.get(request.path))
+
+    async def shown(request: web.Request) -> web.Response:
+        return file_answer(request, picture(desk.session.study, request.match_info['name']))
+
+    app.router.add_get('/', participant)
+    app.router.add_get('/experimenter', experimenter)
+    app.router.add_get('/experimenter/journal', journal)
+    app.router.add_get('/picture/{name:.*}', shown)
+    app.router.add_get('/static/{name:.*}', static)
+
+
+def _read_files() -> Mapping[str, PageFile]:
+    table: dict[str, PageFile] = {}
+    for folder in SHARED:
+        table |= read_files(PACKAGE / folder, f'/static/{folder}/')
+    for path, file in PAGES.items():
+        if f'/static/{file}' not in table:
+            raise CrgameError(f'{PACKAGE / file}: a page of the desk is missing; '
+                              'install crgame_ros again')
+        table[path] = table[f'/static/{file}']
+    return table
+
+
+def _exchange(request: web.Request, access: Access, experimenters: Invitations) -> web.Response:
+    name = _cookie_name(request)
+    try:
+        cookie = experimenters.exchange(request.query['token'], request.cookies.get(name))
+    except InputError:
+        return web.Response(status=403, text=(
+            'This link is not good any more: it lets one browser in, once. '
+            'The program prints another one when it is started again.\n'))
+    answer = web.Response(status=303, headers={'Location': '/experimenter'})
+    answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
+                      secure=access.tls is not None, max_age=COOKIE_S)
+    return answer
+
+
+def _is_experimenter(request: web.Request, experimenters: Invitations) -> bool:
+    return experimenters.rights(request.cookies.get(_cookie_name(request))) is not None
+
+
+def _cookie_name(request: web.Request) -> str:
+    sockname = request.get_extra_info('sockname')
+    return f'crgame-desk-{sockname[1]}' if sockname else 'crgame-desk'
+
+
+def _frames(request: web.Request, desk: Desk) -> str:
+    """Name where the cockpit's page may come from: this machine, at a port not known yet."""
+    if request.path != '/':
+        return "'none'"
+    host = urlsplit(f'//{request.host}').hostname or ''
+    names = dict.fromkeys((host, *(_LOOPBACK if is_loopback(host) else ())))
+    # A literal of IPv6 has no wildcard of ports.
+    allowed = [f'{scheme}://{name}:*' for name in names if name and ':' not in name
+               for scheme in ('http', 'https')]
+    link = urlsplit(desk.drives.state.link)
+    if link.scheme in ('http', 'https') and ';' not in link.netloc and ' ' not in link.netloc:
+        allowed.append(f'{link.scheme}://{link.netloc}')
+    return ' '.join(allowed) or "'none'"
+
+
+def _telling(pages: DeskPages) -> Callable[[web.Application], AsyncIterator[None]]:
+    """Tell experimenters what has changed, some times a second, and drop who never reads."""
+    async def tell() -> None:
+        loop = asyncio.get_running_loop()
+        checked_s = loop.time()
+        while True:
+            await asyncio.sleep(TOLD_EVERY_S)
+            if pages.is_due:
+                pages.tell_experimenters()
+            if loop.time() - checked_s > _STALL_CHECK_S:
+                checked_s = loop.time()
+                for client in pages.clients:
+                    client.check_stall(checked_s)
+
+    async def telling(_: web.Application) -> AsyncIterator[None]:
+        task = asyncio.create_task(tell())
+        yield
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+    return telling

@@ -1,0 +1,50 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** A break, with the time that it lasts at least. */
+
+import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { button } from './page_view.js';
+
+/** @import { BreakDocument } from './desk_messages.js' */
+/** @import { Words } from './words.js' */
+
+/**
+ * Make it.
+ *
+ * @param {BreakDocument} shown
+ * @param {Words} words
+ * @param {() => void} finish
+ * @returns {HTMLElement}
+ */
+export function breakView({ text, left_s }, words, finish) {
+  const over_ms = performance.now() + 1000 * left_s;
+  const left = element('p', { class: 'left', role: 'timer' });
+  const told = element('p', { role: 'status' });
+  const next = button(words.of('next'), 'primary', finish);
+  const node = element('div', {}, element('h2', { text: words.of('break') }),
+    text ? element('p', { class: 'lead', text }) : null, left, told,
+    element('div', { class: 'go-on' }, next));
+  const show = () => {
+    const rest_s = Math.max(0, Math.ceil((over_ms - performance.now()) / 1000));
+    const was = next.disabled;
+    setAttribute(next, 'disabled', rest_s > 0);
+    setText(left, rest_s > 0 ? words.of('break_left', { time: clockTime(rest_s) }) : '');
+    setText(told, rest_s > 0 ? '' : words.of('break_over'));
+    if (was && rest_s === 0) {
+      next.focus();
+    }
+    if (rest_s > 0 && (node.isConnected || !was)) {
+      setTimeout(show, 250);
+    }
+  };
+  show();
+  return node;
+}
+
+/**
+ * @param {number} time_s whole seconds
+ * @returns {string} minutes:seconds
+ */
+export function clockTime(time_s) {
+  return `${Math.floor(time_s / 60)}:${String(time_s % 60).padStart(2, '0')}`;
+}

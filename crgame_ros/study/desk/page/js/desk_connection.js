@@ -1,0 +1,99 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The WebSocket to the desk's server: it comes back by itself, and knows the server's clock. */
+
+const FIRST_RETRY_MS = 250;
+const LAST_RETRY_MS = 2000;
+const PING_EVERY_MS = 1000;
+const LONGEST_TOLD_MS = 60_000;
+
+/**
+ * @typedef {{opened: (again: boolean) => void, lost: () => void,
+ *   received: (message: any) => void, pinged?: () => Record<string, unknown>}} Listener
+ *   `pinged` gives what goes along with each ping
+ */
+
+/** One page's connection. */
+export class DeskConnection {
+  #listener;
+  #url;
+  /** @type {WebSocket|null} */
+  #socket = null;
+  #retry_ms = FIRST_RETRY_MS;
+  #opened = false;
+  #offset_s = 0;
+  #best_ms = Infinity;
+  /** The way there and back [ms]; NaN before it is known. */
+  round_trip_ms = NaN;
+
+  /**
+   * @param {string} path of the WebSocket
+   * @param {Listener} listener
+   */
+  constructor(path, listener) {
+    this.#listener = listener;
+    const url = new URL(path, window.location.href);
+    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+    this.#url = url.href;
+    this.#open();
+    setInterval(() => this.#ping(), PING_EVERY_MS);
+  }
+
+  /** The server's clock now [s since 1970], as well as the page knows it. */
+  get now_s() {
+    return (performance.timeOrigin + performance.now()) / 1000 + this.#offset_s;
+  }
+
+  /**
+   * @param {Record<string, unknown>} message with its `type`
+   * @returns {boolean} false when there is no connection
+   */
+  send(message) {
+    if (this.#socket?.readyState !== WebSocket.OPEN) {
+      return false;
+    }
+    this.#socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  #open() {
+    const socket = new WebSocket(this.#url);
+    socket.addEventListener('open', () => {
+      this.#retry_ms = FIRST_RETRY_MS;
+      this.#best_ms = Infinity;
+      this.#ping();
+      this.#listener.opened(this.#opened);
+      this.#opened = true;
+    });
+    socket.addEventListener('message', ({ data }) => this.#receive(JSON.parse(data)));
+    socket.addEventListener('close', () => {
+      this.#listener.lost();
+      setTimeout(() => this.#open(), this.#retry_ms);
+      this.#retry_ms = Math.min(2 * this.#retry_ms, LAST_RETRY_MS);
+    });
+    this.#socket = socket;
+  }
+
+  #ping() {
+    const more = this.#listener.pinged?.() ?? {};
+    const { round_trip_ms } = this;
+    this.send({ type: 'ping', t: performance.now(), ...more, ...Number.isFinite(round_trip_ms)
+      ? { round_trip_ms: Math.min(round_trip_ms, LONGEST_TOLD_MS) } : {} });
+  }
+
+  /** @param {any} message */
+  #receive(message) {
+    if (message.type !== 'pong') {
+      this.#listener.received(message);
+      return;
+    }
+    const now_ms = performance.now();
+    this.round_trip_ms = now_ms - message.t;
+    // The shortest way says most about the other clock.
+    if (this.round_trip_ms <= this.#best_ms) {
+      this.#best_ms = this.round_trip_ms;
+      this.#offset_s = message.at
+        - (performance.timeOrigin + (now_ms + message.t) / 2) / 1000;
+    }
+  }
+}

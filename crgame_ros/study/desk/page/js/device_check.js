@@ -1,0 +1,196 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The device check: each control is moved once, as this page sees it. */
+
+import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { CalibrationDialog } from '../../../../cockpit/page/js/driving/calibration.js';
+import { connectedPads } from '../../../../cockpit/page/js/driving/gamepad.js';
+import {
+  loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
+} from '../../../../cockpit/page/js/driving/gamepad_profile.js';
+import { ACTIONS } from '../../../../cockpit/page/js/driving/keyboard.js';
+import { button } from './page_view.js';
+
+/** @import { DeviceDocument } from './desk_messages.js' */
+/** @import { Words } from './words.js' */
+
+/** @typedef {'left'|'right'|'throttle'|'brake'} Movement */
+
+export const MOVEMENTS = /** @type {Movement[]} */ (['left', 'right', 'throttle', 'brake']);
+// So much of its travel counts as moved.
+const MOVED = 0.6;
+const PREFIX = 'crgame.gamepad.';
+const KEYBOARD = 'keyboard';
+
+/**
+ * Give the calibrations that this browser keeps, for the stage, whose address has another port.
+ *
+ * @returns {Record<string, string>} JSON of a profile, by the device's name
+ */
+export function calibrations() {
+  return Object.fromEntries(Object.entries(localStorage).filter(([key]) => key.startsWith(PREFIX))
+    .map(([key, value]) => [key.slice(PREFIX.length), value]));
+}
+
+/** The check, until it is left. */
+export class DeviceCheck {
+  #words;
+  #finish;
+  #chosen = KEYBOARD;
+  /** @type {Set<Movement>} */
+  #moved = new Set();
+  #frame = 0;
+  #list = element('ul', { class: 'movements' });
+  #devices = element('div', { class: 'options choices', role: 'radiogroup' });
+  #none = element('p', { class: 'hint' });
+  #problem = element('p', { class: 'problem', role: 'alert' });
+  #calibrate;
+  #calibration = new CalibrationDialog((index, profile) => this.#keep(index, profile));
+  #ids = '';
+  /** @type {(event: KeyboardEvent) => void} */
+  #key = (event) => this.#press(event);
+
+  /**
+   * @param {DeviceDocument} shown
+   * @param {Words} words
+   * @param {(told: {device: string, moved: string[]}) => void} finish
+   */
+  constructor({ text }, words, finish) {
+    this.#words = words;
+    this.#finish = finish;
+    this.#calibrate = button(words.of('device_calibrate'), '', () => this.#openCalibration());
+    setText(this.#none, words.of('device_none'));
+    this.node = element('div', { class: 'device-check' },
+      element('h2', { text: words.of('device') }),
+      element('p', { class: 'lead', text: text || words.of('device_text') }),
+      element('fieldset', { class: 'question' },
+        element('legend', {}, element('span', { class: 'ask', text: words.of('device_choose') })),
+        this.#devices, this.#none, this.#calibrate),
+      this.#list, this.#problem,
+      element('div', { class: 'go-on' },
+        button(words.of('next'), 'primary', () => this.#goOn())));
+    window.addEventListener('keydown', this.#key, true);
+    this.#poll();
+  }
+
+  /** Stop listening. */
+  end() {
+    cancelAnimationFrame(this.#frame);
+    window.removeEventListener('keydown', this.#key, true);
+  }
+
+  #poll() {
+    const pads = connectedPads();
+    const ids = pads.map(({ id, index }) => `${index} ${id}`).join('\n');
+    if (ids !== this.#ids || !this.#devices.hasChildNodes()) {
+      this.#ids = ids;
+      this.#showDevices(pads);
+    }
+    const pad = pads.find(({ index }) => `${index}` === this.#chosen);
+    if (pad) {
+      const { profile } = loadProfile(pad);
+      const sample = sampleOf(pad);
+      const steering = steeringValue(sample, profile.steering);
+      this.#note('left', steering > MOVED);
+      this.#note('right', steering < -MOVED);
+      this.#note('throttle', pedalValue(sample, profile.throttle) > MOVED);
+      this.#note('brake', pedalValue(sample, profile.brake) > MOVED);
+    }
+    this.#frame = requestAnimationFrame(() => this.#poll());
+  }
+
+  /** @param {Gamepad[]} pads */
+  #showDevices(pads) {
+    /** @type {(value: string, label: string) => HTMLElement} */
+    const option = (value, label) => {
+      const input = element('input', { type: 'radio', name: 'device', value,
+        on: { change: () => this.#choose(value) } });
+      input.checked = value === this.#chosen;
+      return element('label', { class: 'option' }, input, element('span', { text: label }));
+    };
+    if (this.#chosen !== KEYBOARD && !pads.some(({ index }) => `${index}` === this.#chosen)) {
+      this.#chosen = KEYBOARD;
+    }
+    this.#devices.replaceChildren(option(KEYBOARD, this.#words.of('device_keyboard')),
+      ...pads.map(({ id, index }) => option(`${index}`, id)));
+    this.#none.hidden = pads.length > 0;
+    this.#choose(this.#chosen);
+  }
+
+  /** @param {string} chosen */
+  #choose(chosen) {
+    if (chosen !== this.#chosen) {
+      this.#moved.clear();
+    }
+    this.#chosen = chosen;
+    this.#calibrate.hidden = chosen === KEYBOARD;
+    this.#showList();
+  }
+
+  /** @param {KeyboardEvent} event */
+  #press(event) {
+    const movement = MOVEMENTS.find((name) => name === ACTIONS[event.code]);
+    const { target } = event;
+    // Arrows choose in a group, and the space bar presses a button, as everywhere.
+    const used = target instanceof HTMLInputElement
+      || (target instanceof HTMLButtonElement && event.code === 'Space');
+    if (this.#chosen === KEYBOARD && movement && !used) {
+      event.preventDefault();
+      this.#note(movement, true);
+    }
+  }
+
+  /**
+   * @param {Movement} movement
+   * @param {boolean} moved
+   */
+  #note(movement, moved) {
+    if (moved && !this.#moved.has(movement)) {
+      this.#moved.add(movement);
+      this.#showList();
+    }
+  }
+
+  #showList() {
+    const keys = this.#chosen === KEYBOARD;
+    this.#list.replaceChildren(...MOVEMENTS.map((name) => {
+      const done = this.#moved.has(name);
+      return element('li', { 'data-done': done },
+        element('span', { class: 'sign', 'aria-hidden': 'true', text: done ? '✓' : '○' }),
+        element('span', { text: this.#words.of(`device_${name}`) }),
+        keys ? element('kbd', { text: this.#words.of(`device_keys_${name}`) }) : null,
+        done ? element('span', { class: 'unseen', text: ` (${this.#words.of('done')})` }) : null);
+    }));
+    if (this.#moved.size === MOVEMENTS.length) {
+      setText(this.#problem, '');
+    }
+  }
+
+  #openCalibration() {
+    this.#calibration.open(Number(this.#chosen));
+  }
+
+  /**
+   * @param {number} index
+   * @param {import('../../../../cockpit/page/js/driving/gamepad_profile.js').Profile|null} profile
+   */
+  #keep(index, profile) {
+    const pad = connectedPads().find((candidate) => candidate.index === index);
+    if (pad) {
+      saveProfile(pad.id, profile);
+      this.#moved.clear();
+      this.#showList();
+    }
+  }
+
+  #goOn() {
+    const missing = MOVEMENTS.filter((name) => !this.#moved.has(name));
+    setText(this.#problem, missing.length === 0 ? '' : this.#words.of('device_missing', {
+      names: missing.map((name) => this.#words.of(`device_${name}`)).join(', ') }));
+    if (missing.length === 0) {
+      const pad = connectedPads().find(({ index }) => `${index}` === this.#chosen);
+      setAttribute(this.#problem, 'hidden', true);
+      this.#finish({ device: (pad?.id ?? KEYBOARD).slice(0, 200), moved: [...this.#moved] });
+    }
+  }
+}

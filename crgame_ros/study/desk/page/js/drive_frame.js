@@ -1,0 +1,193 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The cockpit's stage inside the participant's page, and the gate before each drive. */
+
+import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { calibrations } from './device_check.js';
+import { button } from './page_view.js';
+
+/** @import { DriveDocument, Progress } from './desk_messages.js' */
+/** @import { Words } from './words.js' */
+
+/**
+ * What the stage tells of itself; see docs/studies.md.
+ *
+ * @typedef {{seated?: boolean, connected?: boolean, time_s?: number|null,
+ *   delay_ms?: number|null}} StageState
+ */
+
+const LOOPBACK = ['127.0.0.1', 'localhost'];
+
+/** The frame and what lies over it. */
+export class DriveFrame {
+  #root;
+  #words;
+  #ready;
+  /** @type {HTMLIFrameElement|null} */
+  #frame = null;
+  #link = '';
+  #phase = '';
+  /** @type {StageState} */
+  #state = {};
+  #title = element('h2');
+  #text = element('p', { class: 'lead' });
+  #status = element('p', { role: 'status' });
+  #button;
+  #gate;
+
+  /**
+   * @param {HTMLElement} root the element that fills the page while somebody drives
+   * @param {Words} words
+   * @param {() => void} ready told that the participant is ready
+   */
+  constructor(root, words, ready) {
+    this.#root = root;
+    this.#words = words;
+    this.#ready = ready;
+    this.#button = button('', 'primary', () => this.#press());
+    this.#gate = element('section', { class: 'gate', 'aria-live': 'polite' }, this.#title,
+      this.#text, this.#status, element('div', { class: 'go-on' }, this.#button));
+    root.append(this.#gate);
+    window.addEventListener('message', (event) => this.#hear(event));
+  }
+
+  /** What the stage has told last; nothing before. */
+  get state() {
+    return this.#state;
+  }
+
+  /**
+   * Show a drive.
+   *
+   * @param {DriveDocument} shown
+   */
+  show(shown) {
+    const entered = shown.phase !== this.#phase || this.#root.hidden;
+    this.#root.hidden = false;
+    this.#load(shown.link);
+    this.#phase = shown.phase;
+    setText(this.#title, titleOf(shown, shown.progress, this.#words));
+    setText(this.#text, this.#words.of(
+      shown.phase === 'ended' ? 'ended_text' : shown.attempt > 1 && !shown.practice
+        ? 'again_text' : 'ready_text'));
+    this.#showGate();
+    if (entered && shown.phase === 'ready' && !this.#button.disabled) {
+      this.#button.focus();
+    } else if (entered && shown.phase !== 'ready') {
+      this.#focusFrame();
+    }
+  }
+
+  /** Hide it behind whatever else is shown; the stage stays loaded. */
+  hide() {
+    this.#root.hidden = true;
+    this.#phase = '';
+  }
+
+  #showGate() {
+    const ready = this.#phase === 'ready';
+    // Without a stage there is nothing to wait for.
+    const loaded = this.#link === '' || Boolean(this.#state.seated && this.#state.connected);
+    const was = this.#button.disabled;
+    this.#gate.hidden = !ready;
+    setText(this.#button, this.#words.of('ready'));
+    setText(this.#status, ready && !loaded ? this.#words.of('loading') : '');
+    setAttribute(this.#button, 'disabled', !loaded);
+    if (this.#frame) {
+      this.#frame.inert = ready;
+    }
+    if (ready && was && loaded) {
+      this.#button.focus();
+    }
+  }
+
+  #press() {
+    if (this.#phase !== 'ready') {
+      return;
+    }
+    this.#ready();
+    this.#post({ kind: 'calibrations', profiles: calibrations() });
+    this.#post({ kind: 'ready', ready: true });
+    this.#focusFrame();
+  }
+
+  #focusFrame() {
+    if (this.#frame) {
+      this.#frame.inert = false;
+      this.#frame.focus();
+      this.#post({ kind: 'focus' });
+    }
+  }
+
+  /** @param {string} link */
+  #load(link) {
+    if (link === this.#link) {
+      return;
+    }
+    this.#link = link;
+    this.#state = {};
+    this.#frame?.remove();
+    this.#frame = null;
+    const src = stageAddress(link, window.location);
+    if (src !== null) {
+      this.#frame = element('iframe', { src: src.href, title: this.#title.textContent || 'drive',
+        allow: 'gamepad; fullscreen; autoplay' });
+      this.#root.prepend(this.#frame);
+    }
+  }
+
+  /** @param {Record<string, unknown>} message */
+  #post(message) {
+    const src = stageAddress(this.#link, window.location);
+    if (src !== null) {
+      this.#frame?.contentWindow?.postMessage({ crgame: 1, ...message }, src.origin);
+    }
+  }
+
+  /** @param {MessageEvent} event */
+  #hear(event) {
+    const src = stageAddress(this.#link, window.location);
+    if (src === null || event.origin !== src.origin
+        || event.source !== this.#frame?.contentWindow) {
+      return;
+    }
+    const { data } = event;
+    if (data?.crgame === 1 && data.kind === 'stage' && typeof data.state === 'object') {
+      this.#state = data.state ?? {};
+      if (!this.#root.hidden) {
+        this.#showGate();
+      }
+    }
+  }
+}
+
+/**
+ * Give the stage's address as this page has to name it: cookies are those of one host.
+ *
+ * @param {string} link
+ * @param {{hostname: string}} location of this page
+ * @returns {URL|null} null for what is no address of a page
+ */
+export function stageAddress(link, location) {
+  if (!URL.canParse(link)) {
+    return null;
+  }
+  const url = new URL(link);
+  if (!['http:', 'https:'].includes(url.protocol)) {
+    return null;
+  }
+  if (LOOPBACK.includes(url.hostname) && LOOPBACK.includes(location.hostname)) {
+    url.hostname = location.hostname;
+  }
+  return url;
+}
+
+/**
+ * @param {DriveDocument} shown
+ * @param {Progress|undefined} progress
+ * @param {Words} words
+ */
+function titleOf({ practice, number }, progress, words) {
+  return practice ? words.of('practice', { number })
+    : words.of('drive', { number, of: progress?.drives ?? number });
+}

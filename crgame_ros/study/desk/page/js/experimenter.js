@@ -1,0 +1,249 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The experimenter's page: it shows where the session is, and takes orders. */
+
+import { element, part, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { DeskConnection } from './desk_connection.js';
+import { entryWords, timeOfDay } from './log_words.js';
+import { askReason } from './reason_dialog.js';
+
+/** @import { ExperimenterDocument, ItemRow } from './experimenter_messages.js' */
+
+const MARKER_KEYS = ['F1', 'F2', 'F3', 'F4', 'F5', 'F6', 'F7', 'F8', 'F9'];
+
+/** The whole page. */
+class ExperimenterPage {
+  /** @type {ExperimenterDocument|null} */
+  #shown = null;
+  #lastId = 0;
+  #answer = part(document.body, 'answer');
+  #connection = new DeskConnection('/ws/experimenter', {
+    opened: () => {
+      part(document.body, 'lost').hidden = true;
+    },
+    lost: () => {
+      part(document.body, 'lost').hidden = false;
+    },
+    received: (message) => this.#receive(message),
+  });
+
+  /** @type {Record<'hold'|'skip'|'abort'|'end', HTMLButtonElement>} */
+  #orders = {
+    hold: order('', () => this.#send({ type: 'hold', held: !this.#shown?.held })),
+    abort: order('Abort the drive', () => this.#reasoned('abort', 'Abort the drive',
+      'It counts for nothing, and comes again.')),
+    skip: order('Skip this item', () => this.#reasoned('skip', 'Skip this item',
+      'It is left out of this session.')),
+    end: order('End the session', () => this.#end()),
+  };
+
+  constructor() {
+    part(document.body, 'orders').append(...Object.values(this.#orders));
+    this.#orders.end.classList.add('danger');
+    const note = /** @type {HTMLTextAreaElement} */ (part(document.body, 'note'));
+    const keep = () => {
+      if (note.value.trim() && this.#send({ type: 'note', text: note.value })) {
+        note.value = '';
+      }
+    };
+    part(document.body, 'note-form').addEventListener('submit', (event) => {
+      event.preventDefault();
+      keep();
+    });
+    note.addEventListener('keydown', (event) => {
+      if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) {
+        event.preventDefault();
+        keep();
+      }
+    });
+    window.addEventListener('keydown', (event) => {
+      const name = this.#shown?.markers[MARKER_KEYS.indexOf(event.key)];
+      if (name !== undefined && !event.repeat) {
+        event.preventDefault();
+        this.#send({ type: 'mark', name });
+      }
+    });
+  }
+
+  /** @param {Record<string, unknown>} message */
+  #send(message) {
+    this.#lastId += 1;
+    const sent = this.#connection.send({ ...message, id: this.#lastId });
+    if (!sent) {
+      this.#say('There is no connection.', true);
+    }
+    return sent;
+  }
+
+  /**
+   * @param {string} text
+   * @param {boolean} bad
+   */
+  #say(text, bad) {
+    setText(this.#answer, text);
+    setAttribute(this.#answer, 'data-bad', bad);
+  }
+
+  /** @param {any} message */
+  #receive(message) {
+    if (message.type === 'reply') {
+      this.#say(message.ok ? 'Kept.' : message.text, !message.ok);
+    } else if (message.type === 'desk') {
+      this.#show(message);
+    }
+  }
+
+  /**
+   * @param {'skip'|'abort'} type
+   * @param {string} title
+   * @param {string} text
+   */
+  async #reasoned(type, title, text) {
+    const item = this.#shown?.item ?? '';
+    const reason = await askReason(`${title}: ${item}`, text, title);
+    if (reason !== null) {
+      this.#send({ type, item, reason });
+    }
+  }
+
+  async #end() {
+    const reason = await askReason('End the session?',
+      'Nothing more is asked or driven in it, also after a new start.', 'Go on');
+    if (reason !== null && await askReason('Really end it?', `Reason: ${reason}`,
+      'End the session', false) !== null) {
+      this.#send({ type: 'end', reason });
+    }
+  }
+
+  /** @param {ItemRow} row */
+  async #repeat({ id, kind }) {
+    const reason = await askReason(`Repeat ${kind}`,
+      `${id} comes again now; what was told before stays in the journal.`, 'Repeat');
+    if (reason !== null) {
+      this.#send({ type: 'repeat', item: id, reason });
+    }
+  }
+
+  /** @param {ExperimenterDocument} shown */
+  #show(shown) {
+    this.#shown = shown;
+    document.title = `${shown.participant}: ${shown.study}`;
+    setText(part(document.body, 'study'), shown.study);
+    setText(part(document.body, 'who'), `Participant ${shown.participant}, place `
+      + `${shown.place + 1}${shown.language ? `, language ${shown.language}` : ''}`);
+    this.#showPage(shown);
+    this.#showNow(shown);
+    this.#showMarkers(shown.markers);
+    this.#showItems(shown.items);
+    this.#showLog(shown);
+  }
+
+  /** @param {ExperimenterDocument} shown */
+  #showPage({ page }) {
+    const node = part(document.body, 'page');
+    const delay = page.round_trip_ms === undefined ? ''
+      : `, ${Math.round(page.round_trip_ms)} ms there and back`;
+    const drive = page.drive_delay_ms === undefined ? ''
+      : `, ${Math.round(page.drive_delay_ms)} ms from hand to picture`;
+    const more = page.open > 1 ? `, ${page.open} tabs` : '';
+    setText(node, page.connected ? `Participant's page: connected${delay}${drive}${more}`
+      : "Participant's page: not connected");
+    node.dataset.connected = String(page.connected);
+  }
+
+  /** @param {ExperimenterDocument} shown */
+  #showNow(shown) {
+    const { drive, over } = shown;
+    const row = shown.items.find(({ id }) => id === shown.item);
+    setText(part(document.body, 'now-title'), over
+      ? { done: 'The session is done', declined: 'Consent was not given: the session is over',
+        ended: 'The session was ended' }[over]
+      : `Now: ${row?.kind ?? ''}${row?.condition ? `, ${row.condition}` : ''} (${shown.item})`);
+    const lines = [];
+    if (drive.phase !== 'none') {
+      const clock = drive.time_s === null ? '' : `, ${drive.time_s.toFixed(1)} s`;
+      lines.push(`Drive ${drive.item}: ${drive.phase}${clock}`
+        + `${drive.attempt > 1 ? `, attempt ${drive.attempt}` : ''}`);
+    }
+    if (drive.text) {
+      lines.push(drive.text);
+    }
+    if (shown.page.error) {
+      lines.push(shown.page.error);
+    }
+    if (shown.ending && !over) {
+      lines.push('The session ends as soon as the drive is over.');
+    } else if (shown.waits) {
+      lines.push('Held: the participant waits.');
+    } else if (shown.held) {
+      lines.push('It will be held before the next item.');
+    }
+    setText(part(document.body, 'now-text'), lines.join('\n'));
+    setAttribute(part(document.body, 'now'), 'data-alarm',
+      drive.phase === 'failed' || Boolean(shown.page.error));
+    setText(this.#orders.hold, shown.held ? 'Go on' : 'Hold before the next item');
+    setAttribute(this.#orders.hold, 'disabled', Boolean(over));
+    setAttribute(this.#orders.abort, 'disabled', !shown.can_abort);
+    setAttribute(this.#orders.skip, 'disabled', Boolean(over) || shown.can_abort);
+    setAttribute(this.#orders.end, 'disabled', Boolean(over || shown.ending));
+  }
+
+  /** @param {string[]} markers */
+  #showMarkers(markers) {
+    const node = part(document.body, 'markers');
+    const key = markers.join('\n');
+    if (node.dataset.key !== key) {
+      node.dataset.key = key;
+      node.replaceChildren(...markers.map((name, i) => {
+        const press = order(name, () => this.#send({ type: 'mark', name }));
+        if (MARKER_KEYS[i]) {
+          press.append(element('kbd', { text: MARKER_KEYS[i] }));
+        }
+        return press;
+      }));
+    }
+  }
+
+  /** @param {ItemRow[]} rows */
+  #showItems(rows) {
+    const body = part(document.body, 'items');
+    const key = JSON.stringify(rows);
+    if (body.dataset.key === key) {
+      return;
+    }
+    body.dataset.key = key;
+    body.replaceChildren(...rows.map((row) => {
+      const done = row.state === 'finished' || row.state === 'skipped';
+      const repeat = done ? order('Repeat', () => this.#repeat(row)) : null;
+      repeat?.setAttribute('aria-label', `Repeat ${row.id}`);
+      return element('tr', { 'data-state': row.state,
+        'aria-current': row.state === 'now' ? 'step' : null },
+      element('th', { scope: 'row', text: row.id }), element('td', { text: row.kind }),
+      element('td', { text: row.condition }),
+      element('td', { text: row.outcome ? `${row.state}: ${row.outcome}` : row.state }),
+      element('td', { text: row.attempts ? `${row.attempts}` : '' }),
+      element('td', {}, repeat));
+    }));
+  }
+
+  /** @param {ExperimenterDocument} shown */
+  #showLog({ log }) {
+    const node = part(document.body, 'log');
+    const key = `${log.length} ${log.at(-1)?.at}`;
+    if (node.dataset.key !== key) {
+      node.dataset.key = key;
+      node.replaceChildren(...log.toReversed().map((entry) => element('li', {},
+        element('time', { text: timeOfDay(entry.at) }), entryWords(entry))));
+    }
+  }
+}
+
+/**
+ * @param {string} text
+ * @param {() => void} act
+ */
+function order(text, act) {
+  return element('button', { type: 'button', text, on: { click: act } });
+}
+
+new ExperimenterPage();

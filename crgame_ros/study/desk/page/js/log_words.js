@@ -1,0 +1,41 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Entries of the journal in a line each. */
+
+/** @import { LogEntry } from './experimenter_messages.js' */
+
+/**
+ * Say what an entry says.
+ *
+ * @param {LogEntry} entry
+ * @returns {string}
+ */
+export function entryWords(entry) {
+  const { entry: kind, item, time_s, run, ...rest } = entry;
+  const clock = typeof time_s === 'number' ? ` at ${time_s.toFixed(1)} s of ${run}` : '';
+  const of = typeof item === 'string' && item ? ` ${item}` : '';
+  switch (kind) {
+    case 'note': return `note${clock}: ${rest.text}`;
+    case 'marker': return `marker${clock}: ${rest.name}`;
+    case 'language': return `language: ${rest.language}`;
+    case 'held': return rest.held ? 'held before the next item' : 'goes on';
+    case 'begun': return 'session begun';
+    case 'ended': return `session ended: ${rest.reason}`;
+    case 'started': return `started${of}, attempt ${rest.attempt}${run ? `, ${run}` : ''}`;
+    case 'practised': return `practised${of}: ${rest.good ? 'good' : 'not good'}`;
+    default: {
+      const why = rest.reason ?? rest.outcome;
+      return `${kind}${of}${why === undefined ? '' : `: ${why}`}`;
+    }
+  }
+}
+
+/**
+ * Give the time of day.
+ *
+ * @param {number} at seconds since 1970
+ * @returns {string}
+ */
+export function timeOfDay(at) {
+  return new Date(1000 * at).toLocaleTimeString('en-GB');
+}

@@ -1,0 +1,74 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** A page to read, made of the elements that Markdown knows and no other. */
+
+import { element } from '../../../../cockpit/page/js/dom.js';
+
+/** @import { PageDocument, PageNode } from './desk_messages.js' */
+/** @import { Words } from './words.js' */
+
+const TAGS = /** @type {const} */ (['h1', 'h2', 'h3', 'h4', 'h5', 'h6', 'p', 'ul', 'ol', 'li',
+  'blockquote', 'hr', 'em', 'strong', 's', 'table', 'thead', 'tbody', 'tr', 'th', 'td', 'br',
+  'code', 'pre', 'span']);
+
+/**
+ * Make the nodes of a page.
+ *
+ * @param {PageNode[]} tree
+ * @returns {Node[]}
+ */
+export function pageNodes(tree) {
+  return tree.map((node) => {
+    if (typeof node === 'string') {
+      return document.createTextNode(node);
+    }
+    const children = pageNodes(node.children ?? []);
+    if (node.tag === 'a') {
+      return element('a', { href: node.href, target: '_blank', rel: 'noopener noreferrer' },
+        ...children);
+    }
+    if (node.tag === 'img') {
+      return element('img', { src: `/picture/${encodeURI(node.src ?? '')}`, alt: node.alt });
+    }
+    const tag = TAGS.find((known) => known === node.tag) ?? 'span';
+    return element(tag, {}, ...children);
+  });
+}
+
+/**
+ * Make a page with its way on.
+ *
+ * @param {PageDocument} shown
+ * @param {Words} words
+ * @param {(agreed?: boolean) => void} finish
+ * @returns {HTMLElement}
+ */
+export function pageView({ tree, consent }, words, finish) {
+  const article = element('article', { class: 'reading' }, ...pageNodes(tree));
+  const buttons = element('div', { class: 'go-on' });
+  if (!consent) {
+    buttons.append(button(words.of('next'), 'primary', () => finish()));
+    return element('div', {}, article, buttons);
+  }
+  const ask = () => {
+    const back = button(words.of('back'), '', show);
+    buttons.replaceChildren(
+      element('p', { class: 'problem', role: 'alert', text: words.of('disagree_sure') }),
+      back, button(words.of('disagree_yes'), 'danger', () => finish(false)));
+    back.focus();
+  };
+  const show = () => buttons.replaceChildren(
+    button(words.of('disagree'), '', ask),
+    button(words.of('agree'), 'primary', () => finish(true)));
+  show();
+  return element('div', {}, article, buttons);
+}
+
+/**
+ * @param {string} text
+ * @param {string} kind
+ * @param {() => void} act
+ */
+export function button(text, kind, act) {
+  return element('button', { type: 'button', class: kind || null, text, on: { click: act } });
+}

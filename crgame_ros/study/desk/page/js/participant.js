@@ -1,0 +1,222 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** The participant's page: it shows what the server says, and tells it what the person does. */
+
+import { element, part, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { breakView } from './break_view.js';
+import { DeskConnection } from './desk_connection.js';
+import { DeviceCheck } from './device_check.js';
+import { Draft } from './draft.js';
+import { DriveFrame } from './drive_frame.js';
+import { PadNavigation } from './pad_navigation.js';
+import { button, pageView } from './page_view.js';
+import { questionForm } from './question_form.js';
+import { Words } from './words.js';
+
+/** @import { DeskDocument, Told } from './desk_messages.js' */
+
+const PAGE_KEY = 'crgame.desk.page';
+
+/** The whole page. */
+class ParticipantPage {
+  #words = new Words();
+  #sheet = part(document.body, 'sheet');
+  #lost = part(document.body, 'lost');
+  /** @type {DeskDocument|null} */
+  #shown = null;
+  /** @type {DeviceCheck|null} */
+  #check = null;
+  // What has been sent and not been answered.
+  #sent = '';
+  #drive = new DriveFrame(part(document.body, 'drive'), this.#words,
+    () => this.#connection.send({ type: 'ready', item: this.#shown?.item ?? '' }));
+  #connection = new DeskConnection('/ws/participant', {
+    opened: (again) => {
+      this.#connection.send({ type: 'hello', page: pageKey(), fresh: !again });
+      this.#sent = '';
+      this.#lost.hidden = true;
+    },
+    lost: () => {
+      this.#lost.hidden = this.#shown === null;
+      setText(this.#lost, this.#words.of('lost'));
+    },
+    received: (message) => this.#receive(message),
+    pinged: () => this.#stage(),
+  });
+
+  constructor() {
+    new PadNavigation(this.#sheet, part(document.body, 'drive'));
+  }
+
+  #stage() {
+    const { seated, delay_ms } = this.#drive.state;
+    return { ...typeof seated === 'boolean' ? { seated } : {},
+      ...Number.isFinite(delay_ms) ? { drive_delay_ms: delay_ms } : {} };
+  }
+
+  /** @param {any} message */
+  #receive(message) {
+    switch (message.type) {
+      case 'words':
+        this.#words.take(message.words);
+        break;
+      case 'refused':
+        this.#sent = '';
+        this.#refuse(message.text);
+        break;
+      default:
+        this.#show(message);
+    }
+  }
+
+  /** @param {string} text */
+  #refuse(text) {
+    this.#sheet.querySelector('.refused')?.remove();
+    this.#sheet.append(element('p', { class: 'problem refused', role: 'alert',
+      text: `${this.#words.of('refused')} ${text}` }));
+  }
+
+  /** @param {DeskDocument} shown */
+  #show(shown) {
+    const before = this.#shown;
+    this.#shown = shown;
+    document.documentElement.lang = shown.language;
+    document.title = shown.study;
+    document.body.dataset.show = shown.show;
+    setText(part(document.body, 'study'), shown.study);
+    this.#showProgress(shown);
+    if (shown.show === 'drive') {
+      this.#clear();
+      this.#drive.show(shown);
+      return;
+    }
+    this.#drive.hide();
+    // The same once more, because a page came or went: what is typed stays.
+    const same = before !== null && keyOf(before) === keyOf(shown);
+    if (!same) {
+      this.#sent = '';
+      this.#clear();
+      this.#sheet.append(this.#view(shown));
+      window.scrollTo(0, 0);
+      this.#focus(before !== null);
+    }
+  }
+
+  #clear() {
+    this.#check?.end();
+    this.#check = null;
+    this.#sheet.replaceChildren();
+  }
+
+  /** @param {boolean} moved whether the person has just come from another item */
+  #focus(moved) {
+    const first = this.#sheet.querySelector('input:not([type=checkbox]), textarea, button.primary');
+    const long = this.#sheet.scrollHeight > window.innerHeight;
+    if (moved && (long || !(first instanceof HTMLElement))) {
+      this.#sheet.focus({ preventScroll: true });
+    } else if (first instanceof HTMLElement) {
+      first.focus({ preventScroll: true });
+    }
+  }
+
+  /** @param {DeskDocument} shown */
+  #showProgress({ progress }) {
+    const bar = part(document.body, 'progress');
+    bar.hidden = progress === undefined;
+    if (progress) {
+      const { done, of } = progress;
+      setText(part(document.body, 'step'), this.#words.of('step', {
+        done: Math.min(done + 1, of), of }));
+      setAttribute(bar, 'aria-valuenow', `${done}`);
+      setAttribute(bar, 'aria-valuemax', `${of}`);
+      part(document.body, 'progress-done').style.width = `${100 * done / of}%`;
+    } else {
+      setText(part(document.body, 'step'), '');
+    }
+  }
+
+  /**
+   * @param {Exclude<DeskDocument, {show: 'drive'}>} shown
+   * @returns {HTMLElement}
+   */
+  #view(shown) {
+    const words = this.#words;
+    const draft = shown.item === '' ? null
+      : new Draft(`${shown.study}.${shown.participant}`, shown.item, () => this.#connection.now_s);
+    /** @param {Partial<Told>} told */
+    const finish = (told) => {
+      if (draft && this.#sent !== shown.item) {
+        this.#sent = this.#connection.send({ type: 'finish', item: shown.item, ...draft.times(),
+          ...told }) ? shown.item : '';
+      }
+    };
+    switch (shown.show) {
+      case 'language':
+        return this.#languages(shown.languages);
+      case 'questions':
+        return draft === null ? notice('', '') : questionForm(shown, words, draft, finish);
+      case 'page':
+        return pageView(shown, words, (agreed) => finish(agreed === undefined ? {} : { agreed }));
+      case 'break':
+        return breakView(shown, words, () => finish({}));
+      case 'device':
+        this.#check = new DeviceCheck(shown, words, finish);
+        return this.#check.node;
+      case 'over':
+        return notice(words.of('thanks'), words.of(`over_${shown.how}`));
+      case 'wait':
+        return notice(words.of('wait'), words.of(`wait_${shown.why}`), true);
+      default:
+        return element('div', {}, notice(words.of('elsewhere'), words.of('elsewhere_text')),
+          element('div', { class: 'go-on' }, button(words.of('here'), 'primary',
+            () => this.#connection.send({ type: 'here' }))));
+    }
+  }
+
+  /** @param {string[]} languages */
+  #languages(languages) {
+    return element('div', { class: 'languages' },
+      element('h2', { text: this.#words.of('choose_language') }),
+      ...languages.map((language) => {
+        const name = new Intl.DisplayNames([language], { type: 'language' }).of(language);
+        const choose = button(name ?? language, 'primary',
+          () => this.#connection.send({ type: 'language', language }));
+        choose.lang = language;
+        return choose;
+      }));
+  }
+}
+
+/**
+ * @param {string} title
+ * @param {string} text
+ * @param {boolean} [waits]
+ */
+function notice(title, text, waits = false) {
+  return element('div', { class: 'message', role: 'status' }, element('h2', { text: title }),
+    element('p', { class: 'lead', text }),
+    waits ? element('div', { class: 'waiting', 'aria-hidden': 'true' }) : null);
+}
+
+/**
+ * Say what is shown, so far as it makes another page.
+ *
+ * @param {DeskDocument} shown
+ */
+function keyOf(shown) {
+  return JSON.stringify({ ...shown, progress: null, left_s: 0 });
+}
+
+/** @returns {string} the same as long as this tab lives */
+function pageKey() {
+  const kept = sessionStorage.getItem(PAGE_KEY);
+  if (kept !== null && /^[0-9a-f]{32}$/.test(kept)) {
+    return kept;
+  }
+  const made = [...crypto.getRandomValues(new Uint8Array(16))]
+    .map((byte) => byte.toString(16).padStart(2, '0')).join('');
+  sessionStorage.setItem(PAGE_KEY, made);
+  return made;
+}
+
+new ParticipantPage();

@@ -1,0 +1,256 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** One question on the page: its controls, its answer, and what is wrong with it. */
+
+import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { sliderControls } from './slider.js';
+
+/** @import { Answer, ChoiceQuestion, LikertQuestion, NumberQuestion, Question, TextQuestion
+ * } from './desk_messages.js' */
+/** @import { Words } from './words.js' */
+
+/**
+ * The controls of one question.
+ *
+ * @typedef {object} Controls
+ * @property {HTMLElement} node
+ * @property {() => Answer} answer null where there is none
+ * @property {(answer: Answer) => void} set
+ * @property {() => string} refusal why the answer cannot be taken, empty if it can
+ * @property {HTMLElement[]} inputs that take the focus
+ */
+
+let numbers = 0;
+
+/** One question with its text and its error. */
+export class QuestionView {
+  #controls;
+  #question;
+  #words;
+  #problem;
+
+  /**
+   * @param {Question} question
+   * @param {Words} words
+   * @param {() => void} changed told when the person has changed the answer
+   */
+  constructor(question, words, changed) {
+    numbers += 1;
+    const id = `question-${numbers}`;
+    this.#question = question;
+    this.#words = words;
+    const heard = () => {
+      changed();
+      if (!this.#problem.hidden) {
+        this.show(this.refusal());
+      }
+    };
+    this.#controls = controlsOf(question, words, id, heard);
+    this.#problem = element('p', { class: 'problem', id: `${id}-problem`, role: 'alert',
+      hidden: true });
+    const { inputs, node } = this.#controls;
+    const single = inputs.length === 1;
+    const ask = [element('span', { class: 'ask', text: question.ask }),
+      question.required ? null
+        : element('span', { class: 'optional', text: ` (${words.of('optional')})` })];
+    this.node = single
+      ? element('div', { class: 'question', 'data-kind': question.kind, 'data-name': question.name },
+        element('label', { class: 'legend', for: inputs[0].id }, ...ask), node, this.#problem)
+      : element('fieldset', { class: 'question', 'data-kind': question.kind,
+        'data-name': question.name, 'aria-describedby': `${id}-problem` },
+      element('legend', {}, ...ask), node, this.#problem);
+    if (single) {
+      setAttribute(inputs[0], 'aria-describedby', `${id}-problem`);
+      setAttribute(inputs[0], 'aria-required', question.required ? 'true' : null);
+    }
+  }
+
+  get name() {
+    return this.#question.name;
+  }
+
+  /** @returns {Answer} null where there is none */
+  get answer() {
+    return this.#controls.answer();
+  }
+
+  /** @param {Answer} answer */
+  set answer(answer) {
+    this.#controls.set(answer);
+  }
+
+  /** @returns {string} why the answer cannot be taken, empty if it can */
+  refusal() {
+    const { answer } = this;
+    const refusal = this.#controls.refusal();
+    if (refusal) {
+      return refusal;
+    }
+    const none = answer === null || answer === '' || (Array.isArray(answer) && !answer.length);
+    return none && this.#question.required ? this.#words.of('missing') : '';
+  }
+
+  /** @param {string} problem empty for none */
+  show(problem) {
+    this.#problem.hidden = !problem;
+    setText(this.#problem, problem);
+    for (const input of this.#controls.inputs) {
+      setAttribute(input, 'aria-invalid', problem ? 'true' : null);
+    }
+  }
+
+  focus() {
+    const { inputs } = this.#controls;
+    const chosen = inputs.find((input) => input instanceof HTMLInputElement && input.checked);
+    (chosen ?? inputs[0]).focus();
+    this.node.scrollIntoView({ block: 'nearest' });
+  }
+}
+
+/**
+ * @param {Question} question
+ * @param {Words} words
+ * @param {string} id
+ * @param {() => void} changed
+ * @returns {Controls}
+ */
+function controlsOf(question, words, id, changed) {
+  switch (question.kind) {
+    case 'likert': return likert(question, id, changed);
+    case 'slider': return sliderControls(question, words, id, changed);
+    case 'choice': return choice(question, words, id, changed);
+    case 'number': return number(question, words, id, changed);
+    default: return text(question, words, id, changed);
+  }
+}
+
+/**
+ * @param {LikertQuestion} question
+ * @param {string} id
+ * @param {() => void} changed
+ * @returns {Controls}
+ */
+function likert({ points, left, right, labels }, id, changed) {
+  const labelled = labels.length > 0;
+  const places = Array.from({ length: points }, (_, i) => option(
+    'radio', id, `${i + 1}`, labels[i] ?? `${i + 1}`, changed));
+  const row = element('div', { class: labelled ? 'options likert-labelled' : 'options likert',
+    'data-points': points }, ...places.map(({ node }) => node));
+  const ends = element('div', { class: 'ends' }, element('span', { text: left }),
+    element('span', { text: right }));
+  return {
+    node: labelled || !(left || right) ? row : element('div', {}, row, ends),
+    inputs: places.map(({ input }) => input),
+    answer: () => {
+      const place = places.findIndex(({ input }) => input.checked);
+      return place < 0 ? null : place + 1;
+    },
+    set: (answer) => places.forEach(({ input }, i) => {
+      input.checked = answer === i + 1;
+    }),
+    refusal: () => '',
+  };
+}
+
+/**
+ * @param {ChoiceQuestion} question
+ * @param {Words} words
+ * @param {string} id
+ * @param {() => void} changed
+ * @returns {Controls}
+ */
+function choice({ several, choices }, words, id, changed) {
+  const options = choices.map(([name, label]) => option(
+    several ? 'checkbox' : 'radio', id, name, label, changed));
+  const list = element('div', { class: 'options choices' }, ...options.map(({ node }) => node));
+  const chosen = () => options.filter(({ input }) => input.checked).map(({ input }) => input.value);
+  return {
+    node: several ? element('div', {}, element('p', { class: 'hint', text: words.of('several') }),
+      list) : list,
+    inputs: options.map(({ input }) => input),
+    answer: () => (several ? chosen() : chosen()[0] ?? null),
+    set: (answer) => options.forEach(({ input }) => {
+      input.checked = Array.isArray(answer) ? answer.includes(input.value)
+        : answer === input.value;
+    }),
+    refusal: () => '',
+  };
+}
+
+/**
+ * @param {'radio'|'checkbox'} type
+ * @param {string} name
+ * @param {string} value
+ * @param {string} label
+ * @param {() => void} changed
+ */
+function option(type, name, value, label, changed) {
+  const input = element('input', { type, name, value, on: { change: changed } });
+  return { input, node: element('label', { class: 'option' }, input,
+    element('span', { text: label })) };
+}
+
+/**
+ * @param {NumberQuestion} question
+ * @param {Words} words
+ * @param {string} id
+ * @param {() => void} changed
+ * @returns {Controls}
+ */
+function number({ low, high, whole, unit }, words, id, changed) {
+  // Text, so that what is no number is told, and no wheel of a mouse changes it.
+  const input = element('input', { id, type: 'text', inputmode: whole && low >= 0 ? 'numeric'
+    : 'decimal', autocomplete: 'off', class: 'number', on: { input: changed } });
+  const given = () => input.value.trim().replace(',', '.');
+  const bounded = low > -1e9 && high < 1e9;
+  return {
+    node: element('div', { class: 'number-row' }, input,
+      unit ? element('span', { class: 'unit', text: unit }) : null),
+    inputs: [input],
+    answer: () => (isNumber(given()) ? Number(given()) : null),
+    set: (answer) => {
+      input.value = answer === null ? '' : String(answer);
+    },
+    refusal: () => {
+      if (given() === '') {
+        return '';
+      }
+      const value = Number(given());
+      const fits = isNumber(given()) && value >= low && value <= high
+        && (!whole || Number.isInteger(value));
+      const key = bounded ? whole ? 'number_whole' : 'number_wrong'
+        : whole ? 'number_any_whole' : 'number_any';
+      return fits ? '' : words.of(key, { low, high });
+    },
+  };
+}
+
+/** @param {string} given */
+function isNumber(given) {
+  return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(given) && Number.isFinite(Number(given));
+}
+
+/**
+ * @param {TextQuestion} question
+ * @param {Words} words
+ * @param {string} id
+ * @param {() => void} changed
+ * @returns {Controls}
+ */
+function text({ longest }, words, id, changed) {
+  const input = longest > 100 ? element('textarea', { id, rows: 4, on: { input: changed } })
+    : element('input', { id, type: 'text', autocomplete: 'off', on: { input: changed } });
+  return {
+    node: input,
+    inputs: [input],
+    answer: () => input.value || null,
+    set: (answer) => {
+      input.value = typeof answer === 'string' ? answer : '';
+    },
+    refusal: () => {
+      // As the server counts: an emoji is one character.
+      const count = [...input.value].length;
+      return count <= longest ? '' : words.of('text_long', { longest, count });
+    },
+  };
+}

@@ -1,0 +1,43 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** A question to the experimenter, with a reason for the journal. */
+
+import { element } from '../../../../cockpit/page/js/dom.js';
+
+/**
+ * Ask.
+ *
+ * @param {string} title
+ * @param {string} text
+ * @param {string} yes on the button that goes on
+ * @param {boolean} [reasoned] whether a reason is asked for
+ * @returns {Promise<string|null>} the reason, empty where none is asked for; null for no
+ */
+export function askReason(title, text, yes, reasoned = true) {
+  return new Promise((resolve) => {
+    const reason = element('input', { id: 'reason', type: 'text', required: true,
+      autocomplete: 'off', maxlength: 2000 });
+    /** @type {string|null} */
+    let answer = null;
+    const dialog = element('dialog', { class: 'asking', 'aria-labelledby': 'asking-title', on: {
+      close: () => {
+        dialog.remove();
+        resolve(answer);
+      } } },
+    element('form', { method: 'dialog', on: { submit: (event) => {
+      answer = reasoned ? reason.value.trim() : '';
+      if (reasoned && !answer) {
+        answer = null;
+        event.preventDefault();
+      }
+    } } },
+    element('h2', { id: 'asking-title', text: title }), element('p', { text }),
+    reasoned ? element('label', { for: 'reason', text: 'Reason' }) : null,
+    reasoned ? reason : null,
+    element('div', { class: 'go-on' },
+      element('button', { type: 'button', text: 'Cancel', on: { click: () => dialog.close() } }),
+      element('button', { type: 'submit', class: 'primary', text: yes }))));
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}

@@ -1,0 +1,64 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** A line on which nothing is marked before the person does. */
+
+import { element, setAttribute } from '../../../../cockpit/page/js/dom.js';
+
+/** @import { SliderQuestion } from './desk_messages.js' */
+/** @import { Controls } from './question_view.js' */
+/** @import { Words } from './words.js' */
+
+/**
+ * Make the controls of such a question.
+ *
+ * @param {SliderQuestion} question
+ * @param {Words} words
+ * @param {string} id of its input
+ * @param {() => void} changed
+ * @returns {Controls}
+ */
+export function sliderControls({ low, high, step, left, right }, words, id, changed) {
+  const input = element('input', { id, type: 'range', min: low, max: high, step,
+    class: 'slider' });
+  let marked = false;
+  const show = () => {
+    setAttribute(input, 'data-unset', !marked);
+    setAttribute(input, 'aria-valuetext', marked ? null : words.of('slider_unset'));
+  };
+  const mark = () => {
+    marked = true;
+    show();
+    changed();
+  };
+  input.addEventListener('input', mark);
+  // A click at the very middle changes no value, and yet it is an answer; so are these keys.
+  input.addEventListener('click', () => {
+    if (!marked) {
+      mark();
+    }
+  });
+  input.addEventListener('keydown', ({ key }) => {
+    if (!marked && (key === 'Enter' || key === ' ')) {
+      mark();
+    }
+  });
+  input.value = String((low + high) / 2);
+  show();
+  const count = Math.round((high - low) / step);
+  const ticks = count <= 40
+    ? element('div', { class: 'ticks', 'aria-hidden': 'true' },
+      ...Array.from({ length: count + 1 }, () => element('i'))) : null;
+  return {
+    node: element('div', { class: 'slider-row' }, input, ticks,
+      element('div', { class: 'ends' }, element('span', { text: left }),
+        element('span', { text: right }))),
+    inputs: [input],
+    answer: () => (marked ? Number(input.value) : null),
+    set: (answer) => {
+      marked = typeof answer === 'number';
+      input.value = String(marked ? answer : (low + high) / 2);
+      show();
+    },
+    refusal: () => '',
+  };
+}

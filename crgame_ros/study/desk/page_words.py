@@ -1,0 +1,54 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The words of the participant's page itself, in each language."""
+
+from functools import cache
+from pathlib import Path
+
+from crgame_ros.errors import InputError
+from crgame_ros.study.study_file import StudyFile
+from crgame_ros.yaml_text import read_yaml
+
+WORDS = Path(__file__).resolve().parent / 'words'
+STANDARD = 'en'
+
+
+def words_of(study: StudyFile, language: str) -> dict[str, str]:
+    """
+    Give the words in a language; English ones where it has none.
+
+    :param study: `words.fr.yaml` beside its file is that for French, or goes before ours.
+    :return: by their key.
+    :raises InputError: if a file of words cannot be read.
+    """
+    words = dict(_read(WORDS / f'{STANDARD}.yaml'))
+    for file in (WORDS / f'{language}.yaml', study.base / f'words.{language}.yaml'):
+        if language.isalnum() and file.is_file():
+            given = _read(file)
+            unknown = sorted(set(given) - set(words))
+            if unknown:
+                raise InputError(f'has "{unknown[0][:40]}", which is no word of the page',
+                                 str(file), f'take the keys of {STANDARD}.yaml')
+            words |= given
+    return words
+
+
+@cache
+def _read(file: Path) -> dict[str, str]:
+    given = read_yaml(file, 'words')
+    if not isinstance(given, dict) or not all(
+            isinstance(key, str) and isinstance(text, str) for key, text in given.items()):
+        raise InputError('is no list of words', str(file), 'give texts by their key')
+    return given

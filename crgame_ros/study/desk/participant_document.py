@@ -1,0 +1,148 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the participant's page shows now, as it is sent there."""
+
+from typing import Any
+
+from crgame_ros.study.desk.desk import DECLINED, Desk, is_driven, UNDER_WAY
+from crgame_ros.study.desk.page_markdown import read_tree
+from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.participant_session import SessionEvent
+from crgame_ros.study.question import (
+    ChoiceQuestion,
+    LikertQuestion,
+    NumberQuestion,
+    Question,
+    SliderQuestion,
+    TextQuestion,
+)
+from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
+from crgame_ros.study.study_file import Break, DeviceCheck, Page, Questions
+from crgame_ros.study.study_pages import questionnaire_name
+from crgame_ros.study.trial_plan import PlannedTrial
+
+
+def participant_document(desk: Desk) -> dict[str, Any]:
+    """
+    Describe the page.
+
+    :return: `show` names what is there: language, wait, questions, page, break, device, drive or
+        over; `item` is the id that goes with every answer. Texts are in the page's language.
+    :raises InputError: if a page or questionnaire of the study cannot be read.
+    """
+    session, language = desk.session, desk.language
+    item = session.next_item
+    document = {
+        'study': session.study.title.in_language(language) or session.study.name,
+        'participant': session.participant, 'language': language,
+        'languages': list(session.study.all_languages), 'item': '' if item is None else item.id,
+        'progress': _progress(desk)}
+    if item is None or desk.ending:
+        return {**document, 'show': 'over', 'how': how_over(desk)}
+    if desk.waits:
+        return {**document, 'show': 'wait', 'why': 'held'}
+    if desk.asks_language:
+        return {**document, 'show': 'language'}
+    return {**document, **_item(desk, item)}
+
+
+def how_over(desk: Desk) -> str:
+    """Say how a session is over: done, declined or ended."""
+    ended = next((entry for entry in reversed(desk.session.journal.entries)
+                  if entry['entry'] == SessionEvent.ENDED), None)
+    if ended is None and not desk.ending:
+        return 'done'
+    return 'declined' if ended is not None and ended['reason'] == DECLINED else 'ended'
+
+
+def _progress(desk: Desk) -> dict[str, int]:
+    session = desk.session
+    done = session.done
+    trials = [item for item in session.items if isinstance(item.what, PlannedTrial)]
+    return {'done': len(done), 'of': len(session.items),
+            'drives_done': sum(item.id in done for item in trials), 'drives': len(trials)}
+
+
+def _item(desk: Desk, item: SessionItem) -> dict[str, Any]:
+    what, language, study = item.what, desk.language, desk.session.study
+    if isinstance(what, PlannedTrial | PracticeDrives):
+        return _drive(desk, item)
+    if isinstance(what, Page):
+        return {'show': 'page', 'consent': what.consent,
+                'tree': list(read_tree(study, what, language))}
+    if isinstance(what, Break):
+        return {'show': 'break', 'text': what.text.in_language(language),
+                'left_s': round(desk.break_left_s, 1)}
+    if isinstance(what, DeviceCheck):
+        return {'show': 'device', 'text': what.text.in_language(language)}
+    questions = {'show': 'questions', 'title': '', 'text': '', 'questions': [
+        _question(question, language) for question in desk.session.questions(item)]}
+    if isinstance(what, Questions):
+        scale = load_questionnaire(questionnaire_name(study, what))
+        questions |= {'title': scale.title.in_language(language),
+                      'text': scale.text.in_language(language)}
+    assert isinstance(what, Questions | Fields)
+    return questions
+
+
+def _drive(desk: Desk, item: SessionItem) -> dict[str, Any]:
+    state, what = desk.drives.state, item.what
+    if state.phase not in (DrivePhase.READY, *UNDER_WAY) or state.item != item.id:
+        return {'show': 'wait', 'why': 'failed' if state.phase == DrivePhase.FAILED
+                else 'preparing'}
+    drive = {'show': 'drive', 'phase': state.phase.value, 'link': state.link,
+             'attempt': state.attempt, 'practice': isinstance(what, PracticeDrives)}
+    if isinstance(what, PlannedTrial):
+        drive['number'] = what.number
+    else:
+        drive['number'] = 1 + practised(desk, item)
+    return drive
+
+
+def practised(desk: Desk, item: SessionItem) -> int:
+    """Count the practice drives of an item since it was last to be done anew."""
+    assert is_driven(item)
+    count = 0
+    for entry in desk.session.journal.entries:
+        if entry.get('item') == item.id:
+            if entry['entry'] == SessionEvent.PRACTISED:
+                count += 1
+            elif entry['entry'] == SessionEvent.REPEATED:
+                count = 0
+    return count
+
+
+def _question(question: Question, language: str) -> dict[str, Any]:
+    kind = question.kind
+    document: dict[str, Any] = {'name': question.name, 'required': question.required,
+                                'ask': question.ask.in_language(language) or question.name}
+    if isinstance(kind, LikertQuestion):
+        return document | {
+            'kind': 'likert', 'points': kind.points, 'left': kind.left.in_language(language),
+            'right': kind.right.in_language(language),
+            'labels': [label.in_language(language) for label in kind.labels]}
+    if isinstance(kind, SliderQuestion):
+        return document | {
+            'kind': 'slider', 'low': kind.low, 'high': kind.high, 'step': kind.step,
+            'left': kind.left.in_language(language), 'right': kind.right.in_language(language)}
+    if isinstance(kind, ChoiceQuestion):
+        return document | {'kind': 'choice', 'several': kind.several, 'choices': [
+            [name, text.in_language(language)] for name, text in kind.texts.items()]}
+    if isinstance(kind, NumberQuestion):
+        return document | {'kind': 'number', 'low': kind.low, 'high': kind.high,
+                           'whole': kind.whole, 'unit': kind.unit}
+    assert isinstance(kind, TextQuestion)
+    return document | {'kind': 'text', 'longest': kind.longest}

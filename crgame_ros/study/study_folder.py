@@ -1,0 +1,117 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where a study's data lies: one folder for it, and one in it for each participant."""
+
+from pathlib import Path
+import re
+
+from crgame_ros.errors import InputError
+from crgame_ros.study.session_journal import read_journal
+from crgame_ros.study.study_file import Page, Questions, StudyFile
+
+_ID = re.compile(r'[A-Za-z0-9][A-Za-z0-9_-]{0,31}')
+
+
+def check_participant(name: str) -> str:
+    """
+    Check an anonymous id.
+
+    :raises InputError: if it is none.
+    """
+    if _ID.fullmatch(name) is None:
+        raise InputError('is no id of a participant', name[:40] or '--participant',
+                         'give 1 to 32 letters, digits, - and _, such as P07')
+    return name
+
+
+class StudyFolder:
+    """
+    The folder of a study.
+
+    :param root: of it.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    @property
+    def participants(self) -> list[str]:
+        """Name those who have begun, in the order of their places."""
+        folder = self.root / 'participants'
+        found = [(places[0], path.name) for path in (folder.iterdir() if folder.is_dir() else ())
+                 if (places := _places(path))]
+        return [name for _, name in sorted(found)]
+
+    def participant(self, name: str) -> Path:
+        """Give the folder of a participant, which may not be there yet."""
+        return self.root / 'participants' / name
+
+    def place_of(self, name: str) -> int:
+        """Give a participant's place among all: the one they began with, or the next free one."""
+        own = _places(self.participant(name))
+        if own:
+            return own[0]
+        taken = {place for other in self.participants
+                 for place in _places(self.participant(other))}
+        return next(place for place in range(len(taken) + 1) if place not in taken)
+
+    def keep_study(self, study: StudyFile, file: Path) -> None:
+        """
+        Keep the study's files as they are, or make sure that they still are what was kept.
+
+        :param file: of the study.
+        :raises InputError: if one has changed since, or cannot be written.
+        """
+        folder = self.root / 'study'
+        files = {'study.yaml': file, **{name: study.base / name for name in _beside(study)}}
+        try:
+            for name, path in files.items():
+                kept = folder / name
+                content = path.read_bytes()
+                if not kept.exists():
+                    kept.parent.mkdir(parents=True, exist_ok=True)
+                    part = kept.with_name(f'{kept.name}.part')
+                    part.write_bytes(content)
+                    part.replace(kept)
+                elif kept.read_bytes() != content:
+                    raise InputError('has changed since the first participant', str(path),
+                                     f'put it back as {kept} has it, or begin a new study with '
+                                     'another --out')
+        except OSError as error:
+            raise InputError(f'cannot be kept ({error.strerror})', str(folder),
+                             'choose another folder with --out') from error
+
+
+def _beside(study: StudyFile) -> list[str]:
+    """Name the pages and questionnaires beside a study file, in every language."""
+    entries = [*study.before, *study.after]
+    for block in study.blocks:
+        entries += [*block.before, *block.after_trial, *block.after]
+    names: dict[str, None] = {}
+    for entry in entries:
+        step = entry.step
+        if isinstance(step, Page):
+            page = Path(step.file)
+            for name in (step.file, *(str(page.with_suffix(f'.{language}.md'))
+                                      for language in (study.language, *study.languages))):
+                if (study.base / name).is_file():
+                    names[name] = None
+        elif isinstance(step, Questions) and step.name.endswith(('.yaml', '.yml')):
+            names[step.name] = None
+    return [name for name in names if '..' not in Path(name).parts]
+
+
+def _places(folder: Path) -> list[int]:
+    return [entry['place'] for entry in read_journal(folder) if entry['entry'] == 'begun']

@@ -1,0 +1,296 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A participant's whole session in a real browser, by keyboard alone, and what may go wrong."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+from typing import Any
+
+from browser_support import Browser
+from crgame_ros.study.session_journal import read_journal
+import pytest
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+STUDY_TESTS = Path(__file__).resolve().parents[1] / 'study'
+sys.path.insert(0, str(STUDY_TESTS))
+
+from desk_support import write_study  # noqa: E402, I100
+
+TEXT = '<b>"it\'s" & \\ {age}</b>\n\n  second line\t😀 Grüße ' + 'ä😀' * 4970
+TEXT += 'x' * (10_000 - len(TEXT))
+
+
+class Desk:
+    """A desk's process, with the addresses that it has told."""
+
+    def __init__(self, process: 'subprocess.Popen[str]') -> None:
+        self.process = process
+        assert process.stdout is not None
+        self.participant, self.experimenter = (
+            re.findall(r'http\S+', process.stdout.readline())[0] for _ in range(2))
+        self.port = int(re.findall(r':(\d+)/', self.participant)[0])
+
+
+@contextmanager
+def running(folder: Path, port: int = 0, step_s: float = 0.05, link: str = '',
+            **changed: Any) -> Iterator[Desk]:
+    """Start a desk of the study in a folder."""
+    if not (folder / 'study').exists():
+        write_study(folder / 'study', **changed)
+    process = subprocess.Popen(
+        [sys.executable, STUDY_TESTS / 'desk_process.py', folder / 'study' / 'study.yaml',
+         folder / 'P07', str(port), link, str(step_s)], stdout=subprocess.PIPE, text=True)
+    try:
+        yield Desk(process)
+    finally:
+        process.kill()
+        process.wait()
+
+
+class Participant:
+    """Somebody who has a keyboard only."""
+
+    def __init__(self, browser: Browser) -> None:
+        self.browser = browser
+
+    def press(self, *keys: str) -> None:
+        ActionChains(self.browser.driver).send_keys(*keys).perform()
+
+    def tab_to(self, selector: str) -> None:
+        """Go to the next control that fits."""
+        for _ in range(80):
+            if self.browser.run('return document.activeElement.matches(arguments[0])', selector):
+                return
+            self.press(Keys.TAB)
+        pytest.fail(f'no way to {selector} by Tab')
+
+    def question(self, name: str) -> None:
+        self.tab_to(f'[data-name="{name}"] :is(input, textarea)')
+
+    def go_on(self) -> None:
+        self.tab_to('button.primary')
+        self.press(Keys.ENTER)
+
+    def shows(self, what: str, heading: str = '') -> None:
+        """Wait for a page, and that it says a text."""
+        self.browser.wait('document.body.dataset.show === arguments[0]'
+                          ' && document.body.innerText.includes(arguments[1])',
+                          f'{what} {heading}', arguments=(what, heading))
+
+    def answer_all(self) -> None:
+        """Answer every question of the page: the second option, one step, 30, a few words."""
+        kinds = self.browser.run('return [...document.querySelectorAll(".question")].map('
+                                 '(node) => [node.dataset.name, node.dataset.kind])')
+        for name, kind in kinds:
+            self.question(name)
+            self.press({'likert': Keys.ARROW_RIGHT, 'slider': Keys.ARROW_RIGHT,
+                        'choice': Keys.ARROW_RIGHT, 'number': '30', 'text': 'yes'}[kind])
+
+
+def finished(folder: Path) -> dict[str, dict[str, Any]]:
+    """Give what is told of each finished item."""
+    entries = [entry for entry in read_journal(folder / 'P07') if entry['entry'] == 'finished']
+    assert len({entry['item'] for entry in entries}) == len(entries)
+    return {entry['item']: entry for entry in entries}
+
+
+@pytest.mark.parametrize(('language', 'agree', 'drive', 'thanks'), [
+    ('en', 'I agree', 'Drive 2 of 2', 'Thank you'),
+    ('de', 'Ich stimme zu', 'Fahrt 2 von 2', 'Vielen Dank')])
+def test_a_whole_session_by_keyboard(browser: Browser, tmp_path: Path, language: str, agree: str,
+                                     drive: str, thanks: str) -> None:
+    """Every kind of item; what is typed comes back as it was, with plausible times."""
+    person = Participant(browser)
+    with running(tmp_path) as desk:
+        browser.open(desk.participant)
+        person.shows('language')
+        person.tab_to(f'button[lang={language}]')
+        person.press(Keys.ENTER)
+        person.shows('questions')
+        assert browser.run('return document.documentElement.lang') == language
+        assert browser.run('return document.querySelector("button.primary").textContent') == {
+            'en': 'Next', 'de': 'Weiter'}[language]
+        person.go_on()
+        assert browser.wait('document.querySelectorAll(".question .problem:not([hidden])").length'
+                            ) == 2
+        person.question('age')
+        person.press('17')
+        person.go_on()
+        browser.wait('document.querySelector("[data-name=age] .problem").textContent'
+                     '.includes("18")')
+        person.question('age')
+        person.press(Keys.BACKSPACE, Keys.BACKSPACE, '42')
+        person.question('licence')
+        person.press(Keys.ARROW_DOWN)
+        person.go_on()
+        person.shows('page', agree)
+        person.go_on()
+        person.shows('page', 'Welcome')
+        assert browser.run('return document.querySelectorAll("#sheet script").length') == 0
+        assert browser.run('return [...document.querySelectorAll("#sheet a")].map((a) => a.href)'
+                           ) == ['https://example.org/']
+        browser.wait('document.querySelector("#sheet img").naturalWidth === 320')
+        person.go_on()
+        person.shows('device')
+        browser.run('document.activeElement.blur()')
+        person.press('a', 'd', 'w')
+        person.go_on()
+        browser.wait('document.querySelector(".device-check > .problem").textContent')
+        browser.run('document.activeElement.blur()')
+        person.press('s')
+        person.go_on()
+        person.shows('questions')
+        answer_kinds(person)
+        drive_and_rate(person, drive)
+        person.shows('over', thanks)
+        assert not browser.console_errors()
+    check_told(finished(tmp_path), language)
+
+
+def answer_kinds(person: Participant) -> None:
+    """Answer one question of each kind."""
+    person.question('trust')
+    person.press(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+    person.question('often')
+    person.press(Keys.ARROW_LEFT)
+    person.question('tired')
+    person.press(Keys.HOME, Keys.ARROW_RIGHT)
+    person.question('vehicles')
+    person.press(' ', Keys.TAB, Keys.TAB, ' ')
+    person.question('distance')
+    person.press('12000,5')
+    person.question('words')
+    # Ten thousand characters, many of which no key gives, come from the clipboard.
+    person.browser.driver.execute_cdp_cmd('Input.insertText', {'text': TEXT})
+    person.go_on()
+
+
+def drive_and_rate(person: Participant, last: str) -> None:
+    """Practise, drive twice with a break between, and answer the questionnaires."""
+    person.shows('drive')
+    person.go_on()
+    person.browser.wait('document.querySelector(".gate h2").textContent.includes("1")'
+                        ' && document.querySelector(".gate h2").textContent.includes("2")')
+    person.go_on()
+    person.shows('questions')
+    assert person.browser.run('return document.querySelectorAll(".question").length') == 21
+    person.answer_all()
+    person.go_on()
+    person.shows('break')
+    person.browser.wait('!document.querySelector("#sheet button").disabled')
+    person.go_on()
+    person.shows('drive', last)
+    person.go_on()
+    for _ in range(3):
+        person.shows('questions')
+        title = person.browser.run('return document.querySelector("h2").textContent')
+        person.answer_all()
+        person.go_on()
+        person.browser.wait('document.querySelector("h2")?.textContent !== arguments[0]',
+                            arguments=(title,))
+
+
+def check_told(told: dict[str, dict[str, Any]], language: str) -> None:
+    """Look at what the journal has of such a session."""
+    assert told['fields']['answers'] == {'age': 42, 'licence': 'no'}
+    assert told['before/1']['agreed'] is True
+    assert told['before/3']['device'] == 'keyboard'
+    assert sorted(told['before/3']['moved']) == ['brake', 'left', 'right', 'throttle']
+    answers = told['before/4']['answers']
+    assert answers.pop('words') == TEXT and len(TEXT) == 10_000
+    assert answers == {'trust': 3, 'often': 4, 'tired': 5, 'vehicles': ['car', 'truck'],
+                       'distance': 12000.5}, language
+    for entry in told.values():
+        if 'shown_at' in entry:
+            assert entry['shown_at'] <= entry['answered_at'] <= entry['at'] + 1.0
+            assert entry['taken_s'] == pytest.approx(
+                entry['answered_at'] - entry['shown_at'], abs=0.01)
+            assert all(0.0 <= after_s <= entry['taken_s'] for after_s in entry['after_s'].values())
+    assert set(told['before/4']['after_s']) == {*answers, 'words'}
+    assert len(told) == 13
+
+
+def test_nothing_is_lost_or_asked_twice_after_a_kill_and_a_reload(browser: Browser,
+                                                                  tmp_path: Path) -> None:
+    """The page comes back by itself with what was typed; what was kept is not asked again."""
+    person = Participant(browser)
+    with running(tmp_path) as desk:
+        browser.open(desk.participant)
+        person.shows('language')
+        person.go_on()
+        person.shows('questions')
+        person.question('age')
+        person.press('42')
+        os.kill(desk.process.pid, signal.SIGKILL)
+        desk.process.wait()
+        browser.wait('!document.getElementById("lost").hidden', 'the page to see it')
+        person.question('licence')
+        person.press(Keys.ARROW_DOWN)
+        person.go_on()
+        port = desk.port
+    with running(tmp_path, port) as desk:
+        assert desk.port == port
+        browser.wait('document.getElementById("lost").hidden', 'the page to come back')
+        browser.driver.refresh()
+        person.shows('questions')
+        assert browser.wait('document.querySelector("[data-name=age] input")?.value') == '42'
+        assert browser.run('return document.querySelectorAll("input:checked").length') == 1
+        person.go_on()
+        person.shows('page', 'I agree')
+        os.kill(desk.process.pid, signal.SIGKILL)
+        desk.process.wait()
+    with running(tmp_path, port):
+        browser.wait('document.getElementById("lost").hidden', 'the page to come back again')
+        person.shows('page', 'I agree')
+        assert list(finished(tmp_path)) == ['fields']
+        shown = finished(tmp_path)['fields']
+        assert shown['taken_s'] > 0.0
+
+
+def test_a_second_tab_and_a_double_click_do_nothing_twice(browser: Browser,
+                                                          tmp_path: Path) -> None:
+    """The tab that was opened last is used; the first one takes over when asked to."""
+    person = Participant(browser)
+    with running(tmp_path, languages=[]) as desk:
+        browser.open(desk.participant)
+        person.shows('questions')
+        first = browser.driver.current_window_handle
+        browser.driver.switch_to.new_window('tab')
+        browser.open(desk.participant)
+        person.shows('questions')
+        second = browser.driver.current_window_handle
+        browser.driver.switch_to.window(first)
+        person.shows('elsewhere')
+        person.go_on()
+        person.shows('questions')
+        browser.driver.switch_to.window(second)
+        person.shows('elsewhere')
+        browser.driver.close()
+        browser.driver.switch_to.window(first)
+        person.answer_all()
+        browser.run('const button = document.querySelector("button.primary");'
+                    'button.click(); button.click(); button.click();')
+        person.shows('page', 'I agree')
+        browser.run('const button = document.querySelector("button.primary");'
+                    'button.click(); button.click();')
+        person.shows('page', 'Welcome')
+        assert list(finished(tmp_path)) == ['fields', 'before/1']

@@ -1,0 +1,167 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Trials in the live graph: each is whole or comes again, whatever is killed meanwhile."""
+
+import asyncio
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import signal
+import threading
+from typing import Any
+
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.schema.reading import read
+from crgame_ros.study.conduct.live_drives import LiveDrives
+from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.participant_session import ParticipantSession
+from crgame_ros.study.session_journal import read_journal
+from crgame_ros.study.study_file import StudyFile
+from live_support import is_node, wait_until
+from page_client import PageClient
+import pytest
+
+DURATION_S = 2.5
+
+
+class Participant:
+    """A session that goes on in a thread, and a person who drives in it."""
+
+    def __init__(self, folder: Path) -> None:
+        settings = {'duration': DURATION_S, 'game': str(scenarios_directory() / 'cut_in.yaml')}
+        merge = {'name': 'merge', 'game': str(scenarios_directory() / 'merge.yaml')}
+        study = read(StudyFile, {
+            'name': 'demo', 'settings': settings,
+            'factors': [{'name': 'scene', 'levels': [
+                {'name': 'cut-in', 'planner': 'idm'}, merge]}],
+            'blocks': [{'name': 'main', 'order': 'given', 'repetitions': 2}]}, 'study')
+        self.folder = folder
+        self.session = ParticipantSession(study, folder, 'P01', 0)
+        self.loop = asyncio.new_event_loop()
+        self.drives = LiveDrives(self.session, folder, lambda: 'en', 8150,
+                                 lambda: ['--countdown', '0.2'])
+        self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._run(),))
+        self._page: PageClient | None = None
+        self.graphs: list[int] = []
+
+    async def _run(self) -> None:
+        self._task = asyncio.create_task(self.drives.run())
+        try:
+            await self._task
+        except asyncio.CancelledError:
+            await self.drives.close()
+
+    def __enter__(self) -> 'Participant':
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._page is not None:
+            self._page.close()
+        self.loop.call_soon_threadsafe(self._task.cancel)
+        self._thread.join(90.0)
+        self.session.journal.close()
+        assert not self._thread.is_alive()
+
+    def wait_for(self, phase: DrivePhase, item: str) -> None:
+        wait_until(lambda: self.drives.state.phase is phase and self.drives.state.item == item,
+                   f'{item} to be {phase}; it is {self.drives.state}')
+
+    def begin(self, item: str) -> None:
+        """Take the seat of a trial that is ready, and say so."""
+        self.wait_for(DrivePhase.READY, item)
+        graph = self.drives._graph
+        assert graph is not None
+        self.graphs.append(graph.pid)
+        address = graph.cockpit
+        if self._page is None or self._page.closed or self._page.page != address:
+            if self._page is not None:
+                self._page.close()
+            self._page = PageClient(address)
+        wait_until(lambda: self._page is not None and self._page.request(
+            'claim', seat='hv0', device='')['ok'], 'the seat')
+        self._page.hold_keys('hv0', [1, 0, 0, 0])
+        self.loop.call_soon_threadsafe(self.drives.ready, item)
+
+    def call(self, function: Any, *arguments: Any) -> None:
+        self.loop.call_soon_threadsafe(function, *arguments)
+
+
+@pytest.fixture(scope='module')
+def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str, Any]]]:
+    """Drive four trials: one is killed, one aborted and one skipped on the way."""
+    folder = tmp_path_factory.mktemp('study') / 'participants' / 'P01'
+    with Participant(folder) as person:
+        person.begin('main/1')
+        person.wait_for(DrivePhase.DRIVING, 'main/1')
+        # The launcher's power goes: its nodes end with it.
+        os.kill(person.graphs[-1], signal.SIGKILL)
+        person.begin('main/1')
+        person.begin('main/2')
+        person.wait_for(DrivePhase.DRIVING, 'main/2')
+        wait_until(lambda: (person.drives.state.time_s or 0.0) > 1.0, 'a second of the run')
+        person.call(person.drives.abort, 'a telephone rang')
+        person.begin('main/2')
+        person.begin('main/3')
+        person.wait_for(DrivePhase.DRIVING, 'main/3')
+        person.call(person.session.skip, 'no time left')
+        person.call(person.drives.wake)
+        person.begin('main/4')
+        wait_until(lambda: person.session.next_item is None, 'the end')
+        wait_until(lambda: person.drives.state.phase is DrivePhase.NONE, 'the graph to end')
+        person._thread.join(90.0)
+        assert not any(is_node(pid) for pid in person.graphs)
+    entries = read_journal(folder)
+    for entry in entries:
+        entry['folder'] = folder
+    yield entries
+
+
+def test_each_trial_is_finished_once_or_skipped(journal: list[dict[str, Any]]) -> None:
+    told = [(entry['entry'], entry['item']) for entry in journal if 'item' in entry]
+    assert told == [
+        ('started', 'main/1'), ('aborted', 'main/1'), ('started', 'main/1'),
+        ('finished', 'main/1'),
+        ('started', 'main/2'), ('aborted', 'main/2'), ('started', 'main/2'),
+        ('finished', 'main/2'),
+        ('started', 'main/3'), ('skipped', 'main/3'), ('aborted', 'main/3'),
+        ('started', 'main/4'), ('finished', 'main/4')]
+    reasons = [entry['reason'] for entry in journal if entry['entry'] == 'aborted']
+    assert 'killed' in reasons[0]
+    assert reasons[1] == 'a telephone rang'
+
+
+def test_what_is_finished_was_driven_to_its_end(journal: list[dict[str, Any]]) -> None:
+    finished = [entry for entry in journal if entry['entry'] == 'finished']
+    assert [entry['attempt'] for entry in finished] == [2, 2, 1]
+    for entry in finished:
+        assert entry['outcome'] == 'time'
+        assert entry['end_time_s'] == pytest.approx(DURATION_S)
+        assert entry['asked_at'] < entry['start_at'] < entry['at']
+        log = read_run_log(recording_in(entry['folder'] / entry['run']))
+        # Scenario steps of 0.1 s, the first included.
+        assert len(log.ks) == round(DURATION_S / 0.1) + 1
+
+
+def test_each_run_holds_its_own_game(journal: list[dict[str, Any]]) -> None:
+    finished = {entry['item']: entry for entry in journal if entry['entry'] == 'finished'}
+    games = {item: (entry['folder'] / entry['run'] / 'game.yaml').read_text()
+             for item, entry in finished.items()}
+    assert 'CutIn' in games['main/1']
+    assert 'Merge' in games['main/2']
+    assert 'Merge' in games['main/4']
+    assert len({entry['run'] for entry in finished.values()}) == 3

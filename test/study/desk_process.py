@@ -1,0 +1,43 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A desk in a process of its own, which tests end as they like."""
+
+import asyncio
+from pathlib import Path
+import sys
+
+from crgame_ros.cockpit.access import Access
+from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.desk_server import serve_desk
+from crgame_ros.study.participant_session import ParticipantSession
+from crgame_ros.study.study_file import load_study
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from desk_support import DrivesWithoutGraph  # noqa: E402, I100
+
+
+async def main(study: str, folder: str, port: str, link: str = '', step_s: str = '0.05') -> None:
+    """Serve the session in a folder until somebody ends the process."""
+    with ParticipantSession(load_study(Path(study)), Path(folder), 'P07', 0) as session:
+        desk = Desk(session, DrivesWithoutGraph(session, link, float(step_s)),
+                    markers=('braked late', 'spoke'))
+        _, lines = await serve_desk(desk, Access('127.0.0.1', int(port)), Path(folder))
+        print('\n'.join(lines), flush=True)
+        await asyncio.Event().wait()
+
+
+if __name__ == '__main__':
+    asyncio.run(main(*sys.argv[1:]))
