@@ -155,7 +155,8 @@ export class SeenInstances {
       if (sight !== null && !this.#mayBeSeen(i, sight)) {
         continue;
       }
-      if (sight !== null && this.#far !== null
+      // Where all detail is there, nothing is plain, however soon.
+      if (sight !== null && this.#far !== null && sight.plain_m < Infinity
           && this.#distance(i, sight) > this.#sooner * sight.plain_m) {
         this.#far.add(this.#matrices, this.#colors, i);
       } else {
