@@ -389,6 +389,10 @@ def test_without_the_library_the_map_works_and_a_line_says_so(
         monkeypatch.setattr(page_files, 'find_library', lambda: None)
         browser.open(other.address)
         browser.wait('crgame.ready && crgame.store.scene && crgame.world.stats.frames > 0')
+        # Viewpoints can be chosen where there is a view: on the map one button opens it.
+        assert browser.run("""
+            return [...document.querySelectorAll('.view3d-buttons button')].filter(
+              (node) => node.getClientRects().length > 0).length""") == 1
         assert browser.run_async('return await crgame.view3d.show(true)') is False
         browser.wait("""[...document.querySelectorAll('#notices *')].some(
             (node) => node.textContent.includes('crgame cockpit-3d'))""")
