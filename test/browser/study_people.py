@@ -81,7 +81,7 @@ class StudySession:
     """
 
     def __init__(self, file: Path, out: Path, participant: str, port: int) -> None:
-        self._command = [sys.executable, '-m', 'crgame_ros.cli', 'study', 'run', str(file),
+        self.command = [sys.executable, '-m', 'crgame_ros.cli', 'study', 'run', str(file),
                          '--participant', participant, '--out', str(out), '--port', str(port)]
         self.folder = out / 'participants' / participant
         self.answers: dict[str, Any] = {}
@@ -95,7 +95,7 @@ class StudySession:
         self._open()
 
     def _start(self) -> None:
-        self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(self.command, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
         self._process.stdout.readline()
         links = [re.findall(r'http\S+', self._process.stdout.readline()) for _ in range(2)]
@@ -103,7 +103,8 @@ class StudySession:
         self._experimenter = Experimenter(self._link)
 
     def _open(self) -> None:
-        self._end_browser = open_browser(Path(tempfile.mkdtemp(prefix='crgame_study_')))
+        self._profile = Path(tempfile.mkdtemp(prefix='crgame_study_'))
+        self._end_browser = open_browser(self._profile)
         self._browser = self._end_browser.__enter__()
         self._browser.open(self.page)
         self._robot = StudyRobot(self._browser)
@@ -127,6 +128,10 @@ class StudySession:
         self.is_over = self.is_over or shown == 'over'
         return shown
 
+    def time_s(self) -> float | None:
+        """Give the run's clock as the page shows it [s]; None between drives."""
+        return self._robot.time_s()
+
     def mark(self, name: str) -> None:
         """Set a marker while the page drives, and note the clock that the page shows then."""
         time_s = self._robot.time_s()
@@ -138,9 +143,7 @@ class StudySession:
     def kill(self, victim: str) -> bool:
         """Kill one of `VICTIMS` (-9); tell whether there was one."""
         if victim == 'page':
-            assert self._browser is not None
-            process = self._browser.driver.service.process
-            _kill_with_children(process.pid)
+            _kill_with_profile(self._profile)
             return True
         assert self._process is not None
         if victim == 'study':
@@ -183,6 +186,7 @@ class StudySession:
                 self._process.kill()
 
     def _close_browser(self) -> None:
+        _kill_with_profile(self._profile)
         with suppress(Exception):
             self._end_browser.__exit__(None, None, None)
 
@@ -197,10 +201,10 @@ def study_session(file: Path, out: Path, participant: str, port: int) -> Iterato
         session.close()
 
 
-def _kill_with_children(pid: int) -> None:
-    """Kill a process and all of its descendants."""
-    for child in Path(f'/proc/{pid}/task/{pid}/children').read_text().split():
+def _kill_with_profile(profile: Path) -> None:
+    """Kill the browser that has its files in a folder, with all its processes."""
+    mark = f'--user-data-dir={profile}'.encode()
+    for entry in Path('/proc').iterdir():
         with suppress(OSError):
-            _kill_with_children(int(child))
-    with suppress(OSError):
-        os.kill(pid, signal.SIGKILL)
+            if entry.name.isdecimal() and mark in (entry / 'cmdline').read_bytes():
+                os.kill(int(entry.name), signal.SIGKILL)

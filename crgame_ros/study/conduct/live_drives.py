@@ -18,6 +18,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+import secrets
 import time
 
 from crgame_ros.errors import CrgameError
@@ -61,6 +62,7 @@ class LiveDrives:
                  port: int, more: Callable[[], Sequence[str]] = tuple) -> None:
         self._session, self._folder, self._language = session, folder, language
         self._port, self._more = port, more
+        self._key = secrets.token_hex(16)
         self._graph: StudyGraph | None = None
         self._director: Director | None = None
         # What the graph has loaded and not yet driven.
@@ -300,7 +302,7 @@ class LiveDrives:
     def _tell(self, phase: DrivePhase, item: str = '', text: str = '', *, attempt: int = 0,
               drive: StudyDrive | None = None) -> None:
         link = '' if drive is None or self._graph is None \
-            else drive.link(self._graph.cockpit, self._language())
+            else drive.link(self._graph.cockpit, self._language(), self._key)
         state = DriveState(phase, item, attempt, link, None, text)
         if state != self._state:
             self._state = state

@@ -49,13 +49,18 @@ class StudyDrive:
     seat: str
     game: Path
 
-    def link(self, cockpit: str, language: str) -> str:
-        """Give the address of the cockpit's page as the participant sees it."""
+    def link(self, cockpit: str, language: str, key: str) -> str:
+        """
+        Give the address of the cockpit's page as the participant sees it.
+
+        :param key: by which the cockpit knows the participant again, in whatever browser.
+        """
         settings = self.settings
         shown = {name: int(bool(getattr(settings, name)))
                  for name in ('map', 'names', 'plans', 'sound')}
         return f'{cockpit.rstrip("/")}/?' + urlencode(
-            {'stage': self.seat, 'view': settings.view or 'driver', **shown, 'lang': language})
+            {'stage': self.seat, 'view': settings.view or 'driver', **shown,
+             'lang': language, 'key': key})
 
 
 def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:

@@ -10,9 +10,11 @@ const KEY = 'crgame.key';
 /** The key of this tab, and of the tab to come once it has been closed. */
 class Person {
   #connection;
+  // Whoever gives out the address of a stage may say who its driver is, whatever the browser.
+  #given = givenKey();
   // Of a tab that was open before: another tab may have it, and keeps it then.
-  #fresh = sessionStorage.getItem(KEY) === null;
-  #key = sessionStorage.getItem(KEY) ?? localStorage.getItem(KEY) ?? newKey();
+  #fresh = this.#given === null && sessionStorage.getItem(KEY) === null;
+  #key = this.#given ?? sessionStorage.getItem(KEY) ?? localStorage.getItem(KEY) ?? newKey();
 
   /**
    * @param {Store} store
@@ -33,9 +35,11 @@ class Person {
   }
 
   #introduce() {
-    sessionStorage.setItem(KEY, this.#key);
-    if (localStorage.getItem(KEY) === null) {
-      localStorage.setItem(KEY, this.#key);
+    if (this.#given === null) {
+      sessionStorage.setItem(KEY, this.#key);
+      if (localStorage.getItem(KEY) === null) {
+        localStorage.setItem(KEY, this.#key);
+      }
     }
     this.#connection.send({ type: 'person', key: this.#key, fresh: this.#fresh });
     // From now on a connection that comes back is this tab's.
@@ -43,9 +47,16 @@ class Person {
   }
 
   #beAnother() {
+    this.#given = null;
     this.#key = newKey();
     this.#introduce();
   }
+}
+
+/** @returns {string|null} the key that the address gives */
+function givenKey() {
+  const key = new URLSearchParams(window.location.search).get('key') ?? '';
+  return /^[0-9a-f]{32}$/.test(key) ? key : null;
 }
 
 /** 128 random bits; randomUUID is there on safe origins alone. */

@@ -53,7 +53,11 @@ export class Stage {
     store.on('notice', ({ level, text }) => {
       this.#failed = level === 'error' ? text : this.#failed;
     });
-    store.on('hello', () => this.#takeRole());
+    store.on('hello', () => {
+      // Another server may give the same id, and knows of no role.
+      this.#role = '';
+      this.#takeRole();
+    });
     store.on('seats', () => this.#look());
     store.on('connection', () => this.#look());
     this.#takeRole();

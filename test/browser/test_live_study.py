@@ -1,0 +1,100 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A participant goes through a study in a real browser, whatever is killed on the way."""
+
+from collections import Counter
+from collections.abc import Iterator
+import csv
+from pathlib import Path
+import subprocess
+import sys
+from typing import Any
+
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.study.session_journal import read_journal
+import pytest
+from study_people import study_session, StudySession
+import yaml
+
+# Longer than a page may be gone [s].
+DURATION_S = 6.0
+PATIENCE_S = 240.0
+
+
+@pytest.fixture(scope='module')
+def conducted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudySession]:
+    """Conduct a session of two drives: a page, then the program is killed in the middle of one."""
+    folder = tmp_path_factory.mktemp('study')
+    game = str(scenarios_directory() / 'cut_in.yaml')
+    (folder / 'study.yaml').write_text(yaml.safe_dump({
+        'name': 'killed', 'settings': {'duration': DURATION_S, 'game': game, 'view': 'map'},
+        'factors': [{'name': 'planner', 'levels': [
+            {'name': 'idm', 'planner': 'idm'},
+            {'name': 'steady', 'planner': 'constant-velocity'}]}],
+        'fields': [{'name': 'why', 'text': {}}],
+        'blocks': [{'name': 'main', 'order': 'given',
+                    'after_trial': [{'questions': 'van_der_laan'}]}]}))
+    victims = ['page', 'study']
+    with study_session(folder / 'study.yaml', folder / 'data', 'P01', 8340) as session:
+        def each(shown: str) -> None:
+            time_s = session.time_s() if shown == 'drive' and victims else None
+            if time_s is not None and time_s > 0.5:
+                session.mark(f'before the {victims[0]} is killed')
+                session.kill(victims.pop(0))
+        session.run(PATIENCE_S, each)
+        yield session
+    assert not victims
+
+
+def test_each_item_is_finished_once(conducted: StudySession) -> None:
+    entries = conducted.entries
+    finished = Counter(entry['item'] for entry in entries if entry['entry'] == 'finished')
+    assert finished == dict.fromkeys(
+        ('fields', 'main/1', 'main/1/after/1', 'main/2', 'main/2/after/1'), 1)
+    assert sum(entry['entry'] == 'started' for entry in entries) == 4
+    for entry in entries:
+        if entry['entry'] == 'finished':
+            assert entry['answers'].items() <= conducted.answers.items()
+            assert entry.get('end_time_s', DURATION_S) == pytest.approx(DURATION_S)
+    assert {entry['name'] for entry in entries if entry['entry'] == 'marker'} \
+        <= {name for name, _ in conducted.marked}
+
+
+def test_the_tables_hold_each_trial_once(conducted: StudySession) -> None:
+    out = conducted.folder.parents[1]
+    done = subprocess.run([sys.executable, '-m', 'crgame_ros.cli', 'study', 'data', str(out)],
+                          capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode == 0, done.stderr
+    trials = table(out / 'data' / 'trials.csv')
+    assert [(row['trial'], row['condition'], row['outcome']) for row in trials] == [
+        ('1', 'idm', 'time'), ('2', 'steady', 'time')]
+    answers = {row['text'] for row in table(out / 'data' / 'answers.csv')
+               if row['question'] == 'why'}
+    assert answers == {conducted.answers['why']}
+    assert '<b>' in conducted.answers['why']
+
+
+def test_who_is_done_is_not_asked_again(conducted: StudySession) -> None:
+    before = len(read_journal(conducted.folder))
+    done = subprocess.run(conducted.command, capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode == 0
+    assert 'nothing is left' in done.stdout
+    assert len(read_journal(conducted.folder)) == before
+
+
+def table(path: Path) -> list[dict[str, Any]]:
+    """Read a table."""
+    with path.open(encoding='utf-8', newline='') as file:
+        return list(csv.DictReader(file))
