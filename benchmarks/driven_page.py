@@ -85,10 +85,15 @@ class Browser:
             'type': 'keyDown' if down else 'keyUp', 'code': code, 'key': key,
             'windowsVirtualKeyCode': number})
 
-    def processor_s(self) -> float:
-        """Give the processor time that the browser's processes have used so far [s]."""
+    def processor_s(self, kind: str = '') -> float:
+        """
+        Give the processor time that the browser's processes have used so far [s].
+
+        :param kind: of those that count, such as `gpu-process`, which draws; all where empty.
+        """
         driver = psutil.Process(self.driver.service.process.pid)
-        times = [process.cpu_times() for process in driver.children(recursive=True)]
+        times = [process.cpu_times() for process in driver.children(recursive=True)
+                 if not kind or f'--type={kind}' in process.cmdline()]
         return sum(item.user + item.system for item in times)
 
     def close(self) -> None:

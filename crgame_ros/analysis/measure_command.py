@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def measure(values: argparse.Namespace) -> int:
     """Measure a run, and print what was found."""
-    from crgame_ros.analysis.behaviour.behaviour_text import behaviour_lines
+    from crgame_ros.analysis.behaviour.behaviour_text import behaviour_lines, detection_lines
     from crgame_ros.analysis.run_measures import check_requests, measure_run
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in
@@ -80,7 +80,8 @@ def measure(values: argparse.Namespace) -> int:
     else:
         lines = [*_lines(found.criticality.as_dict()),
                  *(line for each in found.behaviour if each.human or each.take_overs
-                   for line in behaviour_lines(each))]
+                   for line in behaviour_lines(each)),
+                 *(line for each in found.detection for line in detection_lines(each))]
         print('\n'.join(lines))
     return 0
 

@@ -17,7 +17,9 @@
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
+from crgame_ros.analysis.behaviour.detection_score import detection_scores, DetectionScore
 from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+from crgame_ros.analysis.behaviour.task_events import task_events
 from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log
@@ -32,15 +34,19 @@ class RunMeasures(NamedTuple):
 
     :param criticality: of all driven vehicles.
     :param behaviour: of each driven vehicle, in the log's order.
+    :param detection: of each detection response task.
     """
 
     criticality: Criticality
     behaviour: tuple[DriverBehaviour, ...]
+    detection: tuple[DetectionScore, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Say it as `crgame measure --json` does."""
         return {**self.criticality.as_dict(),
-                'behaviour': {each.vehicle_id: each.as_dict() for each in self.behaviour}}
+                'behaviour': {each.vehicle_id: each.as_dict() for each in self.behaviour},
+                **({'detection_response': [each.as_dict() for each in self.detection]}
+                   if self.detection else {})}
 
 
 def measure_run(record: RunRecord, thresholds: Thresholds = USUAL,
@@ -60,7 +66,8 @@ def measure_run(record: RunRecord, thresholds: Thresholds = USUAL,
     thresholds.check()
     check_requests(record, requests)
     return RunMeasures(measure_log(record.log, thresholds, critical),
-                       measure_behaviour(record, requests=requests, progress=driven))
+                       measure_behaviour(record, requests=requests, progress=driven),
+                       tuple(detection_scores(task_events(record))))
 
 
 def check_requests(record: RunRecord, requests: Collection[str], where: str = 'requests') -> None:

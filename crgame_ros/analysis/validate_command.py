@@ -27,8 +27,8 @@ wrong.
   crgame validate runs/NAME scenarios/cut_in.yaml my_scenario.xml
 
 It knows CommonRoad scenarios and solutions, games and the other YAML files of this program,
-recordings, the folder of a run, and tables with their datapackage.json. Exit code 0:
-all are valid; 2: something is wrong with one of them."""
+recordings, the folder of a run, tables with their datapackage.json, the journals of a study and
+its whole folder. Exit code 0: all are valid; 2: something is wrong with one of them."""
 INVALID = 2
 
 

@@ -21,6 +21,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from crgame_ros.analysis.study_parts import is_study, journal_faults, study_parts
 from crgame_ros.analysis.tables.data_package import PACKAGE_FILE
 from crgame_ros.errors import CrgameError, InputError, one_line
 from crgame_ros.game.game import Game
@@ -83,7 +84,9 @@ def validate(path: Path, progress: Progress | None = None) -> FileVerdict:
 
 
 def parts_of(path: Path) -> list[Path]:
-    """Give what is to be checked of a path: of the folder of a run all its files."""
+    """Give what is to be checked of a path: of the folder of a run or study all its files."""
+    if is_study(path):
+        return study_parts(path)
     if not path.is_dir() or recording_in(path) == path:
         return [path]
     tables = [path / TABLES] if (path / TABLES / PACKAGE_FILE).exists() else []
@@ -102,15 +105,17 @@ def _check_of(path: Path) -> Callable[[Path, Progress | None], FileVerdict]:
         raise InputError('holds neither a recording nor tables', str(path),
                          'name a file, or the folder of a run, of a recording or of tables')
     known = {'.xml': _scenario, '.json': _timing, '.yaml': _yaml, '.yml': _yaml,
+             '.jsonl': _journal,
              **dict.fromkeys(_RECORDINGS, _recording)}
     if path.suffix.lower() not in known:
         raise InputError(f'no kind of file is known by "{path.suffix}"', str(path),
-                         'name one of .xml, .yaml, .json, .mcap or .db3')
+                         'name one of .xml, .yaml, .json, .jsonl, .mcap or .db3')
     return known[path.suffix.lower()]
 
 
 def _name_of(path: Path) -> str:
-    names = {'.xml': 'XML file', '.yaml': 'YAML file', '.yml': 'YAML file', '.json': 'JSON file'}
+    names = {'.xml': 'XML file', '.yaml': 'YAML file', '.yml': 'YAML file', '.json': 'JSON file',
+             '.jsonl': 'journal of a session'}
     return names.get(path.suffix.lower(), 'recording')
 
 
@@ -155,6 +160,12 @@ def _tables(path: Path, _progress: Progress | None) -> FileVerdict:
     from crgame_ros.analysis.tables.table_check import table_faults
     count, faults = table_faults(path)
     return FileVerdict(f'{count} tables', tuple(faults[:_SHOWN]))
+
+
+def _journal(path: Path, _progress: Progress | None) -> FileVerdict:
+    """Check what has happened in a participant's session."""
+    count, faults = journal_faults(path)
+    return FileVerdict(f'journal of a session of {count} entries', tuple(faults[:_SHOWN]))
 
 
 def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:

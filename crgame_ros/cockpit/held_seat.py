@@ -17,8 +17,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from crgame_ros.cockpit.input_delay import InputDelay
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
+from crgame_ros.driver.input_delay import InputDelay
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 

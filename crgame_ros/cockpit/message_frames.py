@@ -95,7 +95,7 @@ class MessageFrames:
         """
         Make the frame of states (V, 8).
 
-        :param commands: (V, 5) consumed; None where they are not known.
+        :param commands: (V, 6) consumed; None where they are not known.
         """
         return Frame('state', frames.encode_state(*place, state_rows(states, commands)))
 
@@ -183,12 +183,13 @@ def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:
     """
     Give the rows (V, 13) of a frame of states (V, 8).
 
-    :param commands: (V, 4) consumed; None where they are not known.
+    :param commands: (V, 6) consumed, of which pages get the first five; None where they are not
+        known.
     """
     rows = np.full((len(states), frames.STATE_COLUMNS), np.nan)
     rows[:, :STATE_WIDTH] = states
     if commands is not None:
-        rows[:, STATE_WIDTH:] = commands
+        rows[:, STATE_WIDTH:] = commands[:, :rows.shape[1] - STATE_WIDTH]
     return rows
 
 

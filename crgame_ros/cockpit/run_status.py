@@ -59,6 +59,8 @@ class RunStatus:
         self.recording: dict[str, Any] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
                                           'text': 'nothing is recorded'}
         self.seats_lost: dict[str, bool] = {}
+        # Devices at the machine of the game, by the seat that they drive.
+        self.devices: dict[str, dict[str, Any]] = {}
         # Counts changes of the verdicts: a collision is to be heard when it is seen.
         self.verdicts = 0
         self._vehicles: tuple[str, ...] = ()
@@ -83,6 +85,7 @@ class RunStatus:
         self.drivability: dict[str, dict[str, Any]] = {}
         self.criticality: dict[str, dict[str, Any]] = {}
         self.seats_lost = {}
+        self.devices = {}
         self.contacts: list[dict[str, Any]] = []
         self.departures: list[dict[str, Any]] = []
         self._traffic_late_t = -math.inf
@@ -132,6 +135,10 @@ class RunStatus:
             self._alarm('lost_device', vehicle, level != OK, 'nobody drives', t)
         elif node == 'criticality_node':
             self.criticality[vehicle] = _criticality(level, values)
+        elif node == 'driver_node' and rest == 'driver':
+            self.devices[vehicle] = {
+                'seat': vehicle, 'device': text, 'command_ms': _number(values.get('command_ms')),
+                'input_delay_ms': _number(values.get('input_delay_ms'))}
         elif node == 'driver_node':
             self._alarm('lost_device', vehicle, level == ERROR, text, t)
 

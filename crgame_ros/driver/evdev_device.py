@@ -22,6 +22,7 @@ import re
 from typing import Any
 
 from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
+from crgame_ros.driver.event_clock import stamp_by_steady_clock
 from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons, NO_LIGHTS
 from crgame_ros.driver.keyboard import KeyState
@@ -57,6 +58,8 @@ class EventDecoder:
         self.reverse = reverse
         self.lever = IndicatorLever(lights)
         self.stale = False
+        # Time stamp of the first event that changed something since somebody took it [s].
+        self.changed_s: float | None = None
 
     def feed(self, event: InputEvent) -> bool:
         """
@@ -75,10 +78,15 @@ class EventDecoder:
         elif event.type == ecodes.EV_ABS:
             changed = self.axes.get(event.code) != event.value
             self.axes[event.code] = event.value
-            return changed
+            return self._dated(event, changed)
         elif event.type == ecodes.EV_KEY and event.value in (0, 1):
-            return self._press(event.code, event.value == 1)
+            return self._dated(event, self._press(event.code, event.value == 1))
         return False
+
+    def _dated(self, event: InputEvent, changed: bool) -> bool:
+        if changed and self.changed_s is None:
+            self.changed_s = event.timestamp()
+        return changed
 
     def synchronise(self, axes: Mapping[int, float], pressed: Iterable[int]) -> None:
         """
@@ -126,6 +134,7 @@ class EvdevDevice:
         self._limits: dict[int, tuple[float, float]] = {}
         self._buttons: tuple[int, ...] = ()
         self._can_push = False
+        self._on_steady_clock = False
         self.problem: InputError | None = None
         self.device_map: DeviceMap | None = None
         self.layout: ControlLayout | None = None
@@ -192,6 +201,15 @@ class EvdevDevice:
         self._next_scan_s = now_s + RESCAN_PERIOD_S
         return self._connect()
 
+    def take_input_s(self) -> float | None:
+        """
+        Give when the first input since the last call changed something, by the kernel's stamp.
+
+        :return: steady clock [s]; None without any, or where the kernel stamps by another clock.
+        """
+        changed_s, self.decoder.changed_s = self.decoder.changed_s, None
+        return changed_s if self._on_steady_clock else None
+
     def close(self) -> None:
         """Close the device; `poll` would find it again."""
         if self._device is not None:
@@ -251,6 +269,7 @@ class EvdevDevice:
                 gear, self.layout = device_map.evdev.gear, device_map.evdev.layout(self._limits)
                 lights = device_map.evdev.lights
             self.decoder = EventDecoder(gear, self.decoder.reverse, lights)
+            self._on_steady_clock = stamp_by_steady_clock(device.fd)
             self._synchronise(device)
         except (InputError, OSError) as error:
             device.close()

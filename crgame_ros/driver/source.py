@@ -122,6 +122,10 @@ class DriverSource(ABC):
     """
 
     problem: InputError | None = None
+    # The device, or its map; empty where there is none.
+    name = ''
+    # When the oldest input came that no command has been published for yet, steady clock [s].
+    input_s: float | None = None
     # Whether what it looks at comes between cycles, too, though it has no descriptor.
     is_looking = False
 
@@ -253,7 +257,7 @@ class JoyDriver(DriverSource):
             raise InputError('is a keyboard, which has no joy node', device_map.name,
                              'choose the map of a wheel or gamepad')
         self._layout = device_map.joy.layout()
-        self._name = device_map.name
+        self.name = device_map.name
         self._timeout_s = timeout_s
         self._heard_s = self._now_s = -math.inf
         self._raw = RawInput()
@@ -276,14 +280,16 @@ class JoyDriver(DriverSource):
         self._heard_s = self._now_s = now_s
         missing = [axis.code for axis in self._layout.ranges if axis.code >= len(axes)]
         self.problem = InputError(
-            f'the joy message has {len(axes)} axes, device map {self._name} needs axis '
+            f'the joy message has {len(axes)} axes, device map {self.name} needs axis '
             f'{max(missing)}', 'joy', 'choose the device map of this device') if missing else None
         pressed = frozenset(index for index, value in enumerate(buttons) if value)
         for button in sorted(pressed ^ self._raw.pressed):
             self._reverse = self._layout.gear.after(self._reverse, button, button in pressed)
         self._lever.hold(pressed)
-        moved = reported(dict(enumerate(axes)), self._layout, self._raw.axes)
-        self._raw = RawInput(moved, pressed)
+        raw = RawInput(reported(dict(enumerate(axes)), self._layout, self._raw.axes), pressed)
+        if self.input_s is None and raw != self._raw:
+            self.input_s = now_s
+        self._raw = raw
 
     def poll(self, now_s: float) -> bool:
         """Let the time pass, and tell whether the node has fallen silent since."""
@@ -320,6 +326,8 @@ class EvdevDriver(DriverSource):
     def poll(self, now_s: float) -> bool:
         """Read what is pending, or look for the lost device; keep its problem."""
         changed = self.device.poll(now_s)
+        self.name, input_s = self.device.name, self.device.take_input_s()
+        self.input_s = input_s if self.input_s is None else self.input_s
         self.problem = self.device.problem
         return changed
 

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import (
@@ -36,7 +36,7 @@ from crgame_ros.game.driven_vehicle import (
 )
 from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.event_file import parse_document_entries
-from crgame_ros.game.events import EventSpec, FiredEvent
+from crgame_ros.game.events import EventSpec, FiredBy, FiredEvent
 from crgame_ros.game.game import DrivabilitySpec, MAX_VEHICLES, TimingSpec
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -250,7 +250,7 @@ def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
         content = json.loads(text)
         return int(content['epoch']), tuple(
             FiredEvent(str(item['name']), int(item['n']), int(item['k']),
-                       item['by'] if item['by'] in ('trigger', 'driver') else 'condition')
+                       item['by'] if item['by'] in get_args(FiredBy) else 'condition')
             for item in content['fired'])
     except MALFORMED as error:
         raise InputError(f'is no list of events ({type(error).__name__}: {error})',

@@ -15,7 +15,7 @@
 """The events of a game: what an experimenter triggers, or a condition (FS, external triggers)."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.game.traffic_spec import ReactionTime, Share, SpeedFactor
@@ -294,6 +294,7 @@ class EventSpec:
 EventList = Annotated[tuple[EventSpec, ...], Listed(0, MAX_EVENTS, 'event', 'name')]
 
 
+FiredBy: TypeAlias = Literal['trigger', 'condition', 'driver', 'contact']
 # No event of a game has a space in its name.
 PUT_BACK = 'put back'
 
@@ -303,7 +304,8 @@ class FiredEvent:
     """
     An event that took effect.
 
-    :param name: of the event; `put back hv0` where a driver had the vehicle put back on its lane.
+    :param name: of the event; `contact of hv0 with av0` where a contact stopped a vehicle, and
+        `put back hv0` where its driver had it put back on its lane.
     :param n: simulation step; of an event of the game a tick of the scenario.
     :param k: scenario time step.
     :param by: what made it fire.
@@ -312,7 +314,12 @@ class FiredEvent:
     name: str
     n: int
     k: int
-    by: Literal['trigger', 'condition', 'driver']
+    by: FiredBy
+
+    @classmethod
+    def contact(cls, vehicle_id: str, other_id: str, n: int, k: int) -> 'FiredEvent':
+        """Tell that a vehicle was stopped where it touched somebody."""
+        return cls(f'contact of {vehicle_id} with {other_id}', n, k, 'contact')
 
     @classmethod
     def put_back(cls, vehicle_id: str, n: int, k: int) -> 'FiredEvent':
@@ -321,5 +328,10 @@ class FiredEvent:
 
     @property
     def vehicle(self) -> str | None:
-        """Name the vehicle that was put back; None of an event of the game."""
+        """Name the vehicle that was put back; None of any other event."""
         return self.name.removeprefix(f'{PUT_BACK} ') if self.by == 'driver' else None
+
+    @property
+    def is_of_game(self) -> bool:
+        """Whether the game has an event of this name."""
+        return self.by in ('trigger', 'condition')

@@ -70,8 +70,8 @@ class TaskEntry:
     :param seat: the vehicle whose driver it is for.
     :param what: has happened.
     :param number: of the stimulus or request, from 1; 0 where it is about none.
-    :param by: what made the task begin or end (condition, trigger), a request end (driven, time)
-        or what an answer is (hit, premature).
+    :param by: what made the task begin or end (condition, trigger), a request end (driven, time),
+        what an answer is (hit, premature), or why a stimulus was missed (unseen).
     :param times: as the page has measured them.
     """
 

@@ -29,6 +29,7 @@ from crgame_ros.driver.source import (
 )
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GameDocument, parse_game_document, parse_seats_document
+from crgame_ros.ros.device_delay import DeviceDelay
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
 from crgame_ros.ros.live_force import LiveForce
@@ -79,6 +80,7 @@ class DriverNode(Node):
         self._commands = endpoints.publisher('/<v>/driver_command', self._vehicle_id)
         self._raw = endpoints.publisher('/<hv>/joy', self._vehicle_id)
         self._diagnostics = endpoints.diagnostics
+        self._delay = DeviceDelay(endpoints.diagnostics, self._vehicle_id)
         self._force = LiveForce(endpoints, self._vehicle_id, lambda: not self._silent,
                                 self.get_logger().warning)
         self._lock = threading.Lock()
@@ -168,7 +170,10 @@ class DriverNode(Node):
                 return
             self._cycle = cycle
             self._diagnostics.now_ns = from_time(message.clock)
-            self._driver.poll(time.monotonic())
+            now_s = time.monotonic()
+            if not self._silent:
+                self._delay.stepped(now_s, cycle, self._driver.name)
+            self._driver.poll(now_s)
             self._publish()
 
     def _publish(self) -> None:
@@ -181,6 +186,9 @@ class DriverNode(Node):
         stamp_ns = scheduler.stamp_ns(self._cycle)
         command = self._driver.command(self._cycle, scheduler.dt_s)
         self._commands.publish(to_joy(command, stamp_ns, GAME))
+        if self._driver.input_s is not None:
+            self._delay.published(self._driver.input_s, time.monotonic(), self._cycle)
+            self._driver.input_s = None
         raw = self._driver.joy()
         if raw is not None and not isinstance(self._driver, JoyDriver):
             message = Joy(axes=list(raw.axes), buttons=list(raw.buttons))

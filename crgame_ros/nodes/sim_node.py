@@ -81,10 +81,11 @@ class SimNode(Node):
         # Where it is refused, pages that the system takes back are seen among the causes.
         lock_memory()
         self._control.paused = self._control.starts_paused
-        epoch, offset_ns = 0, FIRST_OFFSET_NS
+        epoch, offset_ns, again = 0, FIRST_OFFSET_NS, False
         while True:
-            # With a driver in the browser each run begins when somebody says so.
-            if not self._control.started:
+            # With a driver in the browser a run begins when somebody says so, but once more the
+            # same for the same people goes on.
+            if not (self._control.started or again):
                 self._control.paused |= any(item.driver == COCKPIT for item in setup.humans)
             run = LiveRun(self, self._executor, self._control, setup, epoch, offset_ns,
                           self._recorded)
@@ -102,10 +103,17 @@ class SimNode(Node):
                 return
             self._control.reset_wanted = False
             self._control.steps_wanted = 0
-            setup = self._next_setup(setup)
+            before, setup = setup, self._next_setup(setup)
+            again = simulation.n > 0 and setup.game == before.game and self._all_sit(setup)
             epoch += 1
             self._write_game(setup.game, epoch)
             offset_ns = (now_ns // NS_PER_S + 2) * NS_PER_S
+
+    def _all_sit(self, setup: Setup) -> bool:
+        """Tell whether somebody is in each seat that the game leaves to people at pages."""
+        tenants = self._control.seat_tenants
+        return all(human.id in tenants and tenants[human.id].here
+                   for human in setup.humans if human.driver == COCKPIT)
 
     def _next_setup(self, present: Setup) -> Setup:
         """Load what the parameters name now; keep the present game if that is unusable."""

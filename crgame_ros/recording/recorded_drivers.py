@@ -16,6 +16,7 @@
 
 from collections import defaultdict
 from pathlib import Path
+import re
 import statistics
 from typing import NamedTuple
 
@@ -26,7 +27,8 @@ from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 
 _DIAGNOSTICS = '/diagnostics'
-_DRIVER, _OF_SEAT = 'cockpit_node: ', ' driver'
+# Of people at pages, and of devices at the machine of the game.
+_DRIVER = re.compile('(?:cockpit|driver)_node: (.+) driver')
 
 
 class RecordedDriver(NamedTuple):
@@ -34,7 +36,8 @@ class RecordedDriver(NamedTuple):
     One stretch of a run that somebody drove.
 
     :param spell: who, which seat, from which step to which.
-    :param input_delay_ms: median from the hand to the page's picture [ms]; None if not measured.
+    :param input_delay_ms: median from the hand to the page's picture, of a device at the machine
+        to the first state that obeys [ms]; None if not measured.
     """
 
     spell: DrivingSpell
@@ -61,9 +64,8 @@ def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, 
                 spells = _newer(spells, str(content.data), wanted)
             else:
                 for status in map(read_status, content.status):
-                    if status.name.startswith(_DRIVER) and status.name.endswith(_OF_SEAT):
-                        seat = status.name[len(_DRIVER):-len(_OF_SEAT)]
-                        _note(delays_ms[seat, status.values.get('person', '')],
+                    if found := _DRIVER.fullmatch(status.name):
+                        _note(delays_ms[found[1], status.values.get('person', '')],
                               status.values.get('input_delay_ms', ''))
     return tuple(RecordedDriver(item, _median(delays_ms.get(
         (item.seat, '' if item.person is None else item.person.id)))) for item in spells)

@@ -38,6 +38,8 @@ class ContactStop:
         self._detector = CollisionDetector(
             [vehicle.vehicle.shape for vehicle in setup.vehicles],
             [item.shape for item in setup.obstacles.descriptions])
+        self._vehicle_ids = setup.vehicle_ids
+        self._object_ids = [item.id for item in setup.obstacles.descriptions]
         self._rear_to_center = [vehicle.vehicle.rear_to_center for vehicle in setup.vehicles]
 
     def set_objects(self, objects: ObjectStates) -> None:
@@ -46,26 +48,27 @@ class ContactStop:
         self._detector.set_objects(objects)
 
     def stopped(self, since_tick_s: float, before: Sequence[VehicleState],
-                after: Sequence[VehicleState]) -> list[int]:
+                after: Sequence[VehicleState]) -> list[tuple[int, str]]:
         """
         Find who must not have moved as they did.
 
         :param since_tick_s: from the objects' tick to the states after the step [s]
         :param before: (V) states of the driven vehicles before the step.
         :param after: (V) their states after it.
-        :return: indices of vehicles, in order.
+        :return: indices of vehicles, in order, each with the id of whom it touched.
         """
         self._detector.move(since_tick_s)
         centers = [self._center(index, state) for index, state in enumerate(after)]
         among, with_objects = self._detector.hits(centers)
         found = []
         for index, (vehicles, objects) in enumerate(zip(among, with_objects, strict=True)):
-            touched = [centers[other] for other in vehicles]
-            touched += [self._object_center(other, since_tick_s) for other in objects]
+            touched = [(self._vehicle_ids[other], centers[other]) for other in vehicles]
+            touched += [(self._object_ids[other], self._object_center(other, since_tick_s))
+                        for other in objects]
             was = self._center(index, before[index])
-            if any(math.dist(centers[index][:2], other[:2]) < math.dist(was[:2], other[:2])
-                   for other in touched):
-                found.append(index)
+            closer = [name for name, other in touched if math.dist(centers[index][:2], other[:2])
+                      < math.dist(was[:2], other[:2])]
+            found += [(index, closer[0])] if closer else []
         return found
 
     def _center(self, index: int, state: VehicleState) -> Pose:

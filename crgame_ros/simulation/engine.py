@@ -14,7 +14,7 @@
 # limitations under the License.
 """The simulation engine that both runners drive (CRG algorithms 1 and 2)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import hashlib
 from itertools import chain
@@ -127,7 +127,7 @@ class Simulation:
         stops = setup.game.drivability.contact == 'stop'
         self._contact_stop = ContactStop(setup) if stops else None
         self._put_back = PutBack(setup)
-        self._put_back_events: tuple[FiredEvent, ...] = ()
+        self._own_events: tuple[FiredEvent, ...] = ()
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
         self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
@@ -215,7 +215,7 @@ class Simulation:
     def fired(self) -> tuple[FiredEvent, ...]:
         """All events that have taken effect so far."""
         of_game = () if self._events is None else self._events.fired
-        return tuple(sorted((*self._put_back_events, *of_game), key=lambda event: event.n))
+        return tuple(sorted((*self._own_events, *of_game), key=lambda event: event.n))
 
     def step(self, dt_eff_s: float, commands: Sequence[DriverCommand | None]) -> StepResult:
         """
@@ -255,11 +255,13 @@ class Simulation:
         since_tick = (self.n - 1) % self.scheduler.steps_per_tick + 1
         if since_tick == 1:
             contacts.set_objects(self._world.objects)
-        for index in contacts.stopped(since_tick * self.scheduler.dt_s, before, self.states):
+        for index, other in contacts.stopped(
+                since_tick * self.scheduler.dt_s, before, self.states):
             driven = self._driven[index]
             if _has_driver(driven):
                 driven.stand(at_rest(before[index], driven.state))
-                self._put_back.note(index, driven.state)
+                if self._put_back.note(index, driven.state):
+                    self._tell(FiredEvent.contact, self.setup.vehicle_ids[index], other)
         for index, command in enumerate(self.commands):
             if command is not None and command.put_back:
                 self._put_on_lane(index, since_tick * self.scheduler.dt_s)
@@ -272,16 +274,18 @@ class Simulation:
         place = self._put_back.place(index, since_tick_s, self.states, self._world.objects)
         if place is not None:
             driven.stand(place)
-            self._put_back_events += (FiredEvent.put_back(
-                self.setup.vehicle_ids[index], self.n, self.scheduler.k(self.n)),)
+            self._tell(FiredEvent.put_back, self.setup.vehicle_ids[index])
+
+    def _tell(self, make: Callable[..., FiredEvent], *ids: str) -> None:
+        self._own_events += (make(*ids, self.n, self.scheduler.k(self.n)),)
 
     def conclude(self) -> StepResult:
         """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
         result = self._result()
         self._add_to_hash()
-        put_back = tuple(event for event in self._put_back_events if event.n == self.n)
-        return result._replace(fired=(*put_back, *result.fired)) if put_back else result
+        own = tuple(event for event in self._own_events if event.n == self.n)
+        return result._replace(fired=(*own, *result.fired)) if own else result
 
     def _result(self) -> StepResult:
         k = self.scheduler.k(self.n)

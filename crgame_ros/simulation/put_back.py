@@ -34,6 +34,8 @@ STEP, FARTHEST = 1.0, 50.0
 ROOM_AHEAD, ROOM_AROUND = 5.0, 0.5
 # Nobody who goes on as they do gets there before [s].
 UNTOUCHED_S = 2.0
+# Who presses on against somebody has one contact with them [m].
+SAME_CONTACT = 1.0
 # After so much of a way from the contact the vehicle has driven on by itself [m].
 LEFT_BEHIND = 20.0
 
@@ -58,9 +60,11 @@ class PutBack:
         shapes = [vehicle.vehicle.shape for vehicle in setup.vehicles]
         self._shapes = shapes + [item.shape for item in setup.obstacles.descriptions]
 
-    def note(self, index: int, state: VehicleState) -> None:
-        """Remember where a contact has stopped a vehicle."""
+    def note(self, index: int, state: VehicleState) -> bool:
+        """Remember where a contact has stopped a vehicle; tell whether it is another contact."""
+        before = self._stopped.get(index)
         self._stopped[index] = state
+        return before is None or math.dist(before[:2], state[:2]) > SAME_CONTACT
 
     def place(self, index: int, since_tick_s: float, states: Sequence[VehicleState],
               objects: ObjectStates) -> VehicleState | None:

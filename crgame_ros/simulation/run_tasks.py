@@ -56,7 +56,9 @@ class _Course:
     running: bool = False
     begun: bool = False
     pressed: bool = False
+    may_end: bool = True
     number: int = 0
+    shown: int = 0
     schedule: StimulusSchedule | None = None
     prompt: OpenPrompt | None = None
     # Step at which what a request is about is triggered.
@@ -167,10 +169,12 @@ class RunTasks:
         for course in self._courses.values():
             by = 'trigger' if course.pressed else 'condition'
             if course.running:
-                if course.pressed or holds(course.spec.until):
+                if course.pressed or (course.may_end and holds(course.spec.until)):
                     self._end(course, by)
             elif course.pressed or (not course.begun and holds(course.when)):
                 self._begin(course, by)
+                # Begun by the button after that, it is ended by the button.
+                course.may_end = not holds(course.spec.until)
             course.pressed = False
 
     def at_step(self, n: int, driven: Mapping[str, bool]) -> tuple[TaskEntry, ...]:
@@ -223,7 +227,7 @@ class RunTasks:
         comes = schedule is not None and self._n >= schedule.next_n
         if prompt is not None and (
                 comes or self._n - prompt.n >= self._steps(task.latest + GRACE_S)):
-            self._close(course, 'missed')
+            self._close(course, 'missed', '' if prompt.seen else 'unseen')
         if schedule is not None and comes:
             schedule.advance()
             course.number += 1
@@ -241,16 +245,20 @@ class RunTasks:
         task, prompt, times = course.spec.task, course.prompt, report.times
         concerns = prompt is not None and prompt.number == report.number
         if report.what == 'shown':
-            # What a page has shown before another one does is seen already.
-            if prompt is not None and concerns and not prompt.seen:
-                course.prompt = replace(prompt, seen=True)
+            # Of several pages the first counts; it may tell of it after the answer.
+            if course.shown < report.number == course.number:
+                course.shown = report.number
+                course.prompt = prompt and replace(prompt, seen=True)
                 self._note(course, 'shown', report.number, times=times)
             return
         if not isinstance(task, DetectionResponse) or not (course.running or prompt):
             return
         since_ms = times.response_ms
         if not concerns or since_ms is None or not 0.0 <= since_ms <= 1e3 * task.latest:
-            self._note(course, 'unrequested', 0, times=times)
+            if not any(entry.task == report.task and entry.what == 'unrequested'
+                       for entry in self._entries):
+                # One a step: nobody is quicker.
+                self._note(course, 'unrequested', 0, times=times)
         else:
             outcome = 'premature' if since_ms < 1e3 * task.earliest else 'hit'
             self._close(course, 'answer', outcome, times)

@@ -26,7 +26,7 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.adapted_game import adapt_game, OWN
-from crgame_ros.study.trial_settings import TrialSettings
+from crgame_ros.study.trial_settings import tasks_over, TrialSettings
 from crgame_ros.yaml_text import read_yaml
 
 PERFECT, NONE = 'perfect', 'none'
@@ -60,6 +60,7 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
     game = replace(game, humans=tuple(
         replace(human, driver=driver) if human.id == seat else human for human in game.humans),
         events=(*game.events, *settings.events),
+        tasks=tasks_over(game.tasks, settings.tasks),
         sound='on' if settings.sound else 'none')
     if settings.duration is not None:
         game = replace(game, duration=settings.duration)

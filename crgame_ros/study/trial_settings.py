@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.game.events import EventList
+from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Named, Within, Wording
 from crgame_ros.study.names import ColumnName, Name
@@ -47,6 +48,8 @@ class TrialSettings:
     :param names: whether the names of planners are shown.
     :param sound: whether there is sound.
     :param events: added to those of the game.
+    :param tasks: besides driving, added to those of the game; one of the same name replaces that
+        further out.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -66,15 +69,23 @@ class TrialSettings:
     names: bool | None = None
     sound: bool | None = None
     events: EventList = ()
+    tasks: TaskList = ()
 
     def over(self, outer: 'TrialSettings') -> 'TrialSettings':
-        """Lay these over settings further out; events of both count."""
-        given = {item.name: value for item in fields(self) if item.name != 'events'
+        """Lay these over settings further out; events and tasks of both count."""
+        given = {item.name: value for item in fields(self) if item.name not in ('events', 'tasks')
                  and (value := getattr(self, item.name)) is not None}
         # Options are those of a planner: another one does not take them.
         if 'planner' in given and 'options' not in given:
             given['options'] = None
-        return replace(outer, **given, events=(*outer.events, *self.events))
+        return replace(outer, **given, events=(*outer.events, *self.events),
+                       tasks=tasks_over(outer.tasks, self.tasks))
+
+
+def tasks_over(outer: tuple[TaskSpec, ...], inner: tuple[TaskSpec, ...]) -> tuple[TaskSpec, ...]:
+    """Lay tasks over those further out: one of the same name takes the place of the other."""
+    names = {task.name for task in inner}
+    return (*(task for task in outer if task.name not in names), *inner)
 
 
 NOTHING = TrialSettings()

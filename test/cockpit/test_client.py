@@ -221,6 +221,10 @@ GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
       'software': False, 'shown': 'driver', 'across_deg': 75.0, 'screen_width_m': 0.6,
       'eye_distance_m': 0.7, 'rate_hz': 29.5, 'renderer': 'ANGLE b'}),
     ({'type': 'ping', 't': 12}, {'type': 'ping', 't': 12.0}),
+    ({'type': 'task', 'seat': 'hv0', 'task': 'light', 'number': 3, 'what': 'answer',
+      'response_ms': 312, 'delay_ms': 20.5},
+     {'type': 'task', 'seat': 'hv0', 'task': 'light', 'number': 3, 'what': 'answer', 'times': {
+         'response_ms': 312.0, 'delay_ms': 20.5, 'picture_ms': None, 'paused_ms': None}}),
 ]
 
 
@@ -279,6 +283,12 @@ BAD = {
     'view by a number': json.dumps({'type': 'view', **MAP_VIEW, 'renderer': 4}),
     'sound on is 2': '{"type": "sound", "on": 2, "volume": 1, "rumble": 0}',
     'ping without': '{"type": "ping"}',
+    'task of a path': '{"type": "task", "seat": "hv0", "task": "../x", "number": 1, '
+                      '"what": "shown"}',
+    'task without number': '{"type": "task", "seat": "hv0", "task": "x", "what": "shown"}',
+    'task begins': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, "what": "begin"}',
+    'task for ever': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, '
+                     '"what": "answer", "response_ms": 1e12}',
 }
 
 

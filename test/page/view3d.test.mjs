@@ -9,6 +9,7 @@ const VIEW = '../../crgame_ros/cockpit/page/js/view3d';
 const { above, chasing, mountedAt } = await import(`${VIEW}/cameras.js`);
 const { acrossAngle, heightAngle, readSeat, trueAngle } = await import(
   `${VIEW}/field_of_view.js`);
+const { wantsHeadlights } = await import(`${VIEW}/headlights.js`);
 const { localOrigin } = await import(`${VIEW}/local_origin.js`);
 const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirror_optics.js`);
 const { DETAILS, isSoftware, Quality } = await import(`${VIEW}/quality.js`);
@@ -147,7 +148,9 @@ test('detail is left out where pictures are too dear, and comes back where they 
     settle(100);
     assert.equal(quality.detail, DETAILS[DETAILS.length - 1]);
     assert.ok(quality.ratio <= 0.25);
+    assert.equal(quality.period_ms, 50);
     settle(1);
+    assert.equal(quality.period_ms, software ? 33 : 0);
     assert.equal(quality.detail, DETAILS[0]);
     assert.equal(quality.ratio, 1);
     settle(100);
@@ -177,7 +180,7 @@ test('pictures of a processor come less often when each takes long, yet 20 times
   const quality = new Quality(true, 1);
   quality.take(5, 0);
   assert.equal(quality.period_ms, 33);
-  quality.take(20, 100);
+  quality.take(12, 100);
   assert.equal(quality.period_ms, 40);
   quality.take(500, 200);
   assert.equal(quality.period_ms, 50);
@@ -240,6 +243,13 @@ test('normals point outwards, are smooth on curves and sharp at edges', () => {
     const axial = 2 * positions[i + 1] * normals[i + 1];
     // On the tyre along the radius, at the ends along the axis.
     near(Math.max(radial, axial), 1, 1e-3);
+  }
+});
+
+test('lights are on at dusk and in fog', () => {
+  for (const [light, visibility, on] of [['day', 30000, false], ['day', 201, false],
+    ['day', 200, true], ['day', 80, true], ['dusk', 30000, true], ['dusk', 80, true]]) {
+    assert.equal(wantsHeadlights({ light, visibility }), on, `${light} ${visibility}`);
   }
 });
 

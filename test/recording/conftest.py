@@ -14,12 +14,14 @@
 # limitations under the License.
 """Messages and whole runs to record, serialised by a library that is not under test."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+import shutil
 import sys
 from typing import Any
 
+from crgame_ros.cli import main
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.game.documents import events_document, objects_document
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
@@ -43,6 +45,7 @@ from rosbags.typesys import get_typestore, Stores
 sys.path.insert(0, str(Path(__file__).parent))
 
 from export_runs import ExportRuns  # noqa: E402, I100 - importable from here on
+from study_maker import Studied, StudyMaker, take_part  # noqa: E402, I100
 
 TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 CYCLE_LABEL = 'epoch,n,k,e_n'
@@ -247,3 +250,20 @@ def drive() -> Callable[..., OfflineResult]:
 def runs() -> type[ExportRuns]:
     """Return the maker of runs to export."""
     return ExportRuns
+
+
+@pytest.fixture(scope='session')
+def studied(recorder: RunRecorder, tmp_path_factory: pytest.TempPathFactory) -> Studied:
+    """Give a study that people took part in, with its data."""
+    folder = tmp_path_factory.mktemp('studies') / 'demo'
+    found = take_part(StudyMaker(recorder, folder, scenarios_directory() / 'cut_in.yaml'))
+    assert main(['study', 'data', str(folder), '--bids']) == 0
+    return found
+
+
+@pytest.fixture
+def copied(studied: Studied, tmp_path: Path) -> Iterator[Path]:
+    """Give a copy of the study's folder to spoil."""
+    shutil.copytree(studied.folder, tmp_path / 'demo')
+    yield tmp_path / 'demo'
+    shutil.rmtree(tmp_path / 'demo')

@@ -14,7 +14,6 @@
 # limitations under the License.
 """A study that people have taken part in: real sessions, real recordings of what they drove."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 import json
 from pathlib import Path
@@ -156,8 +155,7 @@ def lines_of(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text('utf-8').splitlines()]
 
 
-def take_part(make: StudyMaker, stop: Callable[[ParticipantSession], object] | None = None
-              ) -> Studied:
+def take_part(make: StudyMaker) -> Studied:
     """Let four people take part: two wholly, one with troubles, one who leaves."""
     for place, name in enumerate(('P01', 'P02')):
         with make.session(name, place) as session:

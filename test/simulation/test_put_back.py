@@ -84,7 +84,8 @@ def test_it_stands_free_on_the_middle_of_its_lane_behind_the_contact(
     gap = footprint(run.simulation.setup, 0, after).distance(
         footprint(run.simulation.setup, 1, run.simulation.states[1]))
     assert 5.0 <= gap < 7.0
-    event, = run.simulation.fired
+    contact, event = run.simulation.fired
+    assert (contact.name, contact.by) == ('contact of hv0 with hv1', 'contact')
     assert (event.vehicle, event.n, event.by) == ('hv0', run.simulation.n, 'driver')
     assert run.result.fired == (event,)
     run.drive(100, commands=lambda n: [GAS, IDLE])
@@ -97,7 +98,8 @@ def test_nothing_happens_without_a_contact_twice_or_elsewhere(cut_in: LoadedScen
     assert not run.simulation.fired
     run = crashed(setup_of(cut_in))
     first = put_back(run)
-    assert put_back(run) == first and len(run.simulation.fired) == 1
+    assert put_back(run) == first and [event.by for event in run.simulation.fired] == [
+        'contact', 'driver']
     through = HandDriven(setup_of(cut_in, contact='through'))
     through.drive(400, commands=lambda n: [GAS._replace(put_back=n > 300), IDLE])
     assert not through.simulation.fired
@@ -110,7 +112,7 @@ def test_who_has_driven_on_is_not_put_back(cut_in: LoadedScenario) -> None:
     while math.dist(run.simulation.states[0][:2], start[:2]) < 21.0:
         run.drive(1, commands=lambda n: [backwards, IDLE])
     put_back(run)
-    assert not run.simulation.fired
+    assert [event.by for event in run.simulation.fired] == ['contact']
 
 
 def test_a_place_is_passed_over_where_somebody_is(cut_in: LoadedScenario) -> None:

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 import math
 
 from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
+from crgame_ros.analysis.behaviour.detection_score import DetectionScore
 from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.steering_reversals import COGNITIVE, ReversalSetting, VISUAL
 from crgame_ros.analysis.behaviour.take_overs import TakeOver
@@ -52,6 +53,16 @@ def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
         yield from _lane_change(change)
     for take_over in found.take_overs:
         yield from _take_over(take_over)
+
+
+def detection_lines(found: DetectionScore) -> Iterator[str]:
+    """Tell how somebody did in a detection response task."""
+    yield f'{found.task}, answered in {found.seat}'
+    yield (f'  hit_rate             {found.hit_rate:9.2f}        {found.hits} hits, '
+           f'{found.misses} misses, {found.premature} premature, {found.unrequested} unrequested')
+    if found.hits:
+        yield (f'  response_mean        {found.response_mean_s:9.2f} s      median '
+               f'{found.response_median_s:.2f}, by the page that showed the light')
 
 
 def _line(name: str, value: float, text: str) -> str:

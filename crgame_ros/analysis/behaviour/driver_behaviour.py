@@ -69,7 +69,8 @@ def measure_behaviour(record: RunRecord, limits: ResponseLimits = USUAL_LIMITS,
 
     :param record: of a recording (`read_run_record`) or of an offline run (`run_record_of`).
     :param limits: what counts as a response to an event.
-    :param requests: names of the events that ask to take over; orders of the seat do anyway.
+    :param requests: names of the events that ask to take over; orders of the seat and the game's
+        take-over requests do anyway.
     :param progress: is told how much has been measured, from 0 to 1.
     :raises InputError: if the scenario in it cannot be used.
     """
@@ -133,7 +134,7 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
         {**_motion(everybody, states, keeping), **_commands(controls)},
         tuple(EventReaction(event.name, event.n * dt_s,
                             reaction_to(event.n * dt_s, controls, limits))
-              for event in record.fired if event.vehicle is None and len(controls.times_s)),
+              for event in record.fired if event.is_of_game and len(controls.times_s)),
         limits,
         tuple(_gap(everybody, number, keeping, change) for change in keeping.changes),
         () if human else find_take_overs(
@@ -192,6 +193,8 @@ def _requests(record: RunRecord, vehicle_id: str,
              if order.seat == vehicle_id and order.source not in _BACK]
     found += [TakeOverRequest(event.n * dt_s, event.name) for event in record.fired
               if event.name in events]
+    found += [TakeOverRequest(entry.n * dt_s, entry.task) for entry in record.tasks
+              if entry.seat == vehicle_id and entry.what == 'request']
     return sorted(found)
 
 

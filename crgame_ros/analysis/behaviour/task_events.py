@@ -40,8 +40,9 @@ class TaskEvent(NamedTuple):
         task ended [s]
     :param response_time_s: of a stimulus by the page's clock, from the picture that showed it; of
         a request until the first input with hands or pedals [s]
-    :param outcome: of a stimulus hit, premature, missed or open (run or task ended before it was
-        over); unrequested of an answer to none; of a request taken or none; of what lasts begun.
+    :param outcome: of a stimulus hit, premature, missed, unseen (no page showed it) or open (run
+        or task ended before it was over); unrequested of an answer to none; of a request taken or
+        none; of what lasts begun.
     :param value: number of the stimulus or request, from 1; 0 of anything else.
     :param seat: the vehicle whose driver it was for.
     :param what: stimulus, unrequested, request or span (from beginning to end of a task).
@@ -98,8 +99,7 @@ def _row(run: RunRecord, entry: TaskEntry, later: Sequence[TaskEntry], dt_s: flo
                   and isinstance(spec.task, DetectionResponse)), duration_s)
     return TaskEvent(entry.kind, entry.task, onset_s, min(lit_s, duration_s, _or_inf(response_s)),
                      response_s,
-                     closed.by if closed.what == 'answer' else 'missed', entry.number, entry.seat,
-                     'stimulus', times)
+                     closed.by or 'missed', entry.number, entry.seat, 'stimulus', times)
 
 
 def _or_inf(seconds: float) -> float:

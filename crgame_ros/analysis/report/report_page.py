@@ -34,12 +34,13 @@ from crgame_ros.analysis.report.report_section import Plot, Section
 from crgame_ros.analysis.report.report_text import free, NOTHING, number
 from crgame_ros.analysis.report.run_section import began, run_section, title_of
 from crgame_ros.analysis.report.story_section import story_section
+from crgame_ros.analysis.report.task_section import task_section
 from crgame_ros.analysis.report.timing_section import plan_section, timing_section
 
 # The parts of a run's report, in their order: whoever has more to tell adds one.
 SECTIONS: tuple[Callable[[ReportRun], Section | None], ...] = (
-    story_section, criticality_section, outcome_section, driving_section, planners_section,
-    input_section, motion_section, plan_section, timing_section, run_section)
+    story_section, criticality_section, outcome_section, driving_section, task_section,
+    planners_section, input_section, motion_section, plan_section, timing_section, run_section)
 
 
 def report_html(runs: Sequence[ReportRun], software: str = '') -> str:

@@ -151,12 +151,15 @@ def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
 
 
 def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
-    """Say who was in the seats of cockpits; games whose people sat elsewhere have none."""
+    """Say who was in the seats of cockpits, and whose device at the machine drove."""
     last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
     for spell, delay_ms in run.record.drivers:
         person = spell.person
-        if person is not None:
-            until_n = last_n if spell.until_n is None else spell.until_n
+        until_n = last_n if spell.until_n is None else spell.until_n
+        if person is None and delay_ms is not None:
+            yield (named(run, spell.seat), NOTHING, 'driver', free(spell.driver), 'at the machine',
+                   f'{spell.from_n} to {until_n}', number(delay_ms, 0))
+        elif person is not None:
             yield (named(run, spell.seat), free(person.name or NOTHING),
                    free(person.role or NOTHING), free(person.device or NOTHING),
                    free(person.browser or NOTHING), f'{spell.from_n} to {until_n}',

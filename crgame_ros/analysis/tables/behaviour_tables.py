@@ -76,7 +76,7 @@ TAKE_OVERS = TableDeclaration(
     'take_overs', 'somebody driving an AV', ('run', 'vehicle', 'seat_s'),
     (*_OF, Column('seat_s', NUMBER, 's', f'first command that the AV obeyed, {_SINCE_START}'),
      Column('end_s', NUMBER, 's', f'last such command, {_SINCE_START}'),
-     Column('request', TEXT, '', '`order` of the seat, or the name of the event that asked for it',
+     Column('request', TEXT, '', '`order` of the seat, or the name of the event or task asking',
             empty='none is known'),
      Column('request_s', NUMBER, 's', f'when it was asked for, {_SINCE_START}',
             empty='no request is known'),

@@ -22,7 +22,7 @@ from crgame_ros.analysis.tables.table_part import declare, TablePart
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.game.events import ACTIONS
 
-UNKNOWN = 'the game does not know the event: a vehicle was put back on its lane'
+UNKNOWN = 'the game does not know the event: a vehicle touched somebody, or was put back'
 
 
 def _fired(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
@@ -46,8 +46,9 @@ EVENT_PARTS = (
         Column('name', TEXT, '', 'of the event in the game'),
         Column('kind', TEXT, '', 'what it does', empty=UNKNOWN, values=tuple(ACTIONS)),
         Column('label', TEXT, '', 'text for people', empty=UNKNOWN),
-        Column('by', TEXT, '', 'whether somebody triggered it, its condition came true, or a '
-               'driver had the vehicle put back', values=('trigger', 'condition', 'driver')),
+        Column('by', TEXT, '', 'whether somebody triggered it, its condition came true, a driver '
+               'had the vehicle put back, or a contact stopped it',
+               values=('trigger', 'condition', 'driver', 'contact')),
         Column('object', TEXT, '', 'id of the obstacle that it changes or puts',
                empty='it changes no obstacle')), _fired),)
 EVENTS = declare('events', 'an event that took effect', ('run', 'name', 'time_s'), EVENT_PARTS)

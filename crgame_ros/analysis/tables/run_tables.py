@@ -31,12 +31,13 @@ from crgame_ros.analysis.tables.table_part import part_rows
 from crgame_ros.analysis.tables.table_rows import KeptTable, TableRows
 from crgame_ros.analysis.tables.table_writer import Format
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.task_tables import TASK_TABLES, write_tasks
 from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS, VEHICLES
 from crgame_ros.errors import InputError
 import pyarrow as pa
 
 TABLES: tuple[TableDeclaration, ...] = (
-    RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES)
+    RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES, *TASK_TABLES)
 
 
 def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
@@ -95,6 +96,7 @@ def _add_rows(run: TabulatedRun, writers: Mapping[str, TableRows],
         writers[PLANS.name].add(rows)
     progress(f'measuring how people drove in {run.id}', 0.0)
     write_behaviour(run, writers)
+    write_tasks(run, writers)
     if run.scored and run.record.log.vehicles:
         score_vehicles(run, progress=partial(progress, f'scoring {run.id}'))
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):

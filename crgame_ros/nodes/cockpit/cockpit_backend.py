@@ -77,7 +77,8 @@ class LiveBackend:
         self._hub = hub
         self._feed = CockpitFeed(self._endpoints, hub, self._runs)
         self._desk = SeatDesk(self._node, self._endpoints, self._orders, hub, self._feed)
-        self._people = PeopleFeed(self._endpoints, hub, self._desk.table)
+        self._people = PeopleFeed(
+            self._endpoints, hub, self._desk.table, self._feed.status)
         self._pump = asyncio.create_task(self._run())
 
     async def stop(self) -> None:

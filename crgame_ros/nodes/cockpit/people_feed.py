@@ -18,8 +18,10 @@ from typing import Any
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.seat_table import SeatTable
 from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.seat import GAME
 from diagnostic_msgs.msg import DiagnosticStatus
 
 TELL_PERIOD_S = 1.0
@@ -32,9 +34,12 @@ class PeopleFeed:
     :param endpoints: of the node.
     :param hub: all pages.
     :param table: who holds which seat.
+    :param status: knows of devices at this machine.
     """
 
-    def __init__(self, endpoints: Endpoints, hub: Hub, table: SeatTable) -> None:
+    def __init__(self, endpoints: Endpoints, hub: Hub, table: SeatTable,
+                 status: RunStatus) -> None:
+        self._status = status
         self._endpoints = endpoints
         self._hub = hub
         self._table = table
@@ -53,7 +58,9 @@ class PeopleFeed:
             return
         self._shown = present
         self._hub.set_document('people', {
-            'people': [self._entry(client) for client in self._hub.clients.values()]})
+            'people': [self._entry(client) for client in self._hub.clients.values()],
+            'devices': [device for seat, device in self._status.devices.items()
+                        if self._table.seats.get(seat, {}).get('source') == GAME]})
         if due:
             self._told_s = now_s
             self._record()

@@ -91,8 +91,8 @@ def interval_note(means: Sequence[ConditionMeans]) -> str:
         texts.append(
             'Intervals are those within participants: Cousineau (2005) with the correction of '
             'Morey (2008). They show differences between conditions, not the spread of people. '
-            'Means and intervals are of the participants who have a value in every condition; n '
-            'says how many.')
+            'Means and intervals are then of the participants who have a value in every '
+            'condition: * behind n, their number.')
     if len(within) < len(means):
         texts.append(
             'Where n stands without *, fewer than two participants have a value in every '
@@ -113,7 +113,8 @@ def _block(data: StudyData, conditions: tuple[str, ...], blocks: Sequence[str],
         html += table(f'{group}: means with 95 % intervals', (
             '', 'unit', *(free(name) for name in conditions), 'n'),
             [_row(each) for each in of_group], 'numbers')
-        html += '<div class="plots">' + ''.join(_figure(each) for each in of_group) + '</div>'
+        html += '<div class="plots">' + ''.join(
+            _figure(each) for each in of_group if _differs(each.means)) + '</div>'
     return html
 
 
@@ -124,24 +125,21 @@ def _row(shown: ShownMeasure) -> Sequence[str]:
              for each in shown.means.conditions]
     count = f'{len(shown.means.used)}*' if shown.means.within else ' / '.join(
         str(len(each.points)) for each in shown.means.conditions)
-    return (f'<span title="{plain(_definition(shown.column))}">{plain(_label(shown.column))}'
-            f'</span>', plain(_unit(shown.column)), *cells, count)
+    return (f'{plain(shown.column.name)}<br><small>{plain(shown.column.definition)}</small>',
+            plain(_unit(shown.column)), *cells, count)
 
 
 def _figure(shown: ShownMeasure) -> str:
     unit = _unit(shown.column)
-    words = _label(shown.column)
+    words = shown.column.name
     told = f' <span class="unit">[{plain(unit)}]</span>' if unit else ''
     return (f'<figure class="chart"><figcaption>{plain(words)}{told}</figcaption>'
             f'{condition_svg(shown.means.conditions, words, 2)}</figure>')
 
 
-def _label(column: Column) -> str:
-    return column.name
-
-
-def _definition(column: Column) -> str:
-    return f'{column.definition}; {column.variant}' if column.variant else column.definition
+def _differs(means: ConditionMeans) -> bool:
+    """Tell whether there is anything to see in a picture."""
+    return len({value for each in means.conditions for value in each.points.values()}) > 1
 
 
 def _unit(column: Column) -> str:

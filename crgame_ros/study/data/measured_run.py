@@ -127,6 +127,8 @@ def _summary(run: TabulatedRun) -> dict[str, Any]:
         'humans': {item.id: item.driver for item in game.humans},
         'planners': {item.id: item.planner for item in game.avs},
         'input_delay_ms': {item.spell.seat: item.input_delay_ms for item in run.record.drivers},
+        # Of each seat which view its page showed, from when to when.
+        'views': (run.timing or {}).get('view') or {},
         'tasks': [{
             'kind': str(each.kind), 'what': each.what, 'name': each.name, 'seat': each.seat,
             'outcome': each.outcome, 'onset_s': each.onset_s,

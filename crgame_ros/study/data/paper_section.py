@@ -25,6 +25,11 @@ from crgame_ros.study.data.trials_table import measure_columns
 _VIEWS = {'driver': "from the driver's seat", 'chase': 'from behind the vehicle',
           'map': 'from above, on the map', 'bird': 'from above'}
 
+_GEOMETRY = (('view_across_deg', 'Angle across the picture', '°'),
+             ('screen_width_m', 'Width of the screen', ' m'),
+             ('eye_distance_m', 'Distance of the eyes from it', ' m'),
+             ('view_rate_hz', 'Pictures a second', ''))
+
 
 def paper_section(data: StudyData) -> str:
     """Say which software and machine, delays, views, reference points and questionnaires."""
@@ -63,15 +68,23 @@ def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
         order = 'given sequences' if block.sequences else block.order
         factors = ' × '.join(f'{factor.name} ({len(factor.levels)})'
                              for factor in study.factors_of(block)) or 'one condition'
-        yield f'Block {free(block.name)}', free(
-            f'{factors}, {block.repetitions} times each, order: {order}')
+        times = 'once' if block.repetitions == 1 else f'{block.repetitions} times'
+        yield f'Block {free(block.name)}', free(f'{factors}, {times} each, order: {order}')
     views = dict.fromkeys(str(settings.get('view')) for settings in told['conditions'].values())
     yield 'View at the start', ', '.join(plain(_VIEWS.get(view, view)) for view in views)
-    yield 'Geometry of the view', ('eyes, field of view and mirrors: docs/driver_view.md and the '
-                                   'vehicle’s file; add width of the screen and distance of the '
-                                   'eyes from it')
-    if told['view']['recorded']:
-        yield 'Views as recorded', free(told['view']['recorded'])
+    shown = told['view']
+    yield 'Views as recorded', plain(', '.join(_VIEWS.get(name, name) for name in shown['shown'])
+                                     or 'not recorded')
+    for name, words, unit in _GEOMETRY:
+        yield words, _range(shown[name], unit)
+    yield 'Eyes and mirrors in the vehicle', 'docs/driver_view.md, and the vehicle’s file'
+
+
+def _range(spread: Mapping[str, float] | None, unit: str) -> str:
+    if spread is None:
+        return 'not recorded'
+    low, high = (number(spread[key], 2) for key in ('min', 'max'))
+    return plain(f'{low}{unit}' if low == high else f'{low} to {high}{unit}')
 
 
 def _delay(words: str, spread: Mapping[str, float] | None) -> Sequence[str]:

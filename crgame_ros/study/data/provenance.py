@@ -29,6 +29,8 @@ from crgame_ros.study.data.timing_quality import BOUNDS
 from crgame_ros.study.trial_plan import conditions_of
 
 _GIT_S = 10.0
+# Columns of the table of trials about the picture.
+_VIEWS = ('view_across_deg', 'screen_width_m', 'eye_distance_m', 'view_rate_hz')
 
 
 def provenance_of(data: StudyData) -> dict[str, Any]:
@@ -59,8 +61,8 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
                      for name in ('input_delay_s', 'link_delay_s')},
         'timing_bounds': BOUNDS.as_dict(),
         'view': {'geometry': 'docs/driver_view.md',
-                 'recorded': [entry for record in data.records for entry in record.entries
-                              if entry['entry'] == 'view']},
+                 'shown': sorted({row['view'] for row in _rows(data) if row.get('view')}),
+                 **{name: spread([row.get(name) for row in _rows(data)]) for name in _VIEWS}},
         'reference_points': {
             'positions and motion of vehicles': 'rear axle',
             'gaps, distances, times to collision': 'footprints, bumper to bumper',

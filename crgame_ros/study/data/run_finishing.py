@@ -49,12 +49,13 @@ def finished_recording(folder: Path, participant: Path, say: Callable[[str], obj
     """
     if not folder.is_dir() or not bags_of(folder):
         return 'the recording is missing'
-    if (folder / FINISHED_MARK).exists():
+    closed = all((bag / METADATA_FILE).is_file() for bag in bags_of(folder))
+    derived = any(folder.glob('*.xml')) and any(folder.glob('timing*.json'))
+    if (folder / FINISHED_MARK).exists() or closed and derived:
         return ''
     if session_goes_on(participant):
         # What is derived from a closed recording is written later; measures need none of it.
-        closed = (bags_of(folder)[-1] / METADATA_FILE).is_file()
         return '' if closed else 'the recording is not finished yet'
-    say(f'{folder}: finishing what a killed process has left')
+    say(f'{folder}: finishing what was left unfinished')
     finish_run(folder, lambda line: say(line) if line.startswith('error') else None)
     return ''

@@ -15,8 +15,6 @@
 """The commands `crgame study data`, `report` and `rerun`: what a study has found."""
 
 import argparse
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
@@ -127,4 +125,5 @@ def _read(folder: Any) -> 'StudyData':
     return data
 
 
-_say: Callable[[str], None] = partial(print, file=sys.stderr, flush=True)
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

@@ -59,6 +59,10 @@ def only_writer(folder: Path) -> Iterator[None]:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise InputError('another process writes there', str(folder), 'wait for it') from error
+        for part in folder.rglob('.*.part'):
+            # Of a process that was killed.
+            if part.is_file():
+                part.unlink()
         yield
 
 

@@ -125,7 +125,9 @@ def _troubles(data: StudyData) -> str:
 def _timing(data: StudyData) -> str:
     if not data.trials:
         return note('No trial counts yet.')
-    bounds = '; '.join(f'{words} {plain(bound)}' for words, bound in bounds_told())
+    # A number and its unit stay on one line.
+    bounds = '; '.join(f'{words} <span class="bound">{plain(bound)}</span>'
+                       for words, bound in bounds_told())
     html = note(f'Bounds: {bounds}. They are marked with ‼ and said at the end of the row; such '
                 'trials stay in the tables, where timing_flag tells them. What is not known is '
                 'not judged.')

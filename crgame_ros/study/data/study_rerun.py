@@ -22,8 +22,10 @@ from typing import Any
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.data_package import data_package, PACKAGE_FILE, WrittenTable
 from crgame_ros.analysis.tables.vehicles_table import VEHICLES
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
+from crgame_ros.recording.run_cycles import replay_inputs
+from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.study.data.study_column import with_unit
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows
@@ -75,10 +77,9 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
     """
     from crgame_ros.evaluation.dask_cluster import require_dask
     require_dask()
-    trials = [trial for trial in data.trials if trial.run is not None
-              and trial.run.summary['planners'] and trial.run.summary['humans']]
+    trials = [trial for trial in data.trials if _can_be_repeated(trial, say)]
     if not trials:
-        raise InputError('no trial with a person and an AV is recorded', str(data.folder.path),
+        raise InputError('no trial of a person and an AV can be repeated', str(data.folder.path),
                          'run some first')
     by_seed: dict[int, list[CountedTrial]] = {}
     for trial in trials:
@@ -88,11 +89,26 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
         folder = out if len(by_seed) == 1 else out / f'seed-{seed}'
         labels = _evaluated(of_seed, planners, seed, folder, workers)
         rows += _compared(of_seed, labels, folder)
-    if len(trials) < len(data.trials):
-        say(f'note: {len(data.trials) - len(trials)} trials without measures or AVs are left out')
     rows.sort(key=lambda row: (row['participant'], row['trial'], row['planner'], row['vehicle']))
     _write(rows, out, data.folder.study.name)
     return [_told(rows, planner) for planner in dict.fromkeys(row['planner'] for row in rows)]
+
+
+def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
+    """Tell whether everything that a person did in a trial is known; say why not."""
+    reason = trial.row['problem']
+    if trial.run is not None and not trial.run.summary['humans']:
+        reason = 'nobody drove in it'
+    elif trial.run is not None and not trial.run.summary['planners']:
+        reason = 'no AV takes part'
+    elif trial.attempt.folder is not None and not reason:
+        try:
+            replay_inputs(recording_in(trial.attempt.folder))
+        except CrgameError as error:
+            reason = str(error)
+    if reason:
+        say(f'note: {trial.record.id}, trial {trial.attempt.trial.number} is left out: {reason}')
+    return not reason
 
 
 def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: int, folder: Path,

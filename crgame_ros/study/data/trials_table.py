@@ -14,7 +14,7 @@
 # limitations under the License.
 """The table of trials: a row is a trial that counts, with everything that is known of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime, UTC
 from pathlib import Path
 from typing import Any
@@ -83,6 +83,15 @@ _TIMING = (
            'picture', empty='nobody measured it'),
     Column('link_delay_s', NUMBER, 's', 'of the link between page and simulation',
            empty='nobody measured it'),
+    *(Column(name, kind, unit, what, variant='of the view that was shown longest',
+             empty='nobody recorded it') for name, kind, unit, what in (
+        ('view', TEXT, '', 'what the page showed: driver, chase, bird or map'),
+        ('view_across_deg', NUMBER, 'deg', 'angle across the picture'),
+        ('screen_width_m', NUMBER, 'm', 'width of the screen, as was told'),
+        ('eye_distance_m', NUMBER, 'm', 'of the eyes from the screen, as was told'),
+        ('view_rate_hz', NUMBER, 'Hz', 'pictures a second, median'))),
+    Column('view_changes', INTEGER, '1', 'how often the view was changed',
+           empty='nobody recorded it'),
     flag_column('timing_flag', 'whether its timing is beyond a bound'),
     Column('timing_reason', TEXT, '', 'what of its timing is beyond which bound',
            empty='nothing is'))
@@ -182,6 +191,7 @@ class TrialsTable:
         delay_ms = summary['input_delay_ms'].get(vehicle)
         return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],
                 'av_planner': '+'.join(dict.fromkeys(summary['planners'].values())),
+                **_view(summary.get('views', {}).get(vehicle, ())),
                 'input_delay_s': None if delay_ms is None else 1e-3 * delay_ms,
                 **{name: told[name] for name in _RUN_COLUMNS},
                 **{column.name: measures.get(name) for name, column in self._measures.items()}}
@@ -200,6 +210,17 @@ def utc(at_s: float) -> str:
     """Write a time as ISO 8601 does, to the millisecond."""
     return datetime.fromtimestamp(at_s, UTC).isoformat(timespec='milliseconds').replace(
         '+00:00', 'Z')
+
+
+def _view(periods: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Tell of what was shown longest of what a seat's page told."""
+    if not periods:
+        return {}
+    longest = max(periods, key=lambda period: period['to_s'] - period['from_s'])
+    return {'view': longest.get('shown'), 'view_across_deg': longest.get('across_deg'),
+            'screen_width_m': longest.get('screen_width_m'),
+            'eye_distance_m': longest.get('eye_distance_m'),
+            'view_rate_hz': longest.get('rate_hz'), 'view_changes': len(periods) - 1}
 
 
 def _count(value: Any) -> int | None:

@@ -24,6 +24,7 @@ const PARTS = [
   ['./panels/tabs.js', 'createTabs', '#panels', 'panels'],
   ['./panels/scenario.js', 'createScenario', '#panel-scenario', 'scenario'],
   ['./panels/events.js', 'createEvents', '#panel-events', 'events'],
+  ['./tasks/task_panel.js', 'createTaskPanel', '#panel-events', 'taskPanel'],
   ['./panels/planners.js', 'createPlanners', '#planners', 'planners'],
   ['./panels/timing.js', 'createTiming', '#timekeeping', 'timing'],
   ['./after/instant_replay.js', 'createInstantReplay', '#last-seconds', 'lastSeconds'],

@@ -3,9 +3,10 @@
 /** Who is at this cockpit: roles, delays, and links by which others come in. */
 
 import { element, setAttribute, setText } from './dom.js';
+import { oneLine } from './panels/format.js';
 
 /** @import { Connection } from './connection.js' */
-/** @import { Present } from './people_messages.js' */
+/** @import { DeviceDelay, Present } from './people_messages.js' */
 /** @import { Store } from './store.js' */
 
 /** @type {[role: string, text: string][]} */
@@ -57,8 +58,9 @@ class People {
   }
 
   #show() {
-    const { people, rights, scene } = this.#store;
-    this.#list.replaceChildren(...people.map((person) => this.#row(person)));
+    const { people, devices, rights, scene } = this.#store;
+    this.#list.replaceChildren(...people.map((person) => this.#row(person)),
+      ...devices.map(deviceRow));
     const humans = (scene?.vehicles ?? []).filter(({ role }) => role === 'human');
     const shown = JSON.stringify([rights, humans.map(({ id }) => id)]);
     if (shown === this.#shown) {
@@ -137,6 +139,17 @@ class People {
     this.#link.value = answer.link ?? '';
     this.#link.select();
   }
+}
+
+/** @param {DeviceDelay} delay */
+function deviceRow({ seat, device, command_ms, input_delay_ms }) {
+  const delays = [
+    command_ms === null ? '' : `${command_ms.toFixed(1)} ms to the command`,
+    input_delay_ms === null ? '' : `${input_delay_ms.toFixed(0)} ms to the state that obeys`,
+  ].filter(Boolean).join(', ');
+  return element('li', { 'data-device': seat }, element('strong', { text: oneLine(device) }),
+    element('span', { text: `drives ${seat} at the machine of the game` }),
+    element('span', { class: 'drive-note', text: delays }));
 }
 
 /**

@@ -27,8 +27,16 @@ export {};
  */
 
 /**
+ * @typedef {object} DeviceDelay a device at the machine of the game that drives
+ * @property {string} seat
+ * @property {string} device its name
+ * @property {number|null} command_ms from the kernel's stamp of an input to its command
+ * @property {number|null} input_delay_ms to the first state that obeys it
+ */
+
+/**
  * `accepted`: whether the page is taken for the one whose key it has.
  *
  * @typedef {{type: 'you', rights: Rights, accepted: boolean}} YouMessage
- * @typedef {{type: 'people', people: Present[]}} PeopleMessage
+ * @typedef {{type: 'people', people: Present[], devices: DeviceDelay[]}} PeopleMessage
  */

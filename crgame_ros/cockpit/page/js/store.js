@@ -16,7 +16,7 @@ import { SampleRing } from './samples.js';
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
 /** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
-/** @import { PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
+/** @import { DeviceDelay, PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
 /** @import { TasksMessage } from './tasks/task_messages.js' */
 
@@ -82,6 +82,8 @@ export class Store {
   me = { id: '', name: '' };
   /** @type {Present[]} */
   people = [];
+  /** @type {DeviceDelay[]} */
+  devices = [];
   /** @type {Rights} */
   rights = { role: '', directs: false, drives: false, seat: '', may_direct: false,
     may_drive: false };
@@ -178,7 +180,7 @@ export class Store {
         break;
       }
       case 'you': this.rights = message.rights; break;
-      case 'people': this.people = message.people; break;
+      case 'people': this.people = message.people; this.devices = message.devices; break;
       case 'seats': this.seats = message.seats; break;
       case 'signals': this.signals = message; break;
       case 'events': this.fired = message.fired; break;

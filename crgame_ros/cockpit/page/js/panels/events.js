@@ -13,7 +13,8 @@ import { icon } from './icons.js';
 /** @import { Store } from '../store.js' */
 
 /** @type {Record<string, string>} */
-const BY = { trigger: 'by button', condition: 'by its condition', driver: 'by its driver' };
+const BY = { trigger: 'by button', condition: 'by its condition', driver: 'by its driver',
+  contact: 'stopped by it' };
 
 /**
  * Make the panel.

@@ -5,8 +5,9 @@
 import { fetchScore } from '../after/run_api.js';
 import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
-import { clockTime, errorText, oneLine } from './format.js';
+import { errorText, oneLine } from './format.js';
 import { icon } from './icons.js';
+import { mishapsOf } from './mishaps.js';
 import { figures, fileList, part, table, why } from './outcome_card.js';
 import { TABLE_I, valueOf } from './timing.js';
 
@@ -48,7 +49,6 @@ class Outcome {
   #scores = new Map();
   #told = 0;
   #mishapTimer = 0;
-  #fired = 0;
 
   /**
    * @param {HTMLElement} root
@@ -72,12 +72,11 @@ class Outcome {
     });
     store.on('events', ({ fired }) => {
       // Back on the lane: the notice of the contact has served.
-      const mine = window.crgame.driving?.seat;
-      if (mine && fired.some(({ name, by }) => by === 'driver' && name.endsWith(` ${mine}`))
-          && fired.length > this.#fired) {
+      const last = fired.at(-1);
+      if (last?.by === 'driver' && last.name.endsWith(` ${window.crgame.driving?.seat}`)) {
         this.#dismiss();
       }
-      this.#fired = fired.length;
+      this.#show();
     });
     this.#show();
   }
@@ -133,7 +132,7 @@ class Outcome {
       return { phase: 'over', connected, ...this.#result(status, scene) };
     }
     const mine = Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null;
-    const mishaps = mine === null || !connected ? [] : mishapsOf(status, mine);
+    const mishaps = mine === null || !connected ? [] : mishapsOf(this.#store, mine);
     if (mishaps.length > this.#told) {
       const { text, touched } = mishaps[mishaps.length - 1];
       return { phase: 'mishap', run: status.run, text,
@@ -223,7 +222,7 @@ class Outcome {
   #dismiss() {
     const { status } = this.#store;
     const mine = window.crgame.driving?.seat;
-    this.#told = status === null || !mine ? 0 : mishapsOf(status, mine).length;
+    this.#told = status === null || !mine ? 0 : mishapsOf(this.#store, mine).length;
     this.#show();
   }
 
@@ -346,22 +345,6 @@ class Outcome {
       this.#store.receive({ type: 'notice', level: 'warn', text });
     }
   }
-}
-
-/**
- * What a vehicle has hit and where it left the road, in the order of time.
- *
- * @param {Status} status
- * @param {string} mine
- */
-function mishapsOf({ contacts = [], departures = [] }, mine) {
-  return [
-    ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map((item) => ({
-      t: item.t, touched: true, text: `You touched ${item.vehicle === mine ? item.with : item.vehicle} at `
-        + `${clockTime(item.t)}.` })),
-    ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
-      t, touched: false, text: `You left the road at ${clockTime(t)}.` })),
-  ].sort((a, b) => a.t - b.t);
 }
 
 /** @param {Awaiting} facts */

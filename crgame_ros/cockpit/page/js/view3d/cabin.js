@@ -32,6 +32,8 @@ export function createCabin(three, vehicle, paint) {
   const cabin = new three.Mesh(geometryOf(three, mesh.arrays(false)),
     new three.MeshLambertMaterial({ vertexColors: true, side: three.DoubleSide }));
   cabin.frustumCulled = false;
+  // First: what it hides is not computed.
+  cabin.renderOrder = -1;
   return cabin;
 }
 

@@ -5,7 +5,8 @@
 const DEGREE = Math.PI / 180;
 /** What can be chosen across the picture [deg]. */
 export const FIELD_OF_VIEW = { least: 30, usual: 75, most: 140 };
-const TALLEST = 110 * DEGREE;
+// Taller, the roof over the driver's head would be nearer than what is drawn.
+const TALLEST = 95 * DEGREE;
 
 /**
  * What the driver says of screen and seat: then things are as large as in reality.

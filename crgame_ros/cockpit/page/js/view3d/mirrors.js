@@ -31,6 +31,8 @@ export class Mirrors {
   /** @type {ReturnType<typeof makeGlass>[]} */
   #glasses;
   #next = 0;
+  /** How many pictures of mirrors there were. */
+  count = 0;
   /** Name of the one that was drawn last; empty before. */
   drawn = '';
   #width = 1;
@@ -59,10 +61,11 @@ export class Mirrors {
     this.#flat.right = width;
     this.#flat.top = height;
     this.#flat.updateProjectionMatrix();
-    for (const { mirror, target, pane, frame } of this.#glasses) {
+    for (const glass of this.#glasses) {
+      const { mirror, pane, frame } = glass;
       const { left, bottom, width: w, height: h } = this.#rectangle(mirror);
-      target.setSize(Math.max(Math.round(w * ratio * COARSER), 16),
-        Math.max(Math.round(h * ratio * COARSER), 8));
+      glass.size = [Math.max(Math.round(w * ratio * COARSER), 16),
+        Math.max(Math.round(h * ratio * COARSER), 8)];
       pane.position.set(left + w / 2, bottom + h / 2, 0.5);
       pane.scale.set(w, h, 1);
       frame.position.set(left + w / 2, bottom + h / 2, 0);
@@ -93,11 +96,14 @@ export class Mirrors {
    *   the vehicle is
    */
   drawNext(renderer, scene, aim) {
-    const { mirror, target, camera, optics } = this.#glasses[this.#next];
+    const { mirror, target, camera, optics, size } = this.#glasses[this.#next];
     this.drawn = mirror.name;
+    this.count += 1;
     this.#next = (this.#next + 1) % this.#glasses.length;
     if (optics !== null) {
       aim(camera, optics);
+      // Only now: what has another size is empty.
+      target.setSize(...size);
       renderer.setRenderTarget(target);
       renderer.render(scene, camera);
       renderer.setRenderTarget(null);
@@ -151,6 +157,7 @@ function makeGlass(three, overlay, mirror, software) {
     new three.MeshBasicMaterial({ color: FRAME, depthTest: false, toneMapped: false }));
   overlay.add(frame, pane);
   return { mirror, target, camera, pane, frame,
+    size: /** @type {[number, number]} */ ([16, 8]),
     optics: /** @type {MirrorCamera|null} */ (null) };
 }
 

@@ -163,7 +163,8 @@ export class Picture {
     this.#traffic.update(shown, vehicle.id, road.heightAt, eye);
     this.#plans.update(looks.plans, shown, this.#origin, road.heightAt);
     const measures = this.#cost.begin();
-    if (inside && looks.mirrors && this.stats.frames % this.#quality.detail.mirrorEvery === 0) {
+    if (inside && looks.mirrors && (this.mirrors.count < this.mirrors.all.length
+        || this.stats.frames % this.#quality.detail.mirrorEvery === 0)) {
       this.#drawMirror(stand, vehicle);
     }
     this.#drawMain(stand, vehicle, inside);

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Instances of one shape, of which a picture draws those that its camera can see. */
 
+import { MergedMesh } from './merged_mesh.js';
+
 /** @import { BufferGeometry, Camera, InstancedBufferAttribute, InstancedMesh } from 'three' */
-/** @import { Color, Material, Matrix4 } from 'three' */
+/** @import { Color, Material, Matrix4, Mesh } from 'three' */
 /** @typedef {typeof import('./three.js')} Three */
 
 /**
@@ -66,13 +68,27 @@ export function isWithin(planes, x, y, z, radius) {
 /**
  * @typedef {object} Shapes
  * @property {Part[]} near
- * @property {Part[]} [far] the plain ones; without them the near ones are drawn at any distance
- * @property {number} [sooner] share of a sight's `plain_m` at which the plain ones begin
+ * @property {Part[]} [far] the plain ones, of one material; without them the near ones are drawn
+ *   at any distance
+ * @property {number} [sooner] share of a sight's `plain_m` at which the plain ones begin; with 0
+ *   all are plain where any is
  */
+
+/**
+ * Give the same shape as a plain one, for what costs more by its number than by its triangles.
+ *
+ * @param {Part} part of a material that knows no colours of corners
+ * @returns {Part} whose material is to be freed, too
+ */
+export function mergeable({ geometry, material, tinted }) {
+  const own = material.clone();
+  own.vertexColors = true;
+  return { geometry: geometry.clone(), material: own, tinted };
+}
 
 /** Instances are put in anew whenever they move; `see` chooses among them. */
 export class SeenInstances {
-  /** @type {InstancedMesh[]} those of the near shape, then those of the plain one */
+  /** @type {Mesh[]} those of the near shape, then that of the plain one */
   meshes;
   #near;
   #far;
@@ -95,8 +111,9 @@ export class SeenInstances {
     this.#colors = new Float32Array(3 * most);
     this.#own = new Uint8Array(most);
     this.#near = createGroup(three, near, most);
-    this.#far = createGroup(three, far, most);
-    this.meshes = [...this.#near.meshes, ...this.#far.meshes];
+    this.#far = far.length > 0 ? new MergedMesh(three, far, most) : null;
+    far.forEach(({ geometry }) => geometry.dispose());
+    this.meshes = [...this.#near.meshes, ...(this.#far === null ? [] : [this.#far.mesh])];
   }
 
   /** Begin anew. */
@@ -132,22 +149,23 @@ export class SeenInstances {
 
   /** @param {Sight|null} sight */
   #choose(sight) {
-    let [near, far] = [0, 0];
+    let near = 0;
+    this.#far?.begin();
     for (let i = 0; i < this.#count; i += 1) {
       if (sight !== null && !this.#mayBeSeen(i, sight)) {
         continue;
       }
-      if (sight !== null && this.#far.meshes.length > 0
+      // Where all detail is there, nothing is plain, however soon.
+      if (sight !== null && this.#far !== null && sight.plain_m < Infinity
           && this.#distance(i, sight) > this.#sooner * sight.plain_m) {
-        this.#copy(i, this.#far, far);
-        far += 1;
+        this.#far.add(this.#matrices, this.#colors, i);
       } else {
         this.#copy(i, this.#near, near);
         near += 1;
       }
     }
     handOver(this.#near, near);
-    handOver(this.#far, far);
+    this.#far?.end();
   }
 
   /**
@@ -195,11 +213,12 @@ export class SeenInstances {
 
   /** Free what the graphics card holds, but for the materials. */
   dispose() {
-    for (const mesh of this.meshes) {
+    for (const mesh of this.#near.meshes) {
       mesh.removeFromParent();
       mesh.geometry.dispose();
       mesh.dispose();
     }
+    this.#far?.dispose();
   }
 }
 

@@ -8,6 +8,7 @@ import { BrakeLights } from '../world/brake_lights.js';
 import { ofObject, ofVehicle } from './bodies/appearance.js';
 import { plainBody } from './bodies/plain_bodies.js';
 import { FittedParts } from './fitted_parts.js';
+import { Headlights } from './headlights.js';
 import { Instances } from './instances.js';
 
 /** @import { Group } from 'three' */
@@ -28,6 +29,7 @@ import { Instances } from './instances.js';
  * @property {[x: number, y: number, z: number]} scale of the body
  * @property {number} role its colour on the map
  * @property {number} rolled how far its wheels have rolled [m]
+ * @property {boolean} parked whether nobody is in it
  */
 
 /** @typedef {(x: number, y: number) => number} HeightAt of the road at a point of the map [m] */
@@ -47,6 +49,7 @@ export class Traffic {
   /** @type {Map<string, Instances>} */
   #instances = new Map();
   #parts;
+  #headlights;
   #brakeLights = new BrakeLights();
   #matrix;
   #scaling;
@@ -67,6 +70,7 @@ export class Traffic {
     this.#matrix = new three.Matrix4();
     this.#scaling = new three.Vector3();
     this.#parts = new FittedParts(three, group);
+    this.#headlights = new Headlights(three, group);
     store.on('objects', (step) => this.#brakeLights.takeStep(step));
   }
 
@@ -103,7 +107,11 @@ export class Traffic {
     });
     this.#vehicles = things.slice(0, scene.vehicles.length);
     this.#objects = things.slice(scene.vehicles.length);
+    things.forEach((thing, i) => {
+      thing.parked = scene.objects[i - scene.vehicles.length]?.role === 'static';
+    });
     this.#parts.load(things.length);
+    this.#headlights.load(scene.environment, things.length);
   }
 
   /**
@@ -124,6 +132,7 @@ export class Traffic {
       instances.clear();
     }
     this.#parts.clear();
+    this.#headlights.clear();
     for (let i = 0; i < this.#objects.length; i += 1) {
       const row = i * OBJECT_WIDTH;
       const [x, y, yaw, vx, vy] = shown.objects.subarray(row, row + 5);
@@ -152,6 +161,7 @@ export class Traffic {
       instances.see(sight);
     }
     this.#parts.see(sight);
+    this.#headlights.see(sight);
   }
 
   /**
@@ -185,7 +195,7 @@ export class Traffic {
    */
   #thing(look, body, id, role) {
     return {
-      id, look, body, role, rolled: 0,
+      id, look, body, role, rolled: 0, parked: false,
       instances: /** @type {Instances} */ (this.#instances.get(look.key)),
       scale: [(look.length ?? body.length) / body.length, (look.width ?? body.width) / body.width,
         (look.height ?? body.height) / body.height],
@@ -218,6 +228,9 @@ export class Traffic {
     if (body.lamps !== null) {
       this.#parts.addLamps(matrix, body.lamps, scale, {
         brakes, ...shining(lights, this.#shown_t) }, own);
+      if (this.#headlights.on && !thing.parked) {
+        this.#headlights.add(matrix, body.lamps, scale, distance, own);
+      }
     }
     this.#scaling.set(scale[0], scale[1], scale[2]);
     thing.instances.add(matrix.scale(this.#scaling), this.byRole ? thing.role : look.paint, own);

@@ -19,6 +19,8 @@ import { createToolbar } from './toolbar.js';
 /** @import { ChooseHollow, DrawnVehicle } from './vehicle_layer.js' */
 
 const FRAMES_KEPT = 600;
+// A canvas that is so many times as high as before is another map [-].
+const OTHER_SIZE = 1.6;
 const REDRAWN_ON = /** @type {const} */ (['state', 'objects', 'plan', 'prediction', 'perception',
   'signals', 'status', 'seats', 'events', 'epoch', 'hello']);
 
@@ -262,9 +264,13 @@ export class World {
     }
     this.#view.ratio = ratio;
     this.#palette.read();
-    this.camera.resize(width, height, Math.min(covered?.offsetHeight ?? 0, height / 2));
+    const before = this.camera.height;
+    this.camera.resize(width, height, Math.min(coverOf(this.#canvas, covered), height / 2));
     if (first) {
       this.#navigation.reframe();
+    } else if (this.followed !== null && Math.max(height / before, before / height) > OTHER_SIZE) {
+      // It has become the small map, or is so no more: as much of the road is seen.
+      this.camera.zoom(height / before);
     }
     this.redraw();
     this.#draw(performance.now());
@@ -327,6 +333,18 @@ export class World {
     this.stats.frame_ms[this.stats.frames % FRAMES_KEPT] = performance.now() - begin_ms;
     this.stats.frames += 1;
   }
+}
+
+/**
+ * @param {HTMLElement} canvas
+ * @param {HTMLElement|null} covered
+ * @returns {number} how much of the canvas's lower edge an element covers [CSS px]
+ */
+function coverOf(canvas, covered) {
+  if (covered === null || covered.offsetHeight === 0) {
+    return 0;
+  }
+  return Math.max(canvas.getBoundingClientRect().bottom - covered.getBoundingClientRect().top, 0);
 }
 
 /**

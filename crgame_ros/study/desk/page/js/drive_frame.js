@@ -90,6 +90,8 @@ export class DriveFrame {
     setAttribute(this.#button, 'disabled', !loaded);
     if (this.#frame) {
       this.#frame.inert = ready;
+      // Before it is seated it shows the parts of a page that is not there yet.
+      this.#frame.classList.toggle('loads', ready && !loaded);
     }
     if (ready && was && loaded) {
       this.#button.focus();

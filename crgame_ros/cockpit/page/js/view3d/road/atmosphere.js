@@ -61,20 +61,20 @@ void main() {
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
 }`;
-// The same at corners, and evenly between them: a fifth of the time where a processor draws.
+// The same at corners, and evenly between them: a fraction of the time where a processor draws.
 const PLAIN_VERTEX = `
 ${SKY_TONE}
+uniform float encoded;
 varying vec3 vTone;
 void main() {
-  vTone = skyTone(position);
+  vec3 tone = skyTone(position);
+  vTone = mix(tone, 1.055 * pow(tone, vec3(1.0 / 2.4)) - 0.055, encoded);
   ${SKY_PLACE}
 }`;
 const PLAIN_FRAGMENT = `
 varying vec3 vTone;
 void main() {
   gl_FragColor = vec4(vTone, 1.0);
-  #include <tonemapping_fragment>
-  #include <colorspace_fragment>
 }`;
 // Where the plain sky has corners: near the horizon it changes most [deg].
 const RINGS_DEG = [-90, -1, 0, 0.4, 0.9, 1.8, 3.2, 5.5, 9, 14, 22, 34, 50, 70, 90];
@@ -99,7 +99,7 @@ export class Atmosphere {
     this.group = new three.Group();
     const color = () => ({ value: new three.Color() });
     const uniforms = { zenith: color(), horizon: color(), fogTone: color(), sunTone: color(),
-      sunFrom: { value: new three.Vector3() }, haze: { value: 0 } };
+      sunFrom: { value: new three.Vector3() }, haze: { value: 0 }, encoded: { value: 0 } };
     /** @type {(geometry: BufferGeometry, vertexShader: string, fragmentShader: string) => Sky} */
     const sky = (geometry, vertexShader, fragmentShader) => {
       const mesh = new three.Mesh(geometry, new three.ShaderMaterial({ vertexShader,
@@ -111,6 +111,11 @@ export class Atmosphere {
     };
     this.#sky = sky(new three.IcosahedronGeometry(1, 3), SKY_VERTEX, SKY_FRAGMENT);
     this.#plainSky = sky(ringed(three), PLAIN_VERTEX, PLAIN_FRAGMENT);
+    this.#plainSky.onBeforeRender = (renderer) => {
+      // A mirror's picture holds light, the screen's holds sRGB.
+      uniforms.encoded.value = renderer.getRenderTarget() === null ? 1 : 0;
+      this.#plainSky.material.uniformsNeedUpdate = true;
+    };
     this.setFine(true);
     this.#sun = new three.DirectionalLight();
     this.#ambient = new three.HemisphereLight();

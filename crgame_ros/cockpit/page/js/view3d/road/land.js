@@ -30,7 +30,8 @@ const RANK = -2;
  *
  * @param {Scene} scene the scene document
  * @param {Origin} origin
- * @returns {{tiles: MeshParts[], heightAt: Heights}} the latter of points within it, [m]
+ * @returns {{tiles: MeshParts[], plain: MeshParts[], heightAt: Heights}} the same tiles with few
+ *   triangles, none where the land is not flat, and its height at points within it [m]
  */
 export function buildLand(scene, origin) {
   const [xmin, ymin, xmax, ymax] = scene.bounds;
@@ -50,15 +51,23 @@ export function buildLand(scene, origin) {
     return parts.vertex(x0 + column * cell, y0 + row * cell,
       heights === null ? -BELOW_M : heights[at], color, RANK);
   };
+  /** @type {MeshParts[]} */
   const tiles = [];
+  /** @type {MeshParts[]} */
+  const plain = [];
   const edge = Math.ceil(count / TILES);
   for (let row = 0; row < count; row += edge) {
     for (let column = 0; column < count; column += edge) {
-      tiles.push(buildTile(new MeshParts(origin), corner, [row, Math.min(row + edge, count)],
-        [column, Math.min(column + edge, count)]));
+      const rows = rangeOf(row, Math.min(row + edge, count));
+      const columns = rangeOf(column, Math.min(column + edge, count));
+      tiles.push(buildTile(new MeshParts(origin), corner, rows, columns));
+      if (heights === null) {
+        plain.push(buildTile(new MeshParts(origin), corner, everyFourth(rows),
+          everyFourth(columns)));
+      }
     }
   }
-  return { tiles, heightAt: (x, y) => {
+  return { tiles, plain, heightAt: (x, y) => {
     const column = Math.min(Math.max(Math.round((x - x0) / cell), 0), count);
     const row = Math.min(Math.max(Math.round((y - y0) / cell), 0), count);
     return heights === null ? 0 : heights[row * (count + 1) + column];
@@ -71,19 +80,35 @@ export function buildLand(scene, origin) {
  */
 
 /**
+ * @param {number} first
+ * @param {number} last
+ * @returns {number[]} both, and all between them
+ */
+function rangeOf(first, last) {
+  return Array.from({ length: last - first + 1 }, (_, i) => first + i);
+}
+
+/**
+ * @param {number[]} range
+ * @returns {number[]} every fourth of it, and the last
+ */
+function everyFourth(range) {
+  return range.filter((_, i) => i % 4 === 0 || i === range.length - 1);
+}
+
+/**
  * @param {MeshParts} parts empty
  * @param {Corner} corner
- * @param {[number, number]} rows of corners, the first and the last
- * @param {[number, number]} columns
+ * @param {number[]} rows of corners
+ * @param {number[]} columns
  * @returns {MeshParts} the same
  */
 function buildTile(parts, corner, rows, columns) {
-  const width = columns[1] - columns[0] + 1;
-  for (let row = rows[0]; row <= rows[1]; row += 1) {
-    for (let column = columns[0]; column <= columns[1]; column += 1) {
+  for (const [i, row] of rows.entries()) {
+    for (const [k, column] of columns.entries()) {
       const last = corner(parts, row, column);
-      if (row > rows[0] && column > columns[0]) {
-        const below = last - width;
+      if (i > 0 && k > 0) {
+        const below = last - columns.length;
         parts.indices.push(below - 1, below, last, below - 1, last, last - 1);
       }
     }

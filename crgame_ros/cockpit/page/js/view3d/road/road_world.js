@@ -15,10 +15,13 @@ import { Scenery } from './scenery.js';
 import { Signs } from './signs.js';
 import { TrafficLights } from './traffic_lights.js';
 
-/** @import { FogExp2, Group, Object3D } from 'three' */
+/** @import { FogExp2, Group, Mesh, Object3D } from 'three' */
+/** @import { MeshParts } from './mesh_parts.js' */
 /** @import { Environment, Scene } from '../../messages.js' */
 /** @import { Store } from '../../store.js' */
 /** @import { Sight } from '../seen_instances.js' */
+
+const LAND_ORDER = 900;
 
 /** @typedef {typeof import('../three.js')} Three the library, as three.js exports it */
 /** @typedef {{x: number, y: number, z: number}} Point from the local origin [m] */
@@ -62,11 +65,19 @@ export function createRoadWorld(three, scene) {
   const material = paintedMaterial(three, grain);
   const roads = buildRoads(scene, origin, index, heightAt, triangulator(three));
   const land = buildLand(scene, origin);
-  const meshes = [...land.tiles, ...roads].map((parts) => {
+  /** @type {(parts: MeshParts) => Mesh} */
+  const meshOf = (parts) => {
     const mesh = new three.Mesh(geometryOf(three, parts), material);
     mesh.matrixAutoUpdate = false;
     return mesh;
-  });
+  };
+  const [tiles, plainTiles] = [land.tiles, land.plain].map((parts) => parts.map(meshOf));
+  for (const mesh of [...tiles, ...plainTiles]) {
+    // After the roads: where they are, no land is computed.
+    mesh.renderOrder = LAND_ORDER;
+  }
+  plainTiles.forEach((mesh) => { mesh.visible = false; });
+  const meshes = [...tiles, ...roads.map(meshOf)];
   const painted = paintedMaterial(three, null);
   const scenery = new Scenery(three, placeRoadside(scene, index), origin, land.heightAt, painted);
   const signs = new Signs(three, placeSigns(scene, index), scene.country, origin, heightAt,
@@ -75,7 +86,7 @@ export function createRoadWorld(three, scene) {
   const obstacles = new Obstacles(three, origin, heightAt, painted);
   const standing = [scenery, signs, lights];
   /** @type {Object3D[]} */
-  const all = [...meshes, ...scenery.meshes, ...signs.meshes, ...lights.meshes,
+  const all = [...meshes, ...plainTiles, ...scenery.meshes, ...signs.meshes, ...lights.meshes,
     obstacles.mesh];
   group.add(atmosphere.group, ...all);
   return {
@@ -92,6 +103,8 @@ export function createRoadWorld(three, scene) {
     },
     setFine(fine) {
       atmosphere.setFine(fine);
+      plainTiles.forEach((mesh) => { mesh.visible = !fine; });
+      tiles.forEach((mesh) => { mesh.visible = fine || plainTiles.length === 0; });
       const anisotropy = fine ? GRAIN_ANISOTROPY : 1;
       if (grain.anisotropy !== anisotropy) {
         grain.anisotropy = anisotropy;
@@ -100,14 +113,14 @@ export function createRoadWorld(three, scene) {
     },
     triangles: meshes.reduce((sum, { geometry }) => sum + (geometry.index?.count ?? 0) / 3,
       standing.reduce((sum, part) => sum + part.triangles, atmosphere.triangles)),
-    drawCalls: all.length + 1,
+    drawCalls: all.length - plainTiles.length + 1,
     build_ms: performance.now() - begin_ms,
     dispose() {
       atmosphere.dispose();
       standing.forEach((part) => part.dispose());
       obstacles.dispose();
       painted.dispose();
-      meshes.forEach(({ geometry }) => geometry.dispose());
+      [...meshes, ...plainTiles].forEach(({ geometry }) => geometry.dispose());
       material.dispose();
       grain.dispose();
     },

@@ -4,7 +4,7 @@
 
 import { geometryOf } from './materials.js';
 import { NearInstances } from './near_instances.js';
-import { fir, house, lamp, plainFir, plainTree, post, tree } from './scenery_shapes.js';
+import { fir, house, lamp, plainFir, plainPost, plainTree, post, tree } from './scenery_shapes.js';
 
 /** @import { Origin } from '../local_origin.js' */
 /** @import { Heights } from './mesh_parts.js' */
@@ -33,7 +33,8 @@ export class Scenery {
    */
   constructor(three, roadside, origin, heights, painted) {
     const shapes = { posts: post(), lamps: lamp(), trees: tree(), firs: fir(), houses: house() };
-    const plain = { trees: plainTree(), firs: plainFir(), posts: null, lamps: null, houses: null };
+    const plain = { trees: plainTree(), firs: plainFir(), posts: plainPost(),
+      lamps: lamp(), houses: house() };
     const tones = { posts: [0xffffff], lamps: [0xffffff], trees: LEAVES, firs: NEEDLES,
       houses: WALLS };
     for (const kind of /** @type {(keyof Roadside)[]} */ (Object.keys(shapes))) {
@@ -43,7 +44,7 @@ export class Scenery {
       if (instances.length > 0) {
         const [most, reach] = NEAREST[kind];
         this.#kinds.push(new NearInstances(three, geometryOf(three, shapes[kind]),
-          painted, instances, most, reach, plain[kind] && geometryOf(three, plain[kind])));
+          painted, instances, most, reach, geometryOf(three, plain[kind])));
       }
     }
   }

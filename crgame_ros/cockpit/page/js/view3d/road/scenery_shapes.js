@@ -15,7 +15,7 @@ const COLOR = {
 // Corners of what is round.
 const ROUND = 7;
 // Of what is small in the picture.
-const PLAIN_ROUND = 5;
+const PLAIN_ROUND = 6;
 
 const shapeParts = () => new MeshParts({ x: 0, y: 0 });
 
@@ -72,6 +72,14 @@ export function post() {
   return parts;
 }
 
+/** A delineator of few triangles. */
+export function plainPost() {
+  const parts = shapeParts();
+  addBox(parts, [-0.06, -0.05, -0.3], [0.06, 0.05, 1.0], COLOR.white);
+  addBox(parts, [-0.061, -0.051, 0.68], [0.061, 0.051, 0.92], COLOR.black);
+  return parts;
+}
+
 /** A street lamp, whose arm reaches back over the road. */
 export function lamp() {
   const parts = shapeParts();
@@ -103,7 +111,8 @@ export function fir() {
 export function plainTree() {
   const parts = shapeParts();
   addRound(parts, [[0.045, -0.05], [0.035, 0.4]], COLOR.bark, 3);
-  addRound(parts, [[0.14, 0.36], [0.5, 0.6], [0.42, 0.84], [0.04, 1]], COLOR.leaves, PLAIN_ROUND);
+  addRound(parts, [[0.16, 0.36], [0.5, 0.57], [0.43, 0.8], [0.08, 0.99]], COLOR.leaves,
+    PLAIN_ROUND);
   return parts;
 }
 

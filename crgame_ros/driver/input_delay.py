@@ -12,7 +12,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""How long it takes from a page's input until the first state that obeys it is known here."""
+"""How long it takes from an input until the first state that obeys it is known here."""
 
 from collections import deque
 import statistics

@@ -1,0 +1,32 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What a driver is told of at once: contacts, and where the vehicle left the road. */
+
+import { clockTime, oneLine } from './format.js';
+
+/** @import { Store } from '../store.js' */
+
+/** @typedef {{t: number, touched: boolean, text: string}} Mishap */
+
+/**
+ * What a vehicle has hit and where it left the road, in the order of time.
+ *
+ * @param {Store} store
+ * @param {string} mine the vehicle
+ * @returns {Mishap[]}
+ */
+export function mishapsOf({ fired, scene, status }, mine) {
+  const { contacts = [], departures = [] } = status ?? {};
+  /** @type {(t: number, other: string) => Mishap} */
+  const touched = (t, other) => ({
+    t, touched: true, text: `You touched ${oneLine(other)} at ${clockTime(t)}.` });
+  return [
+    ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map(
+      (item) => touched(item.t, item.vehicle === mine ? item.with : item.vehicle)),
+    // Who is stopped by a contact overlaps nobody, so that no verdict tells of it.
+    ...fired.filter(({ by, name }) => by === 'contact' && name.split(' ')[2] === mine).map(
+      ({ n, name }) => touched(n * (scene?.time.dt_s ?? NaN), name.split(' ')[4])),
+    ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
+      t, touched: false, text: `You left the road at ${clockTime(t)}.` })),
+  ].sort((a, b) => a.t - b.t);
+}

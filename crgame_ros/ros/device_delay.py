@@ -1,0 +1,71 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How long the inputs of a device at this machine take, told on /diagnostics and so recorded."""
+
+from collections import deque
+import statistics
+
+from crgame_ros.driver.input_delay import InputDelay
+from crgame_ros.ros.diagnostics import Diagnostics
+from diagnostic_msgs.msg import DiagnosticStatus
+
+_TELL_PERIOD_S = 1.0
+# Enough to tell how it is now; a median does not mind a single late one.
+_KEPT = 21
+
+
+class DeviceDelay:
+    """
+    Measures from an input's time stamp, on the steady clock of this machine.
+
+    :param diagnostics: of the node.
+    :param vehicle_id: whose seat.
+    """
+
+    def __init__(self, diagnostics: Diagnostics, vehicle_id: str) -> None:
+        self._diagnostics = diagnostics
+        self._vehicle_id = vehicle_id
+        self._states = InputDelay()
+        self._commands_ms: deque[float] = deque(maxlen=_KEPT)
+        self._told_s = 0.0
+
+    def published(self, input_s: float, now_s: float, n: int) -> None:
+        """
+        Take note of a command that obeys an input.
+
+        :param input_s: when the input came, steady clock [s]
+        :param now_s: now, after the command was published [s]
+        :param n: the cycle that the command is for.
+        """
+        self._commands_ms.append((now_s - input_s) * 1e3)
+        self._states.changed(input_s, n)
+
+    def stepped(self, now_s: float, n: int, device: str) -> None:
+        """
+        Take note of a new cycle, and tell once a second.
+
+        :param now_s: steady clock [s]
+        :param n: the cycle; its state is known.
+        :param device: which drives.
+        """
+        self._states.stepped(now_s, n)
+        if not self._commands_ms or now_s - self._told_s < _TELL_PERIOD_S:
+            return
+        self._told_s = now_s
+        state_ms = self._states.turn_ms
+        self._diagnostics.publish(
+            f'driver_node: {self._vehicle_id} driver', DiagnosticStatus.OK, device,
+            {'command_ms': round(statistics.median(self._commands_ms), 1),
+             'input_delay_ms': '' if state_ms is None else round(state_ms, 1)})

@@ -1,0 +1,159 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""From a contact back to the lane, once more from the start, and a device at the machine."""
+
+from collections.abc import Iterator
+import signal
+
+from browser_support import Browser
+from crgame_ros.analysis.validation import validate
+from crgame_ros.launcher.run_plan import effective_setup, RunRequest
+from crgame_ros.recording.recorded_drivers import read_drivers
+from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_states import recorded_states
+from crgame_ros.recording.run_folder import run_folders
+from crgame_ros.simulation.offline import run_offline
+from live_browser_support import Graph, live_graph, LivePage, SCENARIOS
+import numpy as np
+import pytest
+from selenium.webdriver.common.keys import Keys
+from sensor_msgs.msg import Joy
+
+# The person comes from behind to a vehicle that a joy node drives, which stands askew.
+GAME = f"""
+scenario: {SCENARIOS / 'ZAM_CutIn-1_1_T-1.xml'}
+duration: 3600
+humans:
+  - {{id: hv0, driver: cockpit, spawn: {{x: -90.0, y: 0.0, yaw: 0.0, speed: 10.0}}}}
+  - {{id: hv1, driver: joy, spawn: {{x: -60.0, y: 1.2, yaw: 0.2, speed: 0.0}}}}
+avs: []
+drivability: {{contact: stop}}
+"""
+
+
+@pytest.fixture(scope='module')
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+    """Keep one graph."""
+    folder = tmp_path_factory.mktemp('seat')
+    (folder / 'game.yaml').write_text(GAME)
+    with live_graph(folder / 'game.yaml', folder / 'run') as running:
+        yield running
+
+
+@pytest.fixture(scope='module')
+def page(graph: Graph, module_browser: Browser) -> LivePage:
+    """Open the page once; the tests are one session, in their order."""
+    return LivePage(graph, module_browser)
+
+
+def put_backs(page: LivePage) -> list[dict[str, object]]:
+    """Give the events by drivers, as the page knows them."""
+    return list(page.run('return crgame.store.fired.filter((event) => event.by === "driver")'))
+
+
+def drive_into_it(page: LivePage) -> None:
+    """Hold the throttle until the vehicle has touched the other one and stands."""
+    page.hold('w')
+    page.wait('document.querySelector("#outcome").dataset.phase === "mishap"', 'the contact')
+    page.wait('Math.abs(crgame.world.shown.vehicles[3]) < 0.5', 'the vehicle to stand')
+    page.release('w')
+    page.wait('crgame.world.shown.vehicles[8] === 0', 'the throttle to be released')
+
+
+def test_a_vehicle_is_put_back_by_button_and_by_key(page: LivePage) -> None:
+    page.claim('hv0')
+    page.order('start')
+    page.wait_for_run('running')
+    drive_into_it(page)
+    x = page.vehicle(0)[0]
+    page.click('#outcome [data-action=put_back]')
+    page.wait('crgame.store.fired.some((event) => event.by === "driver")', 'the event')
+    page.wait('document.querySelector("#outcome").hidden', 'the notice to go')
+    page.wait('crgame.world.shown.vehicles[0] < arguments[0] - 2', 'the jump to be shown', x)
+    row = page.vehicle(0)
+    assert abs(row[1]) < 0.05 and abs(row[2]) < 1e-3 and row[3] == pytest.approx(0.0, abs=1e-3)
+    page.hold('w')
+    page.wait('crgame.world.shown.vehicles[3] > 1', 'to drive on')
+    page.wait('Math.abs(crgame.world.shown.vehicles[3]) < 0.5', 'to stand again')
+    page.release('w')
+    page.hold(Keys.BACKSPACE)
+    page.wait('crgame.store.fired.filter((event) => event.by === "driver").length === 2',
+              'the second event')
+    page.release(Keys.BACKSPACE)
+    assert {event['name'] for event in put_backs(page)} == {'put back hv0'}
+    assert page.browser.console_errors() == []
+
+
+def test_the_delay_of_a_device_at_the_machine_is_shown(page: LivePage, graph: Graph) -> None:
+    publisher = graph.peer.publisher('/<hv>/joy', 'hv1')
+    for number in range(80):
+        # The left trigger, a little more or less.
+        publisher.publish(Joy(axes=[0.0, 0.0, 0.2 + 0.1 * (number % 2), 0.0, 0.0, 1.0],
+                              buttons=[0] * 11))
+        graph.peer.listen_for(0.04)
+    page.wait_for_text('li[data-device="hv1"]', 'to the state that obeys')
+    text = page.text('li[data-device="hv1"]')
+    assert text.startswith('generic_gamepad') and 'ms to the command' in text
+
+
+def test_once_more_needs_no_second_start(page: LivePage) -> None:
+    epoch = page.run('return crgame.store.status.epoch')
+    page.hold('r')
+    page.wait('crgame.store.status.epoch > arguments[0]', 'a new run', epoch)
+    page.release('r')
+    page.wait('crgame.store.status.run === "running" && crgame.store.status.n > 0',
+              'the run to go on by itself')
+    # Who had it paused wants it to stand.
+    page.order('pause')
+    page.wait_for_run('paused')
+    page.order('reset')
+    page.wait('crgame.store.status.epoch > arguments[0] + 1'
+              ' && crgame.store.status.run === "paused"', 'a run that stands', epoch)
+
+
+def test_the_screen_is_filled_and_left_again(page: LivePage) -> None:
+    for pressed in ('true', 'false'):
+        page.click('#fullscreen')
+        page.wait('String(document.fullscreenElement !== null) === arguments[0] && document'
+                  '.querySelector("#fullscreen").getAttribute("aria-pressed") === arguments[0]',
+                  'the screen', pressed)
+    assert page.browser.console_errors() == []
+
+
+def test_the_recording_repeats_the_jumps_to_the_last_bit(graph: Graph) -> None:
+    launcher = graph.launcher
+    launcher.signal(signal.SIGINT)
+    assert launcher.wait() == 0, launcher.text
+    bag = run_folders(launcher.out)[0] / 'bag'
+    fired = read_run_events(bag).fired
+    # It rolls on afterwards, and may touch the other one once more.
+    assert [event.name for event in fired[:4]] == [
+        'contact of hv0 with hv1', 'put back hv0'] * 2
+    assert [event.vehicle for event in fired].count('hv0') == 2
+    device = [item for item in read_drivers(bag) if item.spell.seat == 'hv1']
+    assert device[0].input_delay_ms is not None and 0.0 < device[0].input_delay_ms < 1000.0
+    setup = effective_setup(RunRequest(driver=f'replay:{bag}'))
+    inputs = recorded_inputs(setup)
+    assert inputs.intervals_s is not None
+    result = run_offline(setup, duration_s=len(inputs.intervals_s) * setup.scheduler.dt_s,
+                         drivers=inputs.drivers, intervals_s=inputs.intervals_s)
+    assert [(event.name, event.n) for event in result.fired] == [
+        (event.name, event.n) for event in fired]
+    recorded = recorded_states(bag)['hv0']
+    known = np.isfinite(recorded[:, 0])
+    np.testing.assert_array_equal(
+        result.states_of('hv0')[:len(recorded)][known][:, :3], recorded[known][:, :3])
+    assert not validate(next(bag.parent.glob('*.xml'))).faults

@@ -1,0 +1,84 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Tasks: how long something was to be seen without pauses, which buttons answer, languages. */
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { isTaken } from '../../crgame_ros/cockpit/page/js/tasks/answers.js';
+import { Prompt } from '../../crgame_ros/cockpit/page/js/tasks/prompt.js';
+import { RunningTime } from '../../crgame_ros/cockpit/page/js/tasks/running_time.js';
+import { languageOf, wordsIn } from '../../crgame_ros/cockpit/page/js/tasks/task_words.js';
+
+/** @import { GameTask } from '../../crgame_ros/cockpit/page/js/tasks/task_messages.js' */
+
+/** @type {GameTask} */
+const LIGHT = { name: 'light', kind: 'detection_response', label: '', seat: 'hv0', shown_s: 1,
+  latest_s: 2.5, lead_s: null, show: true };
+
+/** @param {RunningTime} running */
+function drawn(running) {
+  const prompt = new Prompt({ task: 'light', seat: 'hv0', number: 1, n: 300, seen: false }, LIGHT,
+    running, 10_000, 20);
+  prompt.draw(10_030);
+  prompt.picture_ms = 16;
+  return prompt;
+}
+
+test('a response is timed from the first picture, and its delay from when it was heard of', () => {
+  const prompt = drawn(new RunningTime());
+  assert.deepEqual(prompt.times(10_380),
+    { delay_ms: 40, picture_ms: 16, response_ms: 350, paused_ms: 0 });
+  assert.deepEqual(prompt.times(), { delay_ms: 40, picture_ms: 16 });
+});
+
+test('the light is on for its time, an answer is taken for longer', () => {
+  const prompt = drawn(new RunningTime());
+  assert.deepEqual([10_029, 10_030, 11_029, 11_030].map((at) => prompt.lit(at)),
+    [true, true, true, false]);
+  assert.deepEqual([10_029, 10_030, 12_530, 12_531].map((at) => prompt.takes(at)),
+    [false, true, true, false]);
+  prompt.answered = true;
+  assert.equal(prompt.lit(10_100) || prompt.takes(10_100), false);
+});
+
+test('nothing is taken before it is drawn', () => {
+  const prompt = new Prompt({ task: 'light', seat: 'hv0', number: 1, n: 300, seen: false }, LIGHT,
+    new RunningTime(), 10_000, NaN);
+  assert.equal(prompt.takes(10_500) || prompt.lit(10_500), false);
+});
+
+test('pauses count neither for the light nor for the response', () => {
+  const running = new RunningTime();
+  running.note(false, 0);
+  running.note(true, 5000);
+  const prompt = drawn(running);
+  running.note(false, 10_230);
+  running.note(false, 12_000);
+  assert.equal(prompt.since(99_000), 200);
+  assert.equal(prompt.lit(10_500), false);
+  running.note(true, 60_230);
+  running.note(true, 60_240);
+  assert.equal(prompt.lit(60_300), true);
+  assert.deepEqual(prompt.times(60_330),
+    { delay_ms: 40, picture_ms: 16, response_ms: 300, paused_ms: 50_000 });
+});
+
+test('buttons that steer, shift or blink answer nothing, all others do', () => {
+  /** @type {(index: number) => object} */
+  const axis = (index) => ({ kind: 'axis', index, min: 0, max: 1, deadzone: 0 });
+  /** @type {any} */
+  const profile = { throttle: { ...axis(7), kind: 'button' }, brake: axis(2),
+    steering: axis(0), reverse: { on: [3], off: [], toggle: [], held: [4] },
+    lights: { left_indicator: [5], right_indicator: [6], hazard: [], horn: [0] } };
+  assert.deepEqual(Array.from({ length: 10 }, (_, i) => i).filter((i) => !isTaken(profile, i)),
+    [1, 2, 8, 9]);
+});
+
+test('the address names the language, else the game, else English', () => {
+  assert.equal(languageOf('?lang=de', 'en'), 'de');
+  assert.equal(languageOf('?lang=de-AT', undefined), 'de');
+  assert.equal(languageOf('?lang=xx', 'de'), 'de');
+  assert.equal(languageOf('', 'fr'), 'en');
+  assert.deepEqual(Object.keys(wordsIn('de')), Object.keys(wordsIn('en')));
+});

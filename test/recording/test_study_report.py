@@ -1,0 +1,109 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The report of a study: one file, with the numbers of the tables, whatever people wrote."""
+
+from html import unescape
+from pathlib import Path
+import re
+
+from crgame_ros.cli import main
+from crgame_ros.study.data.condition_means import within_halves
+from crgame_ros.study.data.timing_quality import BOUNDS, timing_faults
+from crgame_ros.study.session_journal import JOURNAL, SessionJournal
+import numpy as np
+import polars
+import pytest
+from study_maker import Studied
+
+pytestmark = pytest.mark.xdist_group('study-data')
+_TAG = re.compile('<[^>]+>')
+
+
+def report_of(folder: Path) -> str:
+    """Write the report, and read it."""
+    assert main(['study', 'report', str(folder)]) == 0
+    return (folder / 'data' / 'report.html').read_text('utf-8')
+
+
+def rows_of(html: str, caption: str) -> list[list[str]]:
+    """Give the cells of the table with a caption."""
+    after = html[html.index(f'<caption>{caption}'):].partition('<tbody>')[2]
+    body = after.partition('</tbody>')[0]
+    return [[unescape(_TAG.sub('', cell)) for cell in re.findall(r'<t[hd].*?>(.*?)</t[hd]>', row)]
+            for row in body.split('</tr>')[:-1]]
+
+
+def test_means_and_intervals_are_those_of_the_tables(studied: Studied) -> None:
+    html = report_of(studied.folder)
+    trials = polars.read_parquet(studied.folder / 'data' / 'trials.parquet')
+    values = np.array([[trials.filter(participant=name, condition=condition)[
+        'mean_speed_m_per_s'].mean() for condition in ('idm', 'cv')]
+        for name in ('P01', 'P02', 'P03')])
+    row = next(row for row in rows_of(html, 'Driving') if row[0].startswith('mean_speed_m_per_s'))
+    wanted = [f'{mean:.2f} ± {half:.2f}' for mean, half in zip(
+        values.mean(axis=0), within_halves(values), strict=True)]
+    assert 'mean of its signed speed' in row[0] and row[1:] == ['m/s', *wanted, '3*']
+    # A point for each participant in each of two conditions.
+    assert len(re.findall(r'<title>P0[123]: ', html.partition('mean_speed_m_per_s <')[2]
+                          .partition('</figure>')[0])) == 6
+
+
+def test_it_tells_who_took_part_and_what_went_wrong(studied: Studied) -> None:
+    html = report_of(studied.folder)
+    people = rows_of(html, 'Participants')
+    assert [row[0] for row in people] == ['P01', 'P02', 'P03', 'P04']
+    assert [row[-1] for row in people] == ['yes', 'yes', 'yes', 'no']
+    troubles = [(row[0], row[1], row[-1]) for row in rows_of(html, 'What did not go')]
+    assert troubles == [('P03', 'trial aborted', 'sneezing'),
+                        ('P03', 'trial repeated', 'a phone rang'),
+                        ('P04', 'session ended early', 'felt ill')]
+    for word in ('Kennedy', 'Van der Laan', 'rear axle', 'numpy', 'SHA-256'):
+        assert word in html
+
+
+def test_nothing_is_loaded_and_nothing_written_is_html(copied: Path) -> None:
+    with SessionJournal(copied / 'participants' / 'P03') as journal:
+        journal.add({'entry': 'skipped', 'item': 'after/1', 'at': journal.entries[-1]['at'],
+                     'reason': '<script>alert(1)</script><img src=x>'})
+    html = report_of(copied)
+    assert '<script' not in html and '<img' not in html
+    assert '&lt;script&gt;alert(1)' in html
+    assert "default-src 'none'" in html and 'http' not in _TAG.sub('', html)
+
+
+def test_timing_beyond_a_bound_is_marked_and_named(copied: Path) -> None:
+    journal = copied / 'participants' / 'P02' / JOURNAL
+    assert main(['study', 'data', str(copied)]) == 0
+    row = polars.read_parquet(copied / 'data' / 'trials.parquet').row(0, named=True)
+    assert timing_faults(row) == [] and journal.exists()
+    late = row | {'max_cumulative_error_s': 0.31, 'timeout_ratio': 0.02, 'input_delay_s': 0.15,
+                  'real_time_ratio_final': 0.98, 'resets': 2, 'gaps': 1}
+    assert timing_faults(late) == [
+        'greatest cumulative error 310 ms instead of at most 100 ms',
+        'cycles that took longer than a step 2.0 % instead of at most 1.0 %',
+        'real-time ratio 0.980 instead of at least 0.990',
+        'drift resets 2 instead of at most 0', 'cycles not recorded 1 instead of at most 0',
+        'input delay 150 ms instead of at most 100 ms']
+    assert set(BOUNDS.as_dict()) <= row.keys()
+
+
+def test_before_anybody_has_begun_there_is_a_report(studied: Studied, tmp_path: Path) -> None:
+    (tmp_path / 'empty' / 'study').mkdir(parents=True)
+    for name in ('study.yaml', 'remarks.yaml', 'consent.md'):
+        (tmp_path / 'empty' / 'study' / name).write_bytes(
+            (studied.folder / 'study' / name).read_bytes())
+    assert main(['study', 'data', str(tmp_path / 'empty'), '--bids']) == 0
+    html = report_of(tmp_path / 'empty')
+    assert 'Nobody has begun yet' in html and 'There are no values yet' in html
