@@ -182,6 +182,7 @@ class StudyFile:
     :param seed: of all orders.
     :param participants: how many are planned, for the checks of balance.
     :param fields: what is asked of each participant first.
+    :param markers: that the experimenter sets by a key while a session goes on.
     :param settings: of all trials.
     :param factors: what differs between conditions.
     :param before: steps before the first block.
@@ -200,6 +201,7 @@ class StudyFile:
     seed: Annotated[int, Within(0, 2**63 - 1)] = 0
     participants: Annotated[int, Within(1, 10_000)] = 12
     fields: Annotated[tuple[Question, ...], Listed(0, 50, 'question', 'name')] = ()
+    markers: Annotated[tuple[str, ...], Listed(0, 9, 'marker')] = ('marker',)
     settings: TrialSettings = NOTHING
     factors: Annotated[tuple[Factor, ...], Listed(0, 10, 'factor', 'name')] = ()
     before: Steps = ()

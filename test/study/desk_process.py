@@ -32,8 +32,7 @@ from desk_support import DrivesWithoutGraph  # noqa: E402, I100
 async def main(study: str, folder: str, port: str, link: str = '', step_s: str = '0.05') -> None:
     """Serve the session in a folder until somebody ends the process."""
     with ParticipantSession(load_study(Path(study)), Path(folder), 'P07', 0) as session:
-        desk = Desk(session, DrivesWithoutGraph(session, link, float(step_s)),
-                    markers=('braked late', 'spoke'))
+        desk = Desk(session, DrivesWithoutGraph(session, link, float(step_s)))
         _, lines = await serve_desk(desk, Access('127.0.0.1', int(port)), Path(folder))
         print('\n'.join(lines), flush=True)
         await asyncio.Event().wait()

@@ -30,7 +30,7 @@ import yaml
 
 STUDY: dict[str, Any] = {
     'name': 'demo', 'title': {'en': 'Merging with others', 'de': 'Einfädeln mit anderen'},
-    'language': 'en', 'languages': ['en', 'de'], 'seed': 3,
+    'language': 'en', 'languages': ['en', 'de'], 'seed': 3, 'markers': ['braked late', 'spoke'],
     'fields': [
         {'name': 'age', 'ask': {'en': 'How old are you?', 'de': 'Wie alt sind Sie?'},
          'number': {'low': 18, 'high': 99, 'whole': True, 'unit': 'years'}},

@@ -14,7 +14,7 @@
 # limitations under the License.
 """The desk of a session: what participant and experimenter may do now, and who has to know."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 import logging
 import time
 from typing import Any
@@ -29,7 +29,6 @@ from crgame_ros.study.trial_plan import PlannedTrial
 
 # Why a session ends that nobody has agreed to.
 DECLINED = 'consent was not given'
-MARKERS = ('marker',)
 # While a drive is in one of these nothing else can come before it.
 UNDER_WAY = (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 
@@ -42,15 +41,13 @@ class Desk:
 
     :param session: of the participant.
     :param drives: lets the participant drive.
-    :param markers: names of the markers that the experimenter sets by a key.
     :param clock_s: seconds since 1970.
     """
 
     def __init__(self, session: ParticipantSession, drives: Drives, *,
-                 markers: Sequence[str] = MARKERS,
                  clock_s: Callable[[], float] = time.time) -> None:
-        self.session, self.drives, self.markers = session, drives, tuple(markers)
-        self.clock_s = clock_s
+        self.session, self.drives, self.clock_s = session, drives, clock_s
+        # Why the session ends as soon as its drive is over; empty while it goes on.
         self.ending = ''
         self._watchers: list[Callable[[], None]] = []
         drives.watch(self._drive_changed)

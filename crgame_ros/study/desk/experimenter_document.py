@@ -40,7 +40,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, Any]) -> dict[str, Any]
     return {
         'study': session.study.title.in_language('en') or session.study.name,
         'name': session.study.name, 'participant': session.participant, 'place': session.place,
-        'language': session.language, 'page': dict(page), 'markers': list(desk.markers),
+        'language': session.language, 'page': dict(page), 'markers': list(session.study.markers),
         'item': '' if item is None else item.id, 'held': session.held_at is not None,
         'waits': desk.waits, 'ending': desk.ending,
         'over': how_over(desk) if item is None else '', 'can_abort': desk.is_driving,

@@ -156,7 +156,7 @@ export class DeviceCheck {
     this.#list.replaceChildren(...MOVEMENTS.map((name) => {
       const done = this.#moved.has(name);
       return element('li', { 'data-done': done },
-        element('span', { class: 'sign', 'aria-hidden': 'true', text: done ? '✓' : '○' }),
+        element('span', { class: 'done-mark', 'aria-hidden': 'true', text: done ? '✓' : '○' }),
         element('span', { text: this.#words.of(`device_${name}`) }),
         keys ? element('kbd', { text: this.#words.of(`device_keys_${name}`) }) : null,
         done ? element('span', { class: 'unseen', text: ` (${this.#words.of('done')})` }) : null);
