@@ -58,6 +58,7 @@ class _Course:
     pressed: bool = False
     may_end: bool = True
     number: int = 0
+    shown: int = 0
     schedule: StimulusSchedule | None = None
     prompt: OpenPrompt | None = None
     # Step at which what a request is about is triggered.
@@ -244,9 +245,10 @@ class RunTasks:
         task, prompt, times = course.spec.task, course.prompt, report.times
         concerns = prompt is not None and prompt.number == report.number
         if report.what == 'shown':
-            # What a page has shown before another one does is seen already.
-            if prompt is not None and concerns and not prompt.seen:
-                course.prompt = replace(prompt, seen=True)
+            # Of several pages the first counts; it may tell of it after the answer.
+            if course.shown < report.number == course.number:
+                course.shown = report.number
+                course.prompt = prompt and replace(prompt, seen=True)
                 self._note(course, 'shown', report.number, times=times)
             return
         if not isinstance(task, DetectionResponse) or not (course.running or prompt):

@@ -20,6 +20,7 @@ from typing import Any, Protocol
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
+from urllib3.exceptions import HTTPError
 
 # Answers are chosen by the question's name, so that a test can say what they must be; told are
 # the chosen ones. Radio buttons are clicked, the others typed.
@@ -47,6 +48,20 @@ return told;
 """
 
 
+# The page around the drive is told of its clock; the first call begins to listen.
+_CLOCK = """
+if (window.heard === undefined) {
+  window.heard = {};
+  addEventListener('message', ({ data }) => {
+    if (data?.kind === 'stage') { window.heard = { state: data.state, at: performance.now() }; }
+  });
+}
+const { state, at } = window.heard;
+return document.body.dataset.show === 'drive' && state && state.run === 'running'
+  && performance.now() - at < 150 ? state.time_s : null;
+"""
+
+
 class Page(Protocol):
     """What a browser has to do for the robot."""
 
@@ -71,7 +86,7 @@ class StudyRobot:
         self._text = text
         self.answers: dict[str, dict[str, Any]] = {}
         self.drives: list[str] = []
-        self._done = ''
+        self._refused = 0
 
     def act(self) -> str:
         """
@@ -80,10 +95,26 @@ class StudyRobot:
         :return: what it shows; empty where there is no page that can be used.
         """
         try:
-            return self._act()
-        except WebDriverException:
+            shown = self._act()
+            self._refused = 0
+            return shown
+        except (WebDriverException, HTTPError):
             # It is just changing, or gone.
+            self._refused += 1
             return ''
+
+    @property
+    def lost(self) -> bool:
+        """Tell whether the browser does not answer any more."""
+        return self._refused > 3
+
+    def time_s(self) -> float | None:
+        """Give the run's clock as the frame of the drive tells it [s]; None between drives."""
+        try:
+            time_s = self._browser.run(_CLOCK)
+        except (WebDriverException, HTTPError):
+            return None
+        return None if time_s is None else float(time_s)
 
     def _act(self) -> str:
         shown, what = self._browser.run(

@@ -14,103 +14,18 @@
 # limitations under the License.
 """A participant's whole session in a real browser, by keyboard alone, and what may go wrong."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 import os
 from pathlib import Path
-import re
 import signal
-import subprocess
-import sys
 from typing import Any
 
 from browser_support import Browser
-from crgame_ros.study.session_journal import read_journal
+from desk_page_support import finished, Participant, running
 import pytest
-from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
-
-STUDY_TESTS = Path(__file__).resolve().parents[1] / 'study'
-sys.path.insert(0, str(STUDY_TESTS))
-
-from desk_support import write_study  # noqa: E402, I100
 
 TEXT = '<b>"it\'s" & \\ {age}</b>\n\n  second line\t😀 Grüße ' + 'ä😀' * 4970
 TEXT += 'x' * (10_000 - len(TEXT))
-
-
-class Desk:
-    """A desk's process, with the addresses that it has told."""
-
-    def __init__(self, process: 'subprocess.Popen[str]') -> None:
-        self.process = process
-        assert process.stdout is not None
-        self.participant, self.experimenter = (
-            re.findall(r'http\S+', process.stdout.readline())[0] for _ in range(2))
-        self.port = int(re.findall(r':(\d+)/', self.participant)[0])
-
-
-@contextmanager
-def running(folder: Path, port: int = 0, step_s: float = 0.05, link: str = '',
-            **changed: Any) -> Iterator[Desk]:
-    """Start a desk of the study in a folder."""
-    if not (folder / 'study').exists():
-        write_study(folder / 'study', **changed)
-    process = subprocess.Popen(
-        [sys.executable, STUDY_TESTS / 'desk_process.py', folder / 'study' / 'study.yaml',
-         folder / 'P07', str(port), link, str(step_s)], stdout=subprocess.PIPE, text=True)
-    try:
-        yield Desk(process)
-    finally:
-        process.kill()
-        process.wait()
-
-
-class Participant:
-    """Somebody who has a keyboard only."""
-
-    def __init__(self, browser: Browser) -> None:
-        self.browser = browser
-
-    def press(self, *keys: str) -> None:
-        ActionChains(self.browser.driver).send_keys(*keys).perform()
-
-    def tab_to(self, selector: str) -> None:
-        """Go to the next control that fits."""
-        for _ in range(80):
-            if self.browser.run('return document.activeElement.matches(arguments[0])', selector):
-                return
-            self.press(Keys.TAB)
-        pytest.fail(f'no way to {selector} by Tab')
-
-    def question(self, name: str) -> None:
-        self.tab_to(f'[data-name="{name}"] :is(input, textarea)')
-
-    def go_on(self) -> None:
-        self.tab_to('button.primary')
-        self.press(Keys.ENTER)
-
-    def shows(self, what: str, heading: str = '') -> None:
-        """Wait for a page, and that it says a text."""
-        self.browser.wait('document.body.dataset.show === arguments[0]'
-                          ' && document.body.innerText.includes(arguments[1])',
-                          f'{what} {heading}', arguments=(what, heading))
-
-    def answer_all(self) -> None:
-        """Answer every question of the page: the second option, one step, 30, a few words."""
-        kinds = self.browser.run('return [...document.querySelectorAll(".question")].map('
-                                 '(node) => [node.dataset.name, node.dataset.kind])')
-        for name, kind in kinds:
-            self.question(name)
-            self.press({'likert': Keys.ARROW_RIGHT, 'slider': Keys.ARROW_RIGHT,
-                        'choice': Keys.ARROW_RIGHT, 'number': '30', 'text': 'yes'}[kind])
-
-
-def finished(folder: Path) -> dict[str, dict[str, Any]]:
-    """Give what is told of each finished item."""
-    entries = [entry for entry in read_journal(folder / 'P07') if entry['entry'] == 'finished']
-    assert len({entry['item'] for entry in entries}) == len(entries)
-    return {entry['item']: entry for entry in entries}
 
 
 @pytest.mark.parametrize(('language', 'agree', 'drive', 'thanks'), [

@@ -69,6 +69,20 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
         yield running
 
 
+# Somebody else on the same graph, who has no seat and answers for hv0 all the same.
+STRANGER = """
+const socket = new WebSocket(`ws://${location.host}/ws`);
+await new Promise((resolve) => socket.addEventListener('open', resolve));
+const [prompt] = crgame.store.tasks.open;
+socket.send(JSON.stringify({type: 'task', seat: 'hv0', task: 'light', number: prompt.number,
+  what: 'answer', response_ms: 222}));
+await new Promise((resolve) => setTimeout(resolve, 150));
+const stays = crgame.store.tasks.open.some((each) => each.number === prompt.number);
+socket.close();
+return stays;
+"""
+
+
 def press(page: LivePage) -> None:
     """Answer by the key."""
     page.hold(Keys.ENTER)
@@ -92,11 +106,14 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
     page.wait_for_run('running')
     for number, wait_s in enumerate((0.15, 0.4, 0.8)):
         page.wait('window.seen.length > arguments[0]', 'a light', number)
+        if number == 1:
+            assert page.run_async(STRANGER) is True
         time.sleep(wait_s)
         press(page)
         page.wait('document.querySelector(".task-light").hidden', 'the light to go out')
     press(page)  # To no light.
-    page.run('crgame.connection.request({type: "trigger", event: "radio"})')
+    page.tab('events')
+    page.click('[data-task="radio"] button')
     page.wait_for_text('.task-note', 'Aufgabe: Radio')
     page.wait('window.seen.length > 3', 'a light that nobody answers')
     page.wait('window.seen.length > 4', 'a light that a pause interrupts')
@@ -107,8 +124,17 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
     page.order('start')
     page.wait_for_run('running')
     press(page)
+    seen, pressed = page.run('return [window.seen, window.pressed]')
+    page.wait('crgame.store.tasks.open[0]?.number > 5 && crgame.store.tasks.open[0].seen',
+              'a light that a reload interrupts')
+    reloaded = page.run('return crgame.store.tasks.open[0].number')
+    page.open()
+    page.wait('crgame.driving.seat === "hv0"', 'the seat again')
+    assert page.run('return crgame.tasks.prompts.every((prompt) => prompt.answered'
+                    ' || prompt.open.number !== arguments[0])', reloaded)
     page.give_back('hv0')
-    page.run('crgame.connection.request({type: "trigger", event: "call"})')
+    page.tab('events')
+    page.click('[data-task="call"] button')
     page.wait('!document.querySelector(".task-request").hidden', 'the request')
     assert 'Übernehmen' in page.text('.task-request')
     assert 'Baustelle' in page.text('.task-request')
@@ -119,7 +145,6 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
     graph.wait_for_command('av0', 0, 0.2, 1.0)
     page.release('w')
     assert page.browser.console_errors() == []
-    seen, pressed = page.run('return [window.seen, window.pressed]')
     page.order('stop')
     rows = rows_of(graph)
     lights = [row for row in rows if row.what == 'stimulus']
@@ -135,11 +160,14 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
         assert times.picture_ms is not None and times.picture_ms > 0.0
         assert lights[number].response_time_s == pytest.approx(times.response_ms / 1e3)
     assert [row.outcome for row in rows if row.what == 'unrequested'] == ['unrequested']
+    assert lights[reloaded - 1].outcome == 'missed'
+    assert lights[-1].outcome in ('unseen', 'open')
     paused = lights[4].times
     assert paused.paused_ms is not None and paused.paused_ms > 3000.0
     assert paused.response_ms is not None and paused.response_ms < 2500.0
     request = next(row for row in rows if row.kind == 'take_over')
     assert request.outcome == 'taken'
     assert 0.0 < request.response_time_s < 30.0
+    assert request.times.delay_ms is not None and request.times.delay_ms > 0.0
     radio = next(row for row in rows if row.name == 'radio')
     assert radio.duration_s > 3.0 and math.isnan(radio.response_time_s)

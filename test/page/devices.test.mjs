@@ -7,7 +7,8 @@ import { test } from 'node:test';
 
 import { CalibrationRun } from '../../crgame_ros/cockpit/page/js/driving/calibration_run.js';
 import {
-  defaultProfile, gearAfter, loadProfile, pedalValue, rawValue, saveProfile, steeringValue,
+  defaultProfile, gearAfter, keepProfiles, loadProfile, pedalValue, rawValue, saveProfile,
+  steeringValue,
 } from '../../crgame_ros/cockpit/page/js/driving/gamepad_profile.js';
 import { close, keepStorage } from './support.mjs';
 
@@ -92,6 +93,15 @@ test('a calibration is kept for its device, and what is broken is not taken', (t
   }
   saveProfile('X', null);
   assert.equal(kept.size, 0);
+});
+
+test('calibrations of another page are kept, but for what is none', (t) => {
+  const kept = keepStorage();
+  t.mock.method(console, 'warn', () => {});
+  const own = defaultProfile(pad('X', [0, 1, 1]));
+  keepProfiles({ X: JSON.stringify(own), Y: '{', Z: '{"steering": 1}', W: 5 });
+  assert.deepEqual([...kept.keys()], ['crgame.gamepad.X']);
+  assert.deepEqual(loadProfile(pad('X', [0, 1, 1])).profile, own);
 });
 
 /** Move something there and back, slowly enough for each step to end by itself. */

@@ -199,8 +199,8 @@ test('400 lanelets take few meshes and few triangles', () => {
   const triangulate = (ring) => new Array(3 * (ring.length / 2 - 2)).fill(0);
   const roads = buildRoads(scene, { x: 500, y: 500 }, index, FLAT, triangulate);
   const land = buildLand(scene, { x: 500, y: 500 }).tiles;
-  // With sky, five kinds beside the road, two of them plain, too, signs, lights, obstacles: 15.
-  assert.ok(roads.length + land.length + 15 <= 60, `${roads.length}, ${land.length} chunks`);
+  // With two skies, five kinds beside the road, near and far, signs, lights, obstacles: 18.
+  assert.ok(roads.length + land.length + 18 <= 60, `${roads.length}, ${land.length} chunks`);
   const triangles = [...roads, ...land].reduce((sum, parts) => sum + parts.triangles, 0);
   // Trees and the like take 70,000 at most.
   assert.ok(triangles + 70_000 <= 150_000, `${triangles} triangles`);

@@ -15,152 +15,28 @@
 """The desk's server over real sockets: documents, orders, who is let in, hostile pages."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
-from dataclasses import dataclass
-import functools
 import json
 from pathlib import Path
 import random
-import re
 import sys
-from typing import Any
 
-from aiohttp import (
-    ClientSession,
-    ClientWebSocketResponse,
-    CookieJar,
-    WSMsgType,
-    WSServerHandshakeError,
-)
-from crgame_ros.cockpit.access import Access
-from crgame_ros.errors import InputError
-from crgame_ros.study.desk.desk import Desk
-from crgame_ros.study.desk.desk_messages import parse_experimenter, parse_participant
-from crgame_ros.study.desk.desk_server import serve_desk
+from aiohttp import ClientSession, CookieJar, WSMsgType, WSServerHandshakeError
 from crgame_ros.study.desk.desk_socket import MAX_MALFORMED
-from crgame_ros.study.desk.page_markdown import picture, read_tree
 from crgame_ros.study.desk.page_words import words_of
-from crgame_ros.study.desk.participant_document import participant_document
-from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.study_file import Page
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from desk_support import DrivesWithoutGraph, write_study  # noqa: E402, I100
-
-PATIENCE_S = 30.0
-TIMES = {'shown_at': 10.0, 'answered_at': 12.0, 'taken_s': 2.0}
-KEY = 'a' * 32
-
-
-@dataclass
-class Served:
-    """A desk that listens, and a browser's worth of client."""
-
-    desk: Desk
-    http: ClientSession
-    participant: str
-    experimenter: str
-
-    @property
-    def root(self) -> str:
-        return self.participant.partition('?')[0].rstrip('/')
-
-    async def join(self, key: str = KEY, *, fresh: bool = True) -> ClientWebSocketResponse:
-        """Open the participant's page."""
-        socket = await self.http.ws_connect(f'{self.root}/ws/participant')
-        await socket.send_json({'type': 'hello', 'page': key, 'fresh': fresh})
-        return socket
-
-    async def direct(self) -> ClientWebSocketResponse:
-        """Open the experimenter's page."""
-        async with self.http.get(self.experimenter) as answer:
-            assert answer.status == 200
-        return await self.http.ws_connect(f'{self.root}/ws/experimenter')
-
-
-@asynccontextmanager
-async def served(folder: Path, host: str = '127.0.0.1', step_s: float = 0.02,
-                 token: str | None = None, **changed: Any) -> AsyncIterator[Served]:
-    study = write_study(folder / 'study', **changed)
-    with ParticipantSession(study, folder / 'P07', 'P07', 0) as session:
-        desk = Desk(session, DrivesWithoutGraph(session, step_s=step_s))
-        runner, lines = await serve_desk(desk, Access(host, 0, token), folder)
-        participant, experimenter = (re.findall(r'http\S+', line)[0] for line in lines)
-        async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as http:
-            try:
-                yield Served(desk, http, participant, experimenter)
-            finally:
-                await asyncio.wait_for(runner.cleanup(), PATIENCE_S)
-
-
-def in_loop(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
-    """Run a test in an event loop, which must be empty at its end."""
-    @functools.wraps(test)
-    def run(tmp_path: Path) -> None:
-        async def body() -> None:
-            await asyncio.wait_for(test(tmp_path), 4 * PATIENCE_S)
-            left = asyncio.all_tasks() - {asyncio.current_task()}
-            assert not left
-        asyncio.run(body())
-    return run
-
-
-async def shown(socket: ClientWebSocketResponse, fits: Callable[[dict[str, Any]], bool]
-                ) -> dict[str, Any]:
-    """Wait for a message that fits."""
-    async with asyncio.timeout(PATIENCE_S):
-        async for message in socket:
-            if message.type is WSMsgType.TEXT:
-                content: dict[str, Any] = json.loads(message.data)
-                if fits(content):
-                    return content
-    pytest.fail(f'the connection ended ({socket.close_code})')
-
-
-def shows(what: str, item: str = '') -> Callable[[dict[str, Any]], bool]:
-    """Fit a document of the participant's page."""
-    return lambda content: content['type'] == 'desk' and content['show'] == what \
-        and item in ('', content['item'])
-
-
-async def do(socket: ClientWebSocketResponse, order: dict[str, Any]) -> dict[str, Any]:
-    """Give an order as the experimenter; give the reply."""
-    await socket.send_json({**order, 'id': 7})
-    return await shown(socket, lambda content: content['type'] == 'reply')
-
-
-async def do_until(served_: Served, socket: ClientWebSocketResponse, wanted: str) -> None:
-    """Do as a willing participant does, up to an item."""
-    desk = served_.desk
-    while (item := desk.session.next_item) is not None and item.id != wanted:
-        document = participant_document(desk)
-        if document['show'] == 'language':
-            await socket.send_json({'type': 'language', 'language': 'de'})
-        elif document['show'] == 'drive':
-            await socket.send_json({'type': 'ready', 'item': item.id})
-        else:
-            answers = {question['name']: answer_to(question)
-                       for question in document.get('questions', [])}
-            await socket.send_json({'type': 'finish', 'item': item.id, 'answers': answers,
-                                    'agreed': True, **TIMES})
-        # No faster than people, or the page would be dropped.
-        await asyncio.sleep(0.06)
-
-
-def answer_to(question: dict[str, Any]) -> Any:
-    """Give an answer that can be taken."""
-    match question['kind']:
-        case 'choice':
-            return [] if question['several'] else question['choices'][0][0]
-        case 'text':
-            return 'x'
-        case 'number':
-            return 30
-        case _:
-            return 1
+from desk_client import (  # noqa: E402, I100
+    do,
+    do_until,
+    in_loop,
+    PATIENCE_S,
+    served,
+    shown,
+    shows,
+    TIMES,
+)
 
 
 @in_loop
@@ -381,57 +257,3 @@ async def test_a_hostile_page_is_dropped_and_the_others_go_on(tmp_path: Path) ->
                               'answers': {'age': 33, 'licence': 'yes'}, **TIMES})
         await shown(good, shows('page'))
         await good.close()
-
-
-@pytest.mark.parametrize('message', [
-    'x', '1', 'null', '{"type":"note"}', '{"type":"finish","item":5}',
-    '{"type":"finish","item":"a","shown_at":NaN,"answered_at":1,"taken_s":1}',
-    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":-1}',
-    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":1,"answers":{"a":{}}}',
-    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":1,"answers":{"a":true}}',
-    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":1,"answers":{"a":[1]}}',
-    f'{{"type":"ping","t":{"9" * 400}}}', '{"type":"hello","page":"x","fresh":true}',
-    '{"type":"ready"}', '{"type":"language","language":null}'])
-def test_messages_that_no_page_sends_are_refused(message: str) -> None:
-    with pytest.raises(InputError):
-        parse_participant(message)
-
-
-def test_messages_of_the_experimenter_need_their_fields() -> None:
-    assert parse_experimenter('{"type":"note","text":"x","id":1,"more":2}') == {
-        'type': 'note', 'text': 'x', 'id': 1}
-    for message in ('{"type":"note","text":" ","id":1}', '{"type":"note","text":"x"}',
-                    '{"type":"end","reason":"","id":1}', '{"type":"hold","held":1,"id":1}',
-                    '{"type":"skip","item":"a","reason":"","id":1}',
-                    '{"type":"mark","name":"","id":1}', '{"type":"ready","item":"a"}'):
-        with pytest.raises(InputError):
-            parse_experimenter(message)
-
-
-def test_markdown_becomes_a_tree_without_html(tmp_path: Path) -> None:
-    study = write_study(tmp_path / 'study')
-    tree = read_tree(study, Page('welcome.md'), 'de')
-    assert tree[0] == {'tag': 'h1', 'children': ['Welcome']}
-    assert {'tag': 'em', 'children': ['other']} in tree[1]['children']
-    assert '<script>document.title = "hurt"</script>' in tree[1]['children'][-1]
-    assert tree[2]['tag'] == 'ol' and tree[2]['children'][0]['children'] == ['Take your seat.']
-    assert tree[3]['tag'] == 'table'
-    image, _, link, rest = tree[4]['children']
-    assert (image['tag'], image['src'], image['alt']) == ('img', 'road.png', 'a road')
-    assert link['href'] == 'https://example.org/' and 'javascript' in rest
-    assert 'href' not in json.dumps(tree[4]['children'][3:])
-    assert read_tree(study, Page('consent.md'), 'de')[0]['children'] == ['Zustimmung']
-    assert picture(study, 'road.png') is not None and picture(study, '../road.png') is None
-    with pytest.raises(InputError, match='no such page'):
-        read_tree(study, Page('none.md'), 'en')
-
-
-def test_words_of_another_language_come_from_a_file(tmp_path: Path) -> None:
-    study = write_study(tmp_path / 'study')
-    (study.base / 'words.fr.yaml').write_text('next: Continuer\n', encoding='utf-8')
-    french = words_of(study, 'fr')
-    assert french['next'] == 'Continuer' and french['agree'] == 'I agree'
-    assert words_of(study, 'de').keys() == words_of(study, 'en').keys()
-    (study.base / 'words.it.yaml').write_text('nxet: Avanti\n', encoding='utf-8')
-    with pytest.raises(InputError, match='no word of the page'):
-        words_of(study, 'it')

@@ -100,10 +100,11 @@ class LiveDrives:
             self._abort = reason
             self._news.set()
 
-    def mark(self, subject: str, text: str) -> None:
+    def tell(self, kind: str, text: str) -> None:
         """Let the recording keep a note or marker, if one goes on."""
         if self._director is not None and self._state.phase is DrivePhase.DRIVING:
-            self._director.tell(subject, text)
+            self._director.poll()
+            self._director.tell(kind, text)
 
     async def run(self) -> None:
         """Prepare and conduct drives until the session is over."""

@@ -142,11 +142,13 @@ class Desk:
     def note(self, text: str) -> None:
         """Keep a remark, with the run and its clock."""
         self.session.note(text, **self.moment())
+        self.drives.tell('note', text)
         self._tell()
 
     def mark(self, name: str) -> None:
         """Set a marker, with the run and its clock."""
         self.session.mark(name, **self.moment())
+        self.drives.tell('marker', name)
         self._tell()
 
     def repeat(self, item: str, reason: str) -> None:

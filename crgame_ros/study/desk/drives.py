@@ -40,5 +40,8 @@ class Drives(Protocol):
     def ready(self, item: str) -> None:
         """Take the participant's word that the drive of an item may begin."""
 
+    def tell(self, kind: str, text: str) -> None:
+        """Let the recording that goes on, if one does, keep a note or marker at this moment."""
+
     def abort(self, reason: str) -> None:
         """End the drive that goes on; it counts for nothing and comes again."""

@@ -149,6 +149,14 @@ export class Gamepads {
     }
   }
 
+  /** Take the mappings anew that this browser keeps. */
+  reload() {
+    for (const pad of connectedPads()) {
+      Object.assign(this.#devices.get(pad.index) ?? {}, loadProfile(pad));
+    }
+    this.#report.listed();
+  }
+
   /** @param {Device|null} device */
   #activate(device) {
     this.#active = device;

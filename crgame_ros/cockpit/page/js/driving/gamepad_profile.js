@@ -158,6 +158,24 @@ export function saveProfile(id, profile) {
 }
 
 /**
+ * Keep mappings that another page of this machine has kept; what is none is left out.
+ *
+ * @param {Record<string, unknown>} profiles JSON of each, by the gamepad's id
+ */
+export function keepProfiles(profiles) {
+  for (const [id, text] of Object.entries(profiles)) {
+    try {
+      const profile = JSON.parse(String(text));
+      if (isProfile(profile)) {
+        saveProfile(id, profile);
+      }
+    } catch (error) {
+      console.warn(`the calibration of ${id} cannot be read and is not used: ${error}`);
+    }
+  }
+}
+
+/**
  * @param {any} profile as somebody's storage has it
  * @returns {profile is Profile}
  */

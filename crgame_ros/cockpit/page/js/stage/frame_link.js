@@ -47,6 +47,7 @@ function isOrder(data) {
   if (typeof data !== 'object' || data === null) {
     return false;
   }
-  const { crgame, kind, ready } = /** @type {Record<string, unknown>} */ (data);
-  return crgame === 1 && (kind === 'focus' || (kind === 'ready' && typeof ready === 'boolean'));
+  const { crgame, kind, ready, profiles } = /** @type {Record<string, unknown>} */ (data);
+  return crgame === 1 && (kind === 'focus' || (kind === 'ready' && typeof ready === 'boolean')
+    || (kind === 'calibrations' && typeof profiles === 'object' && profiles !== null));
 }

@@ -3,6 +3,7 @@
 /** The bare page of somebody who only drives: it takes its seat and tells the page around it. */
 
 import { element, setAttribute, setText } from '../dom.js';
+import { keepProfiles } from '../driving/gamepad_profile.js';
 import { FrameLink } from './frame_link.js';
 import { readStage } from './stage_address.js';
 import { WORDS } from './stage_words.js';
@@ -100,6 +101,11 @@ export class Stage {
 
   /** @param {StageOrder} order */
   #obey(order) {
+    if (order.kind === 'calibrations') {
+      keepProfiles(order.profiles);
+      window.crgame.driving?.gamepads.reload();
+      return;
+    }
     window.focus();
     if (order.kind === 'ready') {
       window.crgame.sound?.begin();

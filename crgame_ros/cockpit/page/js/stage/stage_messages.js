@@ -41,5 +41,7 @@ export {};
  * @typedef {{crgame: 1, kind: 'stage', state: StageState}} StageTells to the page around it
  * @typedef {{crgame: 1, kind: 'ready', ready: boolean}} ReadyOrder from it
  * @typedef {{crgame: 1, kind: 'focus'}} FocusOrder from it
- * @typedef {ReadyOrder|FocusOrder} StageOrder
+ * @typedef {{crgame: 1, kind: 'calibrations', profiles: Record<string, string>}
+ *   } CalibrationsOrder from it: JSON of mappings of gamepads and wheels, by the device's name
+ * @typedef {ReadyOrder|FocusOrder|CalibrationsOrder} StageOrder
  */

@@ -76,13 +76,13 @@ function makeCard(task, press) {
   const state = element('p', { class: 'event-state' });
   const error = element('p', { class: 'field-error', role: 'alert' });
   const asks = task.kind === 'take_over';
-  const what = asks ? `${task.seat}, ${fixed(task.lead_s ?? NaN, 1)} s before` : task.seat;
+  const lead = asks ? `, ${fixed(task.lead_s ?? NaN, 1)} s ahead` : '';
   return {
-    root: element('li', { class: 'card event' },
+    root: element('li', { class: 'card event', 'data-task': task.name },
       element('div', { class: 'event-head' },
         element('div', {}, element('h3', { text: label }),
           element('span', { class: 'tag', text: KINDS[task.kind] })), button),
-      element('p', { class: 'dim', text: `For the driver of ${what}` }), state, error),
+      element('p', { class: 'dim', text: `For the driver of ${task.seat}${lead}` }), state, error),
     /** @param {string} text */
     refused: (text) => setText(error, text),
     /**

@@ -4,7 +4,7 @@
 
 import { MeshBuilder } from './bodies/mesh_builder.js';
 import { Instances } from './instances.js';
-import { SeenInstances } from './seen_instances.js';
+import { mergeable, SeenInstances } from './seen_instances.js';
 
 /** @import { Group, Matrix4, MeshBasicMaterial } from 'three' */
 /** @import { Body } from './bodies/motor_vehicles.js' */
@@ -64,11 +64,13 @@ export class FittedParts {
     this.#wheels = new Instances(this.#three, this.#group, wheel(), most, plainWheel(),
       PLAIN_WHEELS_SOONER);
     const [lamp, shadow] = [lampPart(this.#three), shadowPart(this.#three)];
-    this.#materials = [lamp, shadow].map(({ material }) => /** @type {MeshBasicMaterial} */ (
-      material));
-    this.#lamps = new SeenInstances(this.#three, { near: [lamp] }, 2 * most);
-    this.#shadows = new SeenInstances(this.#three, { near: [shadow],
-      far: [{ ...shadow, geometry: shadow.geometry.clone() }], sooner: 0 }, Math.max(count, 1));
+    const plain = [lamp, shadow].map(mergeable);
+    this.#materials = [lamp, shadow, ...plain].map(
+      ({ material }) => /** @type {MeshBasicMaterial} */ (material));
+    this.#lamps = new SeenInstances(this.#three, { near: [lamp], far: [plain[0]], sooner: 0 },
+      2 * most);
+    this.#shadows = new SeenInstances(this.#three, { near: [shadow], far: [plain[1]], sooner: 0 },
+      Math.max(count, 1));
     // After the road and its markings.
     this.#shadows.meshes.forEach((mesh) => { mesh.renderOrder = 5; });
     this.#group.add(...this.#lamps.meshes, ...this.#shadows.meshes);

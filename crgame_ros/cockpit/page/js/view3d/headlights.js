@@ -3,7 +3,7 @@
 /** Headlights and tail lamps at dusk and in fog: lamps, their glow, and the light on the road. */
 
 import { contrastLeft } from './road/fog.js';
-import { SeenInstances } from './seen_instances.js';
+import { mergeable, SeenInstances } from './seen_instances.js';
 
 /** @import { Group, Matrix4, MeshBasicMaterial } from 'three' */
 /** @import { Environment } from '../messages.js' */
@@ -86,13 +86,15 @@ export class Headlights {
     this.#strength = BEAM_STRENGTH[environment.light];
     const most = Math.max(count, 1);
     const parts = [lampPart(this.#three), glowPart(this.#three), beamPart(this.#three)];
-    this.#materials = parts.map(({ material }) => /** @type {MeshBasicMaterial} */ (material));
-    this.#parts = parts.map((part, i) => new SeenInstances(this.#three, { near: [part] },
-      i < 2 ? 4 * most : most));
+    const plain = parts.map(mergeable);
+    this.#materials = [...parts, ...plain].map(
+      ({ material }) => /** @type {MeshBasicMaterial} */ (material));
+    this.#parts = parts.map((part, i) => new SeenInstances(this.#three,
+      { near: [part], far: [plain[i]], sooner: 0 }, i < 2 ? 4 * most : most));
     const [, glow, beams] = this.#parts;
     // The light lies on road and markings; the glow is before all that is not glass.
-    beams.meshes[0].renderOrder = 4;
-    glow.meshes[0].renderOrder = 1001;
+    beams.meshes.forEach((mesh) => { mesh.renderOrder = 4; });
+    glow.meshes.forEach((mesh) => { mesh.renderOrder = 1001; });
     this.#group.add(...this.#parts.flatMap(({ meshes }) => meshes));
   }
 

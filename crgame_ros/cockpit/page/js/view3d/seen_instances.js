@@ -70,8 +70,21 @@ export function isWithin(planes, x, y, z, radius) {
  * @property {Part[]} near
  * @property {Part[]} [far] the plain ones, of one material; without them the near ones are drawn
  *   at any distance
- * @property {number} [sooner] share of a sight's `plain_m` at which the plain ones begin
+ * @property {number} [sooner] share of a sight's `plain_m` at which the plain ones begin; with 0
+ *   all are plain where any is
  */
+
+/**
+ * Give the same shape as a plain one, for what costs more by its number than by its triangles.
+ *
+ * @param {Part} part of a material that knows no colours of corners
+ * @returns {Part} whose material is to be freed, too
+ */
+export function mergeable({ geometry, material, tinted }) {
+  const own = material.clone();
+  own.vertexColors = true;
+  return { geometry: geometry.clone(), material: own, tinted };
+}
 
 /** Instances are put in anew whenever they move; `see` chooses among them. */
 export class SeenInstances {
@@ -142,7 +155,8 @@ export class SeenInstances {
       if (sight !== null && !this.#mayBeSeen(i, sight)) {
         continue;
       }
-      if (sight !== null && this.#far !== null
+      // Where all detail is there, nothing is plain, however soon.
+      if (sight !== null && this.#far !== null && sight.plain_m < Infinity
           && this.#distance(i, sight) > this.#sooner * sight.plain_m) {
         this.#far.add(this.#matrices, this.#colors, i);
       } else {

@@ -60,6 +60,7 @@ export class View3d {
       toggle: () => this.show(!this.#on),
       choose: (viewpoint) => { this.viewpoint = viewpoint; },
     });
+    this.redraw();
     window.addEventListener('keydown', (event) => this.#pressed(event));
     new ResizeObserver(() => this.#resize()).observe(stage);
     for (const name of /** @type {const} */ (['scene', 'epoch', 'plan', 'state', 'signals'])) {

@@ -132,7 +132,7 @@ export class DeviceCheck {
     const movement = MOVEMENTS.find((name) => name === ACTIONS[event.code]);
     const { target } = event;
     // Arrows choose in a group, and the space bar presses a button, as everywhere.
-    const used = target instanceof HTMLInputElement
+    const used = (target instanceof HTMLInputElement && event.code.startsWith('Arrow'))
       || (target instanceof HTMLButtonElement && event.code === 'Space');
     if (this.#chosen === KEYBOARD && movement && !used) {
       event.preventDefault();
@@ -161,7 +161,10 @@ export class DeviceCheck {
         keys ? element('kbd', { text: this.#words.of(`device_keys_${name}`) }) : null,
         done ? element('span', { class: 'unseen', text: ` (${this.#words.of('done')})` }) : null);
     }));
-    if (this.#moved.size === MOVEMENTS.length) {
+    const complete = this.#moved.size === MOVEMENTS.length;
+    // From then on the device's buttons choose and confirm here, too.
+    setAttribute(this.node, 'data-complete', complete);
+    if (complete) {
       setText(this.#problem, '');
     }
   }
@@ -189,7 +192,6 @@ export class DeviceCheck {
       names: missing.map((name) => this.#words.of(`device_${name}`)).join(', ') }));
     if (missing.length === 0) {
       const pad = connectedPads().find(({ index }) => `${index}` === this.#chosen);
-      setAttribute(this.#problem, 'hidden', true);
       this.#finish({ device: (pad?.id ?? KEYBOARD).slice(0, 200), moved: [...this.#moved] });
     }
   }

@@ -9,12 +9,7 @@ import { button } from './page_view.js';
 /** @import { DriveDocument, Progress } from './desk_messages.js' */
 /** @import { Words } from './words.js' */
 
-/**
- * What the stage tells of itself; see docs/studies.md.
- *
- * @typedef {{seated?: boolean, connected?: boolean, time_s?: number|null,
- *   delay_ms?: number|null}} StageState
- */
+/** @import { StageState } from '../../../../cockpit/page/js/stage/stage_messages.js' */
 
 const LOOPBACK = ['127.0.0.1', 'localhost'];
 
@@ -27,7 +22,7 @@ export class DriveFrame {
   #frame = null;
   #link = '';
   #phase = '';
-  /** @type {StageState} */
+  /** @type {Partial<StageState>} */
   #state = {};
   #title = element('h2');
   #text = element('p', { class: 'lead' });
@@ -95,6 +90,8 @@ export class DriveFrame {
     setAttribute(this.#button, 'disabled', !loaded);
     if (this.#frame) {
       this.#frame.inert = ready;
+      // Before it is seated it shows the parts of a page that is not there yet.
+      this.#frame.classList.toggle('loads', ready && !loaded);
     }
     if (ready && was && loaded) {
       this.#button.focus();
@@ -153,6 +150,9 @@ export class DriveFrame {
     }
     const { data } = event;
     if (data?.crgame === 1 && data.kind === 'stage' && typeof data.state === 'object') {
+      if (this.#state.seat === undefined) {
+        this.#post({ kind: 'calibrations', profiles: calibrations() });
+      }
       this.#state = data.state ?? {};
       if (!this.#root.hidden) {
         this.#showGate();

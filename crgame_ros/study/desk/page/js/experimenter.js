@@ -22,7 +22,11 @@ class ExperimenterPage {
       part(document.body, 'lost').hidden = true;
     },
     lost: () => {
-      part(document.body, 'lost').hidden = false;
+      const lost = part(document.body, 'lost');
+      lost.hidden = false;
+      setText(lost, this.#shown?.over ? 'The session is over, and the program has ended.'
+        : 'The connection is lost. It comes back by itself; the session goes on meanwhile. '
+          + 'If the program was ended, start it again.');
     },
     received: (message) => this.#receive(message),
   });

@@ -20,6 +20,7 @@ export class PadNavigation {
   #drive;
   /** @type {Map<number, boolean[]>} */
   #pressed = new Map();
+  #frame = 0;
 
   /**
    * @param {HTMLElement} sheet what is answered
@@ -54,12 +55,10 @@ export class PadNavigation {
     }
   }
 
-  #frame = 0;
-
   /** @param {PadOrder} order */
   #take(order) {
     const root = this.#drive.hidden ? this.#sheet : this.#drive;
-    if (document.querySelector('dialog[open]') || root.querySelector('.device-check')) {
+    if (document.querySelector('dialog[open]') || root.querySelector('.device-check:not([data-complete])')) {
       return;
     }
     const stops = [...root.querySelectorAll(STOPS)].filter(

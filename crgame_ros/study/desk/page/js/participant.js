@@ -37,7 +37,7 @@ class ParticipantPage {
       this.#lost.hidden = true;
     },
     lost: () => {
-      this.#lost.hidden = this.#shown === null;
+      this.#lost.hidden = this.#shown === null || this.#shown.show === 'over';
       setText(this.#lost, this.#words.of('lost'));
     },
     received: (message) => this.#receive(message),
@@ -49,9 +49,9 @@ class ParticipantPage {
   }
 
   #stage() {
-    const { seated, delay_ms } = this.#drive.state;
+    const { seated, input_delay_ms } = this.#drive.state;
     return { ...typeof seated === 'boolean' ? { seated } : {},
-      ...Number.isFinite(delay_ms) ? { drive_delay_ms: delay_ms } : {} };
+      ...Number.isFinite(input_delay_ms) ? { drive_delay_ms: input_delay_ms } : {} };
   }
 
   /** @param {any} message */
@@ -59,6 +59,10 @@ class ParticipantPage {
     switch (message.type) {
       case 'words':
         this.#words.take(message.words);
+        // Whatever is shown is told in other words.
+        if (this.#shown !== null) {
+          this.#show(this.#shown, true);
+        }
         break;
       case 'refused':
         this.#sent = '';
@@ -76,8 +80,11 @@ class ParticipantPage {
       text: `${this.#words.of('refused')} ${text}` }));
   }
 
-  /** @param {DeskDocument} shown */
-  #show(shown) {
+  /**
+   * @param {DeskDocument} shown
+   * @param {boolean} [anew] also where the same is shown already
+   */
+  #show(shown, anew = false) {
     const before = this.#shown;
     this.#shown = shown;
     document.documentElement.lang = shown.language;
@@ -92,7 +99,7 @@ class ParticipantPage {
     }
     this.#drive.hide();
     // The same once more, because a page came or went: what is typed stays.
-    const same = before !== null && keyOf(before) === keyOf(shown);
+    const same = !anew && before !== null && keyOf(before) === keyOf(shown);
     if (!same) {
       this.#sent = '';
       this.#clear();
@@ -110,13 +117,11 @@ class ParticipantPage {
 
   /** @param {boolean} moved whether the person has just come from another item */
   #focus(moved) {
-    const first = this.#sheet.querySelector('input:not([type=checkbox]), textarea, button.primary');
-    const long = this.#sheet.scrollHeight > window.innerHeight;
-    if (moved && (long || !(first instanceof HTMLElement))) {
-      this.#sheet.focus({ preventScroll: true });
-    } else if (first instanceof HTMLElement) {
-      first.focus({ preventScroll: true });
-    }
+    const first = this.#sheet.querySelector('input:not([type=checkbox]), textarea');
+    const fits = this.#sheet.scrollHeight <= window.innerHeight;
+    // Never a button: a key that is still held would agree, or go on, unread.
+    const target = first instanceof HTMLElement && (fits || !moved) ? first : this.#sheet;
+    target.focus({ preventScroll: true });
   }
 
   /** @param {DeskDocument} shown */

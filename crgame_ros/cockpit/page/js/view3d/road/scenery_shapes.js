@@ -15,7 +15,7 @@ const COLOR = {
 // Corners of what is round.
 const ROUND = 7;
 // Of what is small in the picture.
-const PLAIN_ROUND = 5;
+const PLAIN_ROUND = 6;
 
 const shapeParts = () => new MeshParts({ x: 0, y: 0 });
 
@@ -111,7 +111,8 @@ export function fir() {
 export function plainTree() {
   const parts = shapeParts();
   addRound(parts, [[0.045, -0.05], [0.035, 0.4]], COLOR.bark, 3);
-  addRound(parts, [[0.2, 0.36], [0.52, 0.64], [0.06, 1]], COLOR.leaves, PLAIN_ROUND);
+  addRound(parts, [[0.16, 0.36], [0.5, 0.57], [0.43, 0.8], [0.08, 0.99]], COLOR.leaves,
+    PLAIN_ROUND);
   return parts;
 }
 

@@ -1,0 +1,164 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A desk's process, and what participants and experimenters do in a browser."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import functools
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+import re
+import subprocess
+import sys
+import threading
+from typing import Any
+
+from browser_support import Browser
+from crgame_ros.study.session_journal import read_journal
+import pytest
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+STUDY_TESTS = Path(__file__).resolve().parents[1] / 'study'
+sys.path.insert(0, str(STUDY_TESTS))
+
+from desk_support import write_study  # noqa: E402, I100
+
+
+class DeskProcess:
+    """A desk's process, with the addresses that it has told."""
+
+    def __init__(self, process: 'subprocess.Popen[str]') -> None:
+        self.process = process
+        assert process.stdout is not None
+        self.participant, self.experimenter = (
+            re.findall(r'http\S+', process.stdout.readline())[0] for _ in range(2))
+        self.port = int(re.findall(r':(\d+)/', self.participant)[0])
+
+
+@contextmanager
+def running(folder: Path, port: int = 0, step_s: float = 0.05, link: str = '',
+            **changed: Any) -> Iterator[DeskProcess]:
+    """Start a desk of the study in a folder."""
+    if not (folder / 'study').exists():
+        write_study(folder / 'study', **changed)
+    process = subprocess.Popen(
+        [sys.executable, STUDY_TESTS / 'desk_process.py', folder / 'study' / 'study.yaml',
+         folder / 'P07', str(port), link, str(step_s)], stdout=subprocess.PIPE, text=True)
+    try:
+        yield DeskProcess(process)
+    finally:
+        process.kill()
+        process.wait()
+
+
+class Participant:
+    """Somebody who has a keyboard only."""
+
+    def __init__(self, browser: Browser) -> None:
+        self.browser = browser
+
+    def press(self, *keys: str) -> None:
+        ActionChains(self.browser.driver).send_keys(*keys).perform()
+
+    def tab_to(self, selector: str) -> None:
+        """Go to the next control that fits."""
+        for _ in range(80):
+            if self.browser.run('return document.activeElement.matches(arguments[0])', selector):
+                return
+            self.press(Keys.TAB)
+        pytest.fail(f'no way to {selector} by Tab')
+
+    def question(self, name: str) -> None:
+        self.tab_to(f'[data-name="{name}"] :is(input, textarea)')
+
+    def go_on(self) -> None:
+        self.tab_to('button.primary')
+        self.press(Keys.ENTER)
+
+    def shows(self, what: str, heading: str = '') -> None:
+        """Wait for a page, and that it says a text."""
+        self.browser.wait('document.body.dataset.show === arguments[0]'
+                          ' && document.body.innerText.includes(arguments[1])',
+                          f'{what} {heading}', arguments=(what, heading))
+
+    def answer_all(self) -> None:
+        """Answer every question of the page: the second option, one step, 30, a few words."""
+        kinds = self.browser.run('return [...document.querySelectorAll(".question")].map('
+                                 '(node) => [node.dataset.name, node.dataset.kind])')
+        for name, kind in kinds:
+            self.question(name)
+            self.press({'likert': Keys.ARROW_RIGHT, 'slider': Keys.ARROW_RIGHT,
+                        'choice': Keys.ARROW_RIGHT, 'number': '30', 'text': 'yes'}[kind])
+
+
+def finished(folder: Path) -> dict[str, dict[str, Any]]:
+    """Give what is told of each finished item."""
+    entries = [entry for entry in read_journal(folder / 'P07') if entry['entry'] == 'finished']
+    assert len({entry['item'] for entry in entries}) == len(entries)
+    return {entry['item']: entry for entry in entries}
+
+
+# Stands for the cockpit's stage: it tells that it is seated, and keeps what it hears.
+STAGE = """<!DOCTYPE html><title>stage</title><input id="wheel"><script>
+window.heard = [];
+window.began = Math.random();
+addEventListener('message', ({ data, origin }) => {
+  heard.push({ ...data, origin });
+  if (data.kind === 'focus') { document.getElementById('wheel').focus(); }
+});
+setTimeout(() => parent.postMessage({ crgame: 1, kind: 'stage', state: {
+  seat: 'hv0', seated: true, connected: true, input_delay_ms: 33.4 } }, '*'), 300);
+</script>"""
+
+
+@contextmanager
+def stage(folder: Path) -> Iterator[str]:
+    """Serve such a page at a port of its own."""
+    (folder / 'index.html').write_text(STAGE, encoding='utf-8')
+    handler = functools.partial(QuietHandler, directory=str(folder))
+    with ThreadingHTTPServer(('127.0.0.1', 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f'http://127.0.0.1:{server.server_port}/?stage=hv0'
+        server.shutdown()
+        thread.join()
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    """Serves files without a word."""
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing."""
+
+
+def give_order(person: Participant, name: str, reason: str = '') -> None:
+    """Press an order's button, and give the reason that it asks for."""
+    person.browser.wait('[...document.querySelectorAll("#orders button")].some((button) =>'
+                        ' button.textContent === arguments[0] && !button.disabled)',
+                        arguments=(name,))
+    person.browser.run('[...document.querySelectorAll("#orders button")].find((button) =>'
+                       ' button.textContent === arguments[0]).focus()', name)
+    person.press(Keys.ENTER)
+    if reason:
+        give_reason(person, reason)
+
+
+def give_reason(person: Participant, reason: str) -> None:
+    """Type a reason into the dialog that has opened."""
+    person.browser.wait('document.querySelector("dialog[open] #reason")')
+    person.browser.run('document.querySelector("#reason").focus()')
+    person.press(reason, Keys.ENTER)
+    person.browser.wait('!document.querySelector("#reason")')

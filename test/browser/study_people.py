@@ -1,0 +1,206 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A study's session from outside: its program, its pages in a browser, and what may be killed."""
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+import json
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+import urllib.request
+
+from browser_support import Browser, open_browser
+from crgame_ros.study.session_journal import read_journal
+from study_robot import StudyRobot
+import websocket
+
+# What can be killed: the participant's browser, and three processes of the program.
+VICTIMS = ('page', 'simulation', 'launcher', 'study')
+_LOOK_S = 0.2
+
+
+class _KeepRedirect(urllib.request.HTTPRedirectHandler):
+
+    def redirect_request(self, *_: Any) -> None:
+        """Follow nothing: the cookie is in the answer."""
+
+
+class Experimenter:
+    """
+    The experimenter's connection.
+
+    :param link: that the program has printed.
+    """
+
+    def __init__(self, link: str) -> None:
+        opener = urllib.request.build_opener(_KeepRedirect)
+        try:
+            opener.open(link)
+            self._cookie = ''
+        except urllib.error.HTTPError as answer:
+            self._cookie = answer.headers['Set-Cookie'].partition(';')[0]
+        self._address = link.partition('/experimenter')[0]
+        self._count = 0
+
+    def order(self, kind: str, **fields: Any) -> None:
+        """Send an order, over a connection of its own: nothing else is listened to."""
+        self._count += 1
+        with closing(websocket.create_connection(
+                f'{self._address.replace("http", "ws", 1)}/ws/experimenter', cookie=self._cookie,
+                origin=self._address, timeout=30)) as connection:
+            connection.send(json.dumps({'type': kind, 'id': self._count, **fields}))
+
+
+class StudySession:
+    """
+    A participant in a browser, who goes on after whatever is killed.
+
+    :param file: study file.
+    :param out: folder of its data.
+    :param participant: id.
+    :param port: of the pages.
+    """
+
+    def __init__(self, file: Path, out: Path, participant: str, port: int) -> None:
+        self._command = [sys.executable, '-m', 'crgame_ros.cli', 'study', 'run', str(file),
+                         '--participant', participant, '--out', str(out), '--port', str(port)]
+        self.folder = out / 'participants' / participant
+        self.answers: dict[str, Any] = {}
+        # (name, run's clock as the page shows it, of what was sent at that moment) [s]
+        self.marked: list[tuple[str, float]] = []
+        self._browser: Browser | None = None
+        self._end_browser: Any = None
+        self._process: subprocess.Popen[str] | None = None
+        self.is_over = False
+        self._start()
+        self._open()
+
+    def _start(self) -> None:
+        self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None
+        self._process.stdout.readline()
+        links = [re.findall(r'http\S+', self._process.stdout.readline()) for _ in range(2)]
+        self.page, self._link = links[0][0], links[1][0]
+        self._experimenter = Experimenter(self._link)
+
+    def _open(self) -> None:
+        self._end_browser = open_browser(Path(tempfile.mkdtemp(prefix='crgame_study_')))
+        self._browser = self._end_browser.__enter__()
+        self._browser.open(self.page)
+        self._robot = StudyRobot(self._browser)
+
+    @property
+    def entries(self) -> list[dict[str, Any]]:
+        """Give what the journal has."""
+        return read_journal(self.folder)
+
+    def act(self) -> str:
+        """Do what the page asks for now, and keep the program running."""
+        assert self._process is not None
+        if self._process.poll() is not None and not self.is_over:
+            self._start()
+        if self._robot.lost:
+            self._close_browser()
+            self._open()
+        shown = self._robot.act()
+        for told in self._robot.answers.values():
+            self.answers.update(told)
+        self.is_over = self.is_over or shown == 'over'
+        return shown
+
+    def mark(self, name: str) -> None:
+        """Set a marker while the page drives, and note the clock that the page shows then."""
+        time_s = self._robot.time_s()
+        if time_s is not None:
+            with suppress(OSError, websocket.WebSocketException):
+                self._experimenter.order('mark', name=name)
+            self.marked.append((name, time_s))
+
+    def kill(self, victim: str) -> bool:
+        """Kill one of `VICTIMS` (-9); tell whether there was one."""
+        if victim == 'page':
+            assert self._browser is not None
+            process = self._browser.driver.service.process
+            _kill_with_children(process.pid)
+            return True
+        assert self._process is not None
+        if victim == 'study':
+            self._process.kill()
+            self._process.wait()
+            return True
+        logs = sorted((self.folder / 'runs').glob('*.log'), key=lambda path: path.stat().st_mtime)
+        found = re.findall(r'sim_node: process (\d+)', logs[-1].read_text()) if logs else []
+        with suppress(OSError, IndexError):
+            pid = int(found[-1])
+            # The launcher is its parent.
+            if victim == 'launcher':
+                pid = int(Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[1])
+            os.kill(pid, signal.SIGKILL)
+            return True
+        return False
+
+    def run(self, patience_s: float, each: Any = lambda shown: None) -> None:
+        """
+        Go through the whole session.
+
+        :param each: told what the page shows, each time.
+        """
+        until_s = time.monotonic() + patience_s
+        while not self.is_over:
+            assert time.monotonic() < until_s, f'{self.folder}: {self.entries[-3:]}'
+            each(self.act())
+            time.sleep(_LOOK_S)
+        assert self._process is not None
+        self._process.wait(120.0)
+
+    def close(self) -> None:
+        """End what still runs."""
+        self._close_browser()
+        if self._process is not None and self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(120.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+
+    def _close_browser(self) -> None:
+        with suppress(Exception):
+            self._end_browser.__exit__(None, None, None)
+
+
+@contextmanager
+def study_session(file: Path, out: Path, participant: str, port: int) -> Iterator[StudySession]:
+    """Begin or resume a participant's session, and end it."""
+    session = StudySession(file, out, participant, port)
+    try:
+        yield session
+    finally:
+        session.close()
+
+
+def _kill_with_children(pid: int) -> None:
+    """Kill a process and all of its descendants."""
+    for child in Path(f'/proc/{pid}/task/{pid}/children').read_text().split():
+        with suppress(OSError):
+            _kill_with_children(int(child))
+    with suppress(OSError):
+        os.kill(pid, signal.SIGKILL)

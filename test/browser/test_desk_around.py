@@ -1,0 +1,169 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Around a session: the stage in its frame, the experimenter's page, answers by a wheel."""
+
+from pathlib import Path
+
+from browser_support import Browser
+from crgame_ros.study.session_journal import read_journal
+from desk_page_support import finished, give_order, give_reason, Participant, running, stage
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+# Stands for the hardware that a test has not: a wheel whose buttons a test presses.
+WHEEL = """
+const wheel = { id: 'Wheel (Vendor: 046d Product: c24f)', index: 0, connected: true, mapping: '',
+  axes: [0, 0, 1, 1], timestamp: 0,
+  buttons: Array.from({ length: 20 }, () => ({ pressed: false, touched: false, value: 0 })) };
+navigator.getGamepads = () => [wheel];
+window.wheel = wheel;
+window.dispatchEvent(new Event('gamepadconnected'));
+"""
+
+
+def test_the_stage_stays_loaded_between_drives_and_knows_when_somebody_is_ready(
+        browser: Browser, tmp_path: Path) -> None:
+    """The gate opens when the stage is seated; the frame gets the focus, and is never reloaded."""
+    person = Participant(browser)
+    blocks = [{'name': 'main', 'settings': {'game': 'x.yaml'}, 'after_trial': [
+        {'questions': 'van_der_laan'}]}]
+    (tmp_path / 'stage').mkdir()
+    with stage(tmp_path / 'stage') as link, running(
+            tmp_path, link=link, step_s=1.5, languages=[], fields=[], before=[], blocks=blocks,
+            after=[]) as desk:
+        browser.open(desk.participant)
+        browser.run('localStorage.setItem("crgame.gamepad.wheel", "{}")')
+        person.shows('drive', 'Drive 1 of 2')
+        assert browser.run('return document.querySelector(".gate button").disabled')
+        assert browser.run('return document.querySelector("iframe").allow') \
+            == 'gamepad; fullscreen; autoplay'
+        browser.wait('!document.querySelector(".gate button").disabled', 'the seat')
+        person.press(Keys.ENTER)
+        browser.wait('document.querySelector(".gate").hidden')
+        browser.driver.switch_to.frame(0)
+        kinds = browser.wait('heard.length >= 4 && heard.map(({ kind }) => kind)')
+        assert kinds[:4] == ['calibrations', 'calibrations', 'ready', 'focus']
+        assert browser.run('return heard[0].profiles') == {'wheel': '{}'}
+        assert browser.run('return heard[2].ready') is True
+        assert browser.wait('document.hasFocus() && document.activeElement.id === "wheel"')
+        began = browser.run('return began')
+        browser.driver.switch_to.default_content()
+        person.shows('questions')
+        assert browser.run('return getComputedStyle(document.getElementById("drive")).visibility'
+                           ) == 'hidden'
+        # What lies below is not in the way of the keys.
+        person.answer_all()
+        person.go_on()
+        person.shows('drive', 'Drive 2 of 2')
+        browser.driver.switch_to.frame(0)
+        assert browser.run('return began') == began
+        # No other page is heard.
+        browser.driver.switch_to.default_content()
+        browser.run('window.postMessage({crgame: 1, kind: "stage", state: {seated: false}}, "*")')
+        assert not browser.run('return document.querySelector(".gate button").disabled')
+        assert not browser.console_errors()
+
+
+def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> None:
+    """Notes and markers by keys, hold, skip, repeat, and an end that is asked twice."""
+    person = Participant(browser)
+    with running(tmp_path, languages=[]) as desk:
+        browser.open(f'{desk.participant}experimenter')
+        assert 'terminal' in browser.run('return document.body.innerText')
+        browser.open(desk.experimenter)
+        browser.wait('document.querySelectorAll("#items tr").length === 13')
+        assert 'token' not in browser.driver.current_url
+        assert browser.run('return document.getElementById("page").textContent').endswith(
+            'not connected')
+        own = browser.driver.current_window_handle
+        browser.driver.switch_to.new_window('tab')
+        browser.open(desk.participant)
+        person.shows('questions')
+        there = browser.driver.current_window_handle
+        browser.driver.switch_to.window(own)
+        browser.wait('document.getElementById("page").textContent.includes("connected, ")')
+        person.press(Keys.F2)
+        person.tab_to('#note')
+        person.press('<i>sleepy</i>')
+        ActionChains(browser.driver).key_down(Keys.CONTROL).send_keys(Keys.ENTER).key_up(
+            Keys.CONTROL).perform()
+        browser.wait('document.getElementById("log").textContent.includes("<i>sleepy</i>")')
+        browser.wait('document.getElementById("log").textContent.includes("marker: spoke")')
+        give_order(person, 'Hold before the next item')
+        browser.driver.switch_to.window(there)
+        person.answer_all()
+        person.go_on()
+        person.shows('wait')
+        browser.driver.switch_to.window(own)
+        give_order(person, 'Skip this item', 'asked elsewhere')
+        browser.wait('document.querySelector("#items tr:nth-child(2)").dataset.state'
+                     ' === "skipped"')
+        give_order(person, 'Go on')
+        browser.driver.switch_to.window(there)
+        person.shows('page', 'Welcome')
+        browser.driver.switch_to.window(own)
+        browser.run('document.querySelector("#items tr button").click()')
+        give_reason(person, 'typed by mistake')
+        browser.driver.switch_to.window(there)
+        person.shows('questions')
+        browser.driver.switch_to.window(own)
+        give_order(person, 'End the session', 'asked to stop')
+        assert finished(tmp_path).keys() == {'fields'}
+        browser.wait('document.querySelector("dialog h2").textContent === "Really end it?"')
+        # The button that ends it is not the one that a second Enter presses.
+        person.tab_to('dialog button.primary')
+        person.press(Keys.ENTER)
+        browser.wait('document.getElementById("now-title").textContent.includes("ended")')
+        browser.driver.switch_to.window(there)
+        person.shows('over', 'has ended')
+        assert [entry['entry'] for entry in read_journal(tmp_path / 'P07')] == [
+            'begun', 'marker', 'note', 'held', 'finished', 'skipped', 'held', 'repeated', 'ended']
+
+
+def test_questions_are_answered_by_a_wheel(browser: Browser, tmp_path: Path) -> None:
+    """The paddles choose, the first button confirms; axes and pedals pass the device check."""
+    person = Participant(browser)
+    before = [{'questions': 'van_der_laan'}, {'device_check': {}}]
+
+    def press(button: int) -> None:
+        for pressed in (True, False):
+            browser.run_async(
+                'wheel.buttons[arguments[0]] = {pressed: arguments[1], value: +arguments[1]};'
+                'await new Promise((done) => requestAnimationFrame(() =>'
+                ' requestAnimationFrame(done)));', button, pressed)
+
+    with running(tmp_path, languages=[], fields=[], before=before) as desk:
+        browser.open(desk.participant)
+        person.shows('questions')
+        browser.run(WHEEL)
+        for _ in range(8):
+            press(4)
+            press(4)
+            press(0)
+        press(4)
+        press(5)
+        press(0)
+        press(0)
+        person.shows('device')
+        assert [*finished(tmp_path)['before/1']['answers'].values()] == [2] * 8 + [1]
+        browser.wait('document.querySelectorAll(".device-check input").length === 2')
+        person.tab_to('.device-check input')
+        person.press(Keys.ARROW_DOWN)
+        for axes in ([-1, 0, 1, 1], [1, 0, 1, 1], [0, 0, -1, 1], [0, 0, 1, -1], [0, 0, 1, 1]):
+            browser.run_async('wheel.axes = arguments[0]; await new Promise((done) =>'
+                              ' requestAnimationFrame(() => requestAnimationFrame(done)));', axes)
+        person.go_on()
+        person.shows('drive')
+        assert finished(tmp_path)['before/2']['device'].startswith('Wheel')

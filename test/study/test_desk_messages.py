@@ -1,0 +1,84 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the desk's pages may say, and what pages and words of a study become."""
+
+import json
+from pathlib import Path
+import sys
+
+from crgame_ros.errors import InputError
+from crgame_ros.study.desk.desk_messages import parse_experimenter, parse_participant
+from crgame_ros.study.desk.page_markdown import picture, read_tree
+from crgame_ros.study.desk.page_words import words_of
+from crgame_ros.study.study_file import Page
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from desk_support import write_study  # noqa: E402, I100
+
+
+@pytest.mark.parametrize('message', [
+    'x', '1', 'null', '{"type":"note"}', '{"type":"finish","item":5}',
+    '{"type":"finish","item":"a","shown_at":NaN,"answered_at":1,"taken_s":1}',
+    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":-1}',
+    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":1,"answers":{"a":{}}}',
+    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":1,"answers":{"a":true}}',
+    '{"type":"finish","item":"a","shown_at":1,"answered_at":1,"taken_s":1,"answers":{"a":[1]}}',
+    f'{{"type":"ping","t":{"9" * 400}}}', '{"type":"hello","page":"x","fresh":true}',
+    '{"type":"ready"}', '{"type":"language","language":null}'])
+def test_messages_that_no_page_sends_are_refused(message: str) -> None:
+    with pytest.raises(InputError):
+        parse_participant(message)
+
+
+def test_messages_of_the_experimenter_need_their_fields() -> None:
+    assert parse_experimenter('{"type":"note","text":"x","id":1,"more":2}') == {
+        'type': 'note', 'text': 'x', 'id': 1}
+    for message in ('{"type":"note","text":" ","id":1}', '{"type":"note","text":"x"}',
+                    '{"type":"end","reason":"","id":1}', '{"type":"hold","held":1,"id":1}',
+                    '{"type":"skip","item":"a","reason":"","id":1}',
+                    '{"type":"mark","name":"","id":1}', '{"type":"ready","item":"a"}'):
+        with pytest.raises(InputError):
+            parse_experimenter(message)
+
+
+def test_markdown_becomes_a_tree_without_html(tmp_path: Path) -> None:
+    study = write_study(tmp_path / 'study')
+    tree = read_tree(study, Page('welcome.md'), 'de')
+    assert tree[0] == {'tag': 'h1', 'children': ['Welcome']}
+    assert {'tag': 'em', 'children': ['other']} in tree[1]['children']
+    assert '<script>document.title = "hurt"</script>' in tree[1]['children'][-1]
+    assert tree[2]['tag'] == 'ol' and tree[2]['children'][0]['children'] == ['Take your seat.']
+    assert tree[3]['tag'] == 'table'
+    image, _, link, rest = tree[4]['children']
+    assert (image['tag'], image['src'], image['alt']) == ('img', 'road.png', 'a road')
+    assert link['href'] == 'https://example.org/' and 'javascript' in rest
+    assert 'href' not in json.dumps(tree[4]['children'][3:])
+    assert read_tree(study, Page('consent.md'), 'de')[0]['children'] == ['Zustimmung']
+    assert picture(study, 'road.png') is not None and picture(study, '../road.png') is None
+    with pytest.raises(InputError, match='no such page'):
+        read_tree(study, Page('none.md'), 'en')
+
+
+def test_words_of_another_language_come_from_a_file(tmp_path: Path) -> None:
+    study = write_study(tmp_path / 'study')
+    (study.base / 'words.fr.yaml').write_text('next: Continuer\n', encoding='utf-8')
+    french = words_of(study, 'fr')
+    assert french['next'] == 'Continuer' and french['agree'] == 'I agree'
+    assert words_of(study, 'de').keys() == words_of(study, 'en').keys()
+    (study.base / 'words.it.yaml').write_text('nxet: Avanti\n', encoding='utf-8')
+    with pytest.raises(InputError, match='no word of the page'):
+        words_of(study, 'it')
