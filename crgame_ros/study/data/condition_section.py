@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.report.report_text import free, note, number, plain, table
-from crgame_ros.analysis.tables.column import Column, FLAG
+from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER
 from crgame_ros.study.data.condition_means import (
     condition_means,
     ConditionMeans,
@@ -26,6 +26,7 @@ from crgame_ros.study.data.condition_means import (
 )
 from crgame_ros.study.data.condition_plot import condition_svg
 from crgame_ros.study.data.study_data import StudyData
+from crgame_ros.study.data.trial_tasks import TASK_COLUMNS
 from crgame_ros.study.data.trials_table import measure_columns
 from crgame_ros.study.trial_plan import conditions_of
 
@@ -35,7 +36,7 @@ SHOWN = ('mean_speed', 'max_speed', 'min_acceleration', 'worst_ttc', 'worst_thw'
          'worst_min_distance', 'worst_drac', 'worst_pet_s', 'tet_s', 'drive_sdlp',
          'drive_lane_changes', 'drive_srr_visual', 'drive_tlc_min', 'drive_time_above_limit',
          'drive_jerk_sd', 'drive_throttle_mean', 'drive_brake_mean', 'score_comfort')
-_SCORES, _DRIVING = 'Questionnaires', 'Driving'
+_SCORES, _DRIVING, _TASKS = 'Questionnaires', 'Driving', 'Tasks'
 
 
 class ShownMeasure(NamedTuple):
@@ -58,6 +59,7 @@ def shown_measures(data: StudyData, conditions: Sequence[str],
     measures = measure_columns()
     columns = [(_SCORES, column) for column in _scored(data)]
     columns += [(_DRIVING, measures[name]) for name in SHOWN if name in measures]
+    columns += [(_TASKS, column) for column in TASK_COLUMNS if column.type == NUMBER]
     found = []
     rows = [trial.row for trial in data.trials if trial.row['block'] in blocks]
     for group, column in columns:

@@ -36,6 +36,7 @@ from crgame_ros.study.data.measured_run import MeasuredRun
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.study_column import flag_column, unlike, with_unit
 from crgame_ros.study.data.timing_quality import timing_faults
+from crgame_ros.study.data.trial_tasks import TASK_COLUMNS, task_values
 from crgame_ros.study.trial_plan import PlannedTrial
 
 WALL = 'wall clock, seconds since 1970-01-01 UTC'
@@ -126,7 +127,7 @@ class TrialsTable:
         self._measures = measure_columns()
         runs = {column.name: column for column in RUNS.columns}
         fixed = [*_DRIVE, *(runs[name] for name in _RUN_COLUMNS), *_TIMING,
-                 *self._measures.values(), _ANSWERED]
+                 *self._measures.values(), *TASK_COLUMNS, _ANSWERED]
         taken = {column.name for column in (*_FIRST, *fixed)}
         self.factors: dict[str, Column] = {}
         for factor in study.factors:
@@ -191,6 +192,8 @@ class TrialsTable:
         delay_ms = summary['input_delay_ms'].get(vehicle)
         return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],
                 'av_planner': '+'.join(dict.fromkeys(summary['planners'].values())),
+                **task_values(run.table('detection_scores').to_pylist(),
+                              run.table('take_over_requests').to_pylist()),
                 **_view(summary.get('views', {}).get(vehicle, ())),
                 'input_delay_s': None if delay_ms is None else 1e-3 * delay_ms,
                 **{name: told[name] for name in _RUN_COLUMNS},
