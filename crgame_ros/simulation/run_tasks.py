@@ -102,12 +102,12 @@ class RunTasks:
 
     @property
     def running(self) -> tuple[str, ...]:
-        """Names of the tasks that last now."""
+        """The names of the tasks that last now."""
         return tuple(name for name, course in self._courses.items() if course.running)
 
     @property
     def prompts(self) -> tuple[OpenPrompt, ...]:
-        """What is neither answered nor over."""
+        """Stimuli and requests that are neither answered nor over."""
         return tuple(course.prompt for course in self._courses.values() if course.prompt)
 
     def trigger(self, name: str) -> str | None:
