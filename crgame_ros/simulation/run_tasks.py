@@ -102,7 +102,7 @@ class RunTasks:
 
     @property
     def running(self) -> tuple[str, ...]:
-        """The names of the tasks that last now."""
+        """Names of the tasks that last now."""
         return tuple(name for name, course in self._courses.items() if course.running)
 
     @property
