@@ -107,7 +107,7 @@ class RunTasks:
 
     @property
     def prompts(self) -> tuple[OpenPrompt, ...]:
-        """What is neither answered nor over."""
+        """Stimuli and requests that are neither answered nor over."""
         return tuple(course.prompt for course in self._courses.values() if course.prompt)
 
     def trigger(self, name: str) -> str | None:

@@ -29,8 +29,9 @@ export class TaskView {
     this.note = element('p', { class: 'task-note', role: 'status', hidden: true });
     this.answerButton = element('button', { type: 'button', class: 'task-answer', tabindex: '-1',
       hidden: true });
-    this.root = element('div', { id: 'tasks' }, this.frame, this.light, this.note, this.request,
-      this.answerButton);
+    // The light comes last: nothing hides it.
+    this.root = element('div', { id: 'tasks' }, this.frame, this.note, this.request,
+      this.answerButton, this.light);
     stage.append(this.root);
   }
 
