@@ -132,7 +132,7 @@ class DrivenPage:
 
     @property
     def browser(self) -> Browser:
-        """The browser that looks at the page."""
+        """Give the browser that looks at the page."""
         assert self._browser is not None
         return self._browser
 
