@@ -33,8 +33,8 @@ from crgame_ros.recording.run_contacts import recorded_contacts
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.seat_sound import SeatSound
-from crgame_ros.recording.seat_view import SeatView
 from crgame_ros.recording.storage import BagMessage
+from crgame_ros.recording.view_periods import ViewPeriods
 from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.timing_metrics import TimingMetrics
 import numpy as np
@@ -150,7 +150,7 @@ class _Collector:
         self._reasons: dict[str, Counter[str]] = defaultdict(Counter)
         self._statuses: dict[str, dict[str, str]] = {}
         self.sound = SeatSound()
-        self.view = SeatView()
+        self.view = ViewPeriods()
 
     def take(self, recorded: BagMessage, reader: BagReader) -> None:
         """Take one message; those of other runs, and those that are none, are passed over."""

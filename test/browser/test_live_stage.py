@@ -241,6 +241,19 @@ def test_a_seat_that_is_not_there_or_not_free_is_told(
                           ' && s.trouble.includes("no such")')['seated'] is False
 
 
+def test_who_is_in_an_av_rides_along(
+        graph: Graph, around: Around, module_browser: Browser) -> None:
+    """Its planner keeps it; the picture is that of the AV, and nothing is said to be wrong."""
+    browser = module_browser
+    around.shown.append(f'{graph.address}?stage=av0&view=map')
+    browser.open(around.origin)
+    told = wait_for_state(browser, 's.connected && s.time_s !== null && s.trouble === ""')
+    assert not told['seated'] and not told['hasInput']
+    with within(browser):
+        browser.wait("crgame.world.followed === 'av0'")
+        assert browser.run('return crgame.store.seats.av0.holder') is None
+
+
 def test_no_other_page_can_show_the_cockpit(
         graph: Graph, around: Around, module_browser: Browser) -> None:
     """The same page at another port gets an empty frame, and is told nothing."""

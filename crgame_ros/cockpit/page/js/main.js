@@ -40,8 +40,8 @@ const PARTS = [
   ['./panels/save_panel.js', 'createSaving', '#panels', 'saving'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
-// Of somebody who only drives.
-const STAGE = ['person', 'driving', 'lobby', 'sound', 'view3d', 'viewReport'];
+// Of somebody who only drives; names of parts that are not there count for nothing.
+const STAGE = ['person', 'driving', 'tasks', 'lobby', 'sound', 'view3d', 'viewReport'];
 
 const bare = readStage(window.location.search) !== null;
 document.documentElement.classList.toggle('bare', bare);

@@ -121,7 +121,10 @@ export class Stage {
   /** Take the seat while it is free, say what is wrong, and tell the page around. */
   #look() {
     const seat = this.#store.seats[this.address.seat];
-    if (this.#store.connected && seat !== undefined && seat.holder === null
+    if (this.#rides && window.crgame.world.followed !== this.address.seat) {
+      window.crgame.world.follow(this.address.seat, true);
+    }
+    if (this.#store.connected && !this.#rides && seat !== undefined && seat.holder === null
         && !this.#store.rights.directs
         && performance.now() - this.#claimed_ms > CLAIM_EVERY_MS) {
       this.#claim();
@@ -160,6 +163,13 @@ export class Stage {
     this.#refusal = ok ? '' : text;
   }
 
+  /** Whether it is in an AV that nobody here has taken over: then its planner drives. */
+  get #rides() {
+    const { scene } = this.#store;
+    return !this.#seated && scene?.vehicles.find(
+      ({ id }) => id === this.address.seat)?.role === 'autonomous';
+  }
+
   get #seated() {
     return window.crgame.driving?.seat === this.address.seat;
   }
@@ -174,6 +184,9 @@ export class Stage {
     }
     if (mode === 'replay') {
       return 'recording';
+    }
+    if (this.#rides) {
+      return null;
     }
     if (!this.#seated) {
       const other = seats[seat]?.holder ?? null;

@@ -36,7 +36,7 @@ class _Told(NamedTuple):
     rate_hz: float | None
 
 
-class SeatView:
+class ViewPeriods:
     """Sums up the statuses of each seat's view, which come once a second and at each change."""
 
     def __init__(self) -> None:
