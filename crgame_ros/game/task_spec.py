@@ -62,7 +62,7 @@ class DetectionResponse:
 
 
 @dataclass(frozen=True)
-class TakeOver:
+class TakeOverPrompt:
     """
     A request to take over, seen and heard.
 
@@ -104,11 +104,11 @@ class OnEvent:
     event: str
 
 
-Task = DetectionResponse | TakeOver | SecondaryTask
+Task = DetectionResponse | TakeOverPrompt | SecondaryTask
 TaskCondition = AtTime | AtStep | Near | Between | OnEvent
 
 TASKS: dict[TaskKind, type[Task]] = {
-    'detection_response': DetectionResponse, 'take_over': TakeOver,
+    'detection_response': DetectionResponse, 'take_over': TakeOverPrompt,
     'secondary_task': SecondaryTask}
 
 
@@ -141,7 +141,7 @@ class TaskSpec:
 
     def check(self) -> None:
         """Refuse an end of what has no length."""
-        if isinstance(self.task, TakeOver) and self.until is not None:
+        if isinstance(self.task, TakeOverPrompt) and self.until is not None:
             raise InputError('a take-over request has "until"', '', 'give it "shown"')
 
     @property

@@ -30,7 +30,7 @@ from crgame_ros.game.task_documents import (
 from crgame_ros.game.task_spec import (
     DetectionResponse,
     OnEvent,
-    TakeOver,
+    TakeOverPrompt,
     TaskCondition,
     TaskSpec,
 )
@@ -91,7 +91,7 @@ class RunTasks:
 
     def _begins(self, spec: TaskSpec) -> TaskCondition | None:
         """Give when a task begins by itself: a request also by the time of its event."""
-        if spec.when is not None or not isinstance(spec.task, TakeOver):
+        if spec.when is not None or not isinstance(spec.task, TakeOverPrompt):
             return spec.when
         about = next((event.when for event in self._setup.game.events
                       if event.name == spec.task.before), None)
@@ -117,7 +117,7 @@ class RunTasks:
         :return: None if it will, else the reason why not.
         """
         course = self._courses[name]
-        if course.prompt is not None and isinstance(course.spec.task, TakeOver):
+        if course.prompt is not None and isinstance(course.spec.task, TakeOverPrompt):
             return f'"{name}" is being shown'
         course.pressed = True
         return None
@@ -144,7 +144,7 @@ class RunTasks:
         due: list[str] = []
         for course in self._courses.values():
             task = course.spec.task
-            if course.due_n is not None and n >= course.due_n and isinstance(task, TakeOver):
+            if course.due_n is not None and n >= course.due_n and isinstance(task, TakeOverPrompt):
                 course.due_n = None
                 due.append(str(task.before))
         return due
@@ -192,7 +192,7 @@ class RunTasks:
             task = course.spec.task
             if isinstance(task, DetectionResponse):
                 self._detect(course, task)
-            elif isinstance(task, TakeOver) and course.prompt is not None:
+            elif isinstance(task, TakeOverPrompt) and course.prompt is not None:
                 self._request(course, task, driven[course.seat])
         entries, self._entries = tuple(self._entries), []
         return entries
@@ -200,7 +200,7 @@ class RunTasks:
     def _begin(self, course: _Course, by: str) -> None:
         task = course.spec.task
         course.begun = True
-        if isinstance(task, TakeOver):
+        if isinstance(task, TakeOverPrompt):
             course.number += 1
             self._note(course, 'request', course.number, by)
             course.prompt = OpenPrompt(course.spec.name, course.seat, course.number, self._n)
@@ -234,7 +234,7 @@ class RunTasks:
             course.prompt = OpenPrompt(course.spec.name, course.seat, course.number, self._n)
             self._note(course, 'stimulus', course.number)
 
-    def _request(self, course: _Course, task: TakeOver, driven: bool) -> None:
+    def _request(self, course: _Course, task: TakeOverPrompt, driven: bool) -> None:
         autonomous = course.seat not in {human.id for human in self._setup.humans}
         if autonomous and driven:
             self._close(course, 'over', 'driven')

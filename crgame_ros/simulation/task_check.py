@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import AtTime, Between, EventSpec, Near
-from crgame_ros.game.task_spec import OnEvent, TakeOver, TaskSpec
+from crgame_ros.game.task_spec import OnEvent, TakeOverPrompt, TaskSpec
 
 
 def task_seat(spec: TaskSpec, vehicles: Sequence[str]) -> str:
@@ -56,7 +56,7 @@ def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: s
                 if name not in (*vehicles, *objects):
                     raise InputError(f'there is no vehicle or object "{name}"', place,
                                      _listed(vehicles))
-        if isinstance(spec.task, TakeOver) and spec.task.before is not None:
+        if isinstance(spec.task, TakeOverPrompt) and spec.task.before is not None:
             _check_event(spec.task.before, by_name, place)
             _check_lead(spec, spec.task, by_name[spec.task.before], place)
 
@@ -66,7 +66,7 @@ def _check_event(name: str, events: dict[str, EventSpec], place: str) -> None:
         raise InputError(f'there is no event "{name}"', place, _listed(list(events)))
 
 
-def _check_lead(spec: TaskSpec, task: TakeOver, event: EventSpec, place: str) -> None:
+def _check_lead(spec: TaskSpec, task: TakeOverPrompt, event: EventSpec, place: str) -> None:
     """Refuse a request that would have to come before the run."""
     if spec.when is None and isinstance(event.when, AtTime) and event.when.time < task.lead:
         raise InputError(f'"{event.name}" is at {event.when.time:g} s, before the lead of '
