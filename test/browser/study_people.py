@@ -82,7 +82,7 @@ class StudySession:
 
     def __init__(self, file: Path, out: Path, participant: str, port: int) -> None:
         self.command = [sys.executable, '-m', 'crgame_ros.cli', 'study', 'run', str(file),
-                         '--participant', participant, '--out', str(out), '--port', str(port)]
+                        '--participant', participant, '--out', str(out), '--port', str(port)]
         self.folder = out / 'participants' / participant
         self.answers: dict[str, Any] = {}
         # (name, run's clock as the page shows it, of what was sent at that moment) [s]
