@@ -58,7 +58,8 @@ export class PadNavigation {
   /** @param {PadOrder} order */
   #take(order) {
     const root = this.#drive.hidden ? this.#sheet : this.#drive;
-    if (document.querySelector('dialog[open]') || root.querySelector('.device-check:not([data-complete])')) {
+    if (document.querySelector('dialog[open]')
+        || root.querySelector('.device-check:not([data-complete])')) {
       return;
     }
     const stops = [...root.querySelectorAll(STOPS)].filter(

@@ -54,7 +54,8 @@ export class QuestionView {
       question.required ? null
         : element('span', { class: 'optional', text: ` (${words.of('optional')})` })];
     this.node = single
-      ? element('div', { class: 'question', 'data-kind': question.kind, 'data-name': question.name },
+      ? element('div', { class: 'question', 'data-kind': question.kind,
+        'data-name': question.name },
         element('label', { class: 'legend', for: inputs[0].id }, ...ask), node, this.#problem)
       : element('fieldset', { class: 'question', 'data-kind': question.kind,
         'data-name': question.name, 'aria-describedby': `${id}-problem` },
@@ -163,7 +164,8 @@ function choice({ several, choices }, words, id, changed) {
   const options = choices.map(([name, label]) => option(
     several ? 'checkbox' : 'radio', id, name, label, changed));
   const list = element('div', { class: 'options choices' }, ...options.map(({ node }) => node));
-  const chosen = () => options.filter(({ input }) => input.checked).map(({ input }) => input.value);
+  const chosen = () => options.filter(({ input }) => input.checked)
+    .map(({ input }) => input.value);
   return {
     node: several ? element('div', {}, element('p', { class: 'hint', text: words.of('several') }),
       list) : list,
