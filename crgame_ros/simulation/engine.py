@@ -14,12 +14,12 @@
 # limitations under the License.
 """The simulation engine that both runners drive (CRG algorithms 1 and 2)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import hashlib
 from itertools import chain
 from struct import Struct
-from typing import NamedTuple, TypeGuard
+from typing import NamedTuple
 
 from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
@@ -35,13 +35,12 @@ from crgame_ros.simulation.av_models import (
     make_vehicle_model,
     published,
 )
-from crgame_ros.simulation.contact_stop import at_rest, ContactStop
 from crgame_ros.simulation.plan_requests import PlanRequests
-from crgame_ros.simulation.put_back import PutBack
 from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.run_tasks import RunTasks
 from crgame_ros.simulation.setup import AvSetup, Setup
+from crgame_ros.simulation.stopped_drivers import StoppedDrivers
 from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
@@ -124,10 +123,8 @@ class Simulation:
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
         self._driven = (*self.humans, *self.avs)
-        stops = setup.game.drivability.contact == 'stop'
-        self._contact_stop = ContactStop(setup) if stops else None
-        self._put_back = PutBack(setup)
-        self._own_events: tuple[FiredEvent, ...] = ()
+        self._stopped = StoppedDrivers(setup, self._driven) \
+            if setup.game.drivability.contact == 'stop' else None
         self._av_by_id = {av.setup.id: av for av in self.avs}
         self._hash = hashlib.sha256()
         self._packed = Struct(f'{STATE_WIDTH * len(self.commands)}d').pack
@@ -215,7 +212,8 @@ class Simulation:
     def fired(self) -> tuple[FiredEvent, ...]:
         """All events that have taken effect so far."""
         of_game = () if self._events is None else self._events.fired
-        return tuple(sorted((*self._own_events, *of_game), key=lambda event: event.n))
+        own = () if self._stopped is None else self._stopped.events
+        return tuple(sorted((*own, *of_game), key=lambda event: event.n))
 
     def step(self, dt_eff_s: float, commands: Sequence[DriverCommand | None]) -> StepResult:
         """
@@ -235,7 +233,7 @@ class Simulation:
         Parameters are those of `step`. Whoever drives can be shown what became of it before
         planners' requests are made, which takes ten times as long.
         """
-        before = self.states if self._contact_stop is not None else []
+        before = self.states if self._stopped is not None else []
         self.n += 1
         seats = len(self.humans) + len(self.avs)
         self.commands = [command and command.rounded() for command in commands]
@@ -247,44 +245,15 @@ class Simulation:
                 av.advance(self.n)
             else:
                 av.drive(command, dt_eff_s)
-        if self._contact_stop is not None:
-            self._stop_who_touched(self._contact_stop, before)
-
-    def _stop_who_touched(self, contacts: ContactStop, before: Sequence[VehicleState]) -> None:
-        """Let persons' vehicles stand that have driven into something; traces go on."""
-        since_tick = (self.n - 1) % self.scheduler.steps_per_tick + 1
-        if since_tick == 1:
-            contacts.set_objects(self._world.objects)
-        for index, other in contacts.stopped(
-                since_tick * self.scheduler.dt_s, before, self.states):
-            driven = self._driven[index]
-            if _has_driver(driven):
-                driven.stand(at_rest(before[index], driven.state))
-                if self._put_back.note(index, driven.state):
-                    self._tell(FiredEvent.contact, self.setup.vehicle_ids[index], other)
-        for index, command in enumerate(self.commands):
-            if command is not None and command.put_back:
-                self._put_on_lane(index, since_tick * self.scheduler.dt_s)
-
-    def _put_on_lane(self, index: int, since_tick_s: float) -> None:
-        """Put a vehicle back that a contact has stopped, if there is room."""
-        driven = self._driven[index]
-        if not _has_driver(driven):
-            return
-        place = self._put_back.place(index, since_tick_s, self.states, self._world.objects)
-        if place is not None:
-            driven.stand(place)
-            self._tell(FiredEvent.put_back, self.setup.vehicle_ids[index])
-
-    def _tell(self, make: Callable[..., FiredEvent], *ids: str) -> None:
-        self._own_events += (make(*ids, self.n, self.scheduler.k(self.n)),)
+        if self._stopped is not None:
+            self._stopped.act(self.n, before, self.commands, self._world.objects)
 
     def conclude(self) -> StepResult:
         """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
         result = self._result()
         self._add_to_hash()
-        own = tuple(event for event in self._own_events if event.n == self.n)
+        own = () if self._stopped is None else self._stopped.events_at(self.n)
         return result._replace(fired=(*own, *result.fired)) if own else result
 
     def _result(self) -> StepResult:
@@ -349,13 +318,6 @@ class Simulation:
     def state_hash(self) -> str:
         """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""
         return self._hash.hexdigest()
-
-
-def _has_driver(driven: HumanVehicle | TracedVehicle | AutonomousVehicle
-                ) -> TypeGuard[HumanVehicle | AutonomousVehicle]:
-    """Tell whether a person drives a vehicle now; traces go on, and so do plans."""
-    return isinstance(driven, HumanVehicle) or (
-        isinstance(driven, AutonomousVehicle) and driven.driven)
 
 
 def _road_limit(setup: Setup, av: AvSetup) -> RoadLimit | None:
