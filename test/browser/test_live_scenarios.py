@@ -138,23 +138,3 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
     page.wait('crgame.world.shown.vehicles[3] > arguments[0] + 1', 'a faster car', speed)
     page.release('w')
     assert page.browser.console_errors() == []
-
-
-def test_an_upload_is_deleted_after_a_question(page: LivePage) -> None:
-    """Its bin asks first; who keeps it has it still, and then it is gone for good."""
-    page.tab('scenario')
-    row = '#panel-scenario [data-action="delete"]'
-    page.wait('document.querySelectorAll(arguments[0]).length === 1', 'the upload', row)
-    page.click(row)
-    page.click('dialog.confirm[open] .drive-button:not(.danger)')
-    page.wait('!document.querySelector("dialog.confirm[open]")')
-    assert page.run('return document.querySelectorAll(arguments[0]).length', row) == 1
-    page.click(row)
-    page.click('dialog.confirm[open] .danger')
-    page.wait('document.querySelectorAll(arguments[0]).length === 0', 'it to be gone', row)
-    page.run('location.reload();')
-    page.open()
-    page.tab('scenario')
-    page.wait('document.querySelector("button.scenario")', 'the list')
-    assert page.run('return document.querySelectorAll(arguments[0]).length', row) == 0
-    assert page.browser.console_errors() == []
