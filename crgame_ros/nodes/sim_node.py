@@ -104,7 +104,9 @@ class SimNode(Node):
             self._control.reset_wanted = False
             self._control.steps_wanted = 0
             before, setup = setup, self._next_setup(setup)
-            again = simulation.n > 0 and setup.game == before.game and self._all_sit(setup)
+            again = simulation.n > 0 and setup.game == before.game \
+                and not self._control.chosen_anew and self._all_sit(setup)
+            self._control.chosen_anew = False
             epoch += 1
             self._write_game(setup.game, epoch)
             offset_ns = (now_ns // NS_PER_S + 2) * NS_PER_S

@@ -57,6 +57,8 @@ class SimControl:
         self.over = False
         # Somebody has chosen a game or scenario since the start.
         self.chosen_later = False
+        # Since the last reset: who chooses a game, be it the same one, says when it begins.
+        self.chosen_anew = False
         # Somebody has said start since the last reset.
         self.started = False
         # Seats whose driver must come before the run begins.
@@ -247,6 +249,7 @@ class SimControl:
 
     def _after_parameters(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:
+            self.chosen_anew |= parameter.name in ('game', 'scenario')
             if parameter.name == 'real_time_factor':
                 self.real_time_factor = float(parameter.value)
 
