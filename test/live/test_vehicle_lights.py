@@ -80,18 +80,19 @@ def test_lights_are_recorded_and_change_no_motion(tmp_path: Path) -> None:
     cycles = read_cycles(bag)
     lights = cycles.commands('hv0')[:, 4]
     # The planner asks for them: each request says what they are at its time.
-    shown = dict(zip(cycles.column('stamp_ns').tolist(), lights.tolist(), strict=True))
+    log = read_run_log(bag)
+    shown = dict(zip(cycles.column('n').tolist(), lights.tolist(), strict=True))
     with BagReader(bag) as reader:
         requests = [from_joint_trajectory(item.message, item.topic)
                     for item in reader.decoded(['/av0/plan_request'])]
-    asked = {each.stamp_ns: each.positions[0, each.names.index('hv0/lights')]
-             for each in requests}
+    asked = {log.game.scheduler.tick_of_stamp(each.stamp_ns):
+             each.positions[0, each.names.index('hv0/lights')] for each in requests}
     assert len(asked) >= 10 and set(asked.values()) >= {1.0, 2.0, 4.0}
-    assert asked == {stamp_ns: shown[stamp_ns] for stamp_ns in asked}
+    assert asked == {n: shown.get(n, 0.0) for n in asked}
     places = np.flatnonzero(np.diff(lights)) + 1
     assert [each['n'] for each in told][-len(places):] == cycles.column('n')[places].tolist()
 
-    exported = export_scenario(read_run_log(bag))
+    exported = export_scenario(log)
     (tmp_path / 'run.xml').write_text(exported.xml_text)
     scenario, _ = CommonRoadFileReader(str(tmp_path / 'run.xml')).open()
     obstacle = scenario.obstacle_by_id(exported.obstacle_ids['hv0'])
