@@ -18,7 +18,7 @@ The other end of `job_process`: a process that answers jobs until its standard i
 Reading can take seconds and much memory; the process that serves the page, and may carry
 somebody's hands on the wheel, has neither. Jobs are JSON objects, one a line, with the name of the
 `job`, a `path` and further arguments; each is answered on the standard output, with one of
-`Outcome`.
+`JobOutcome`.
 """
 
 from collections.abc import Callable, Mapping
@@ -47,7 +47,7 @@ MOST_CPU_S = 20.0
 Job = Callable[..., dict[str, Any]]
 
 
-class Outcome(IntEnum):
+class JobOutcome(IntEnum):
     """What became of a job; after one that was given up the process is to be ended."""
 
     REFUSED = 0
@@ -94,16 +94,16 @@ def _answer(jobs: Mapping[str, Job], job: dict[str, Any], answers: BinaryIO,
             result = jobs[job.pop('job')](path, **job)
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
-        outcome, text = Outcome.DONE, json.dumps(result, allow_nan=False, separators=(',', ':'))
+        outcome, text = JobOutcome.DONE, json.dumps(result, allow_nan=False, separators=(',', ':'))
     except CrgameError as error:
         # Names of folders on this machine are nobody's business.
-        outcome = Outcome.GIVEN_UP if isinstance(error, _GivenUpError) else Outcome.REFUSED
+        outcome = JobOutcome.GIVEN_UP if isinstance(error, _GivenUpError) else JobOutcome.REFUSED
         text = str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
     except (MemoryError, RecursionError):
-        outcome, text = Outcome.GIVEN_UP, f'the {subject} is too large to be read'
+        outcome, text = JobOutcome.GIVEN_UP, f'the {subject} is too large to be read'
     except Exception:
         traceback.print_exc()
-        outcome = Outcome.REFUSED
+        outcome = JobOutcome.REFUSED
         text = f'the {subject} cannot be read; the log of the server says why'
     data = text.encode('utf-8', 'replace')
     answers.write(HEADER.pack(outcome, len(data)) + data)

@@ -103,7 +103,6 @@ class PlannerRegistry(ModelRegistry):
                              'give the class an attribute `name`')
         return found
 
-
     def wants_lights(self, name: str) -> bool:
         """
         Tell whether a planner asks for others' lights.
