@@ -17,11 +17,13 @@ The other end of `job_process`: a process that answers jobs until its standard i
 
 Reading can take seconds and much memory; the process that serves the page, and may carry
 somebody's hands on the wheel, has neither. Jobs are JSON objects, one a line, with the name of the
-`job`, a `path` and further arguments; each is answered on the standard output.
+`job`, a `path` and further arguments; each is answered on the standard output, with one of
+`JobOutcome`.
 """
 
 from collections.abc import Callable, Mapping
 import contextlib
+from enum import IntEnum
 import json
 import os
 from pathlib import Path
@@ -35,13 +37,26 @@ from typing import Any, BinaryIO
 
 from crgame_ros.errors import CrgameError
 
-HEADER = struct.Struct('<?Q')
+HEADER = struct.Struct('<BQ')
 _MAX_MEMORY = 4 * 2 ** 30
 _NICE = 10
-# Of the processor's time that one job may take [s]: of 60,000 lanelets a preview takes 35 s.
+# Of the processor's time that one job may take [s]. The preview of a map of 50,000 lanelets, the
+# most that the guard lets through, would take 33 s and 1.4 GB (docs/measurements.md).
 MOST_CPU_S = 20.0
 
 Job = Callable[..., dict[str, Any]]
+
+
+class JobOutcome(IntEnum):
+    """What became of a job; after one that was given up the process is to be ended."""
+
+    REFUSED = 0
+    DONE = 1
+    GIVEN_UP = 2
+
+
+class _GivenUpError(CrgameError):
+    """A job has taken more of the processor than it may."""
 
 
 def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_CPU_S) -> None:
@@ -54,8 +69,8 @@ def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_C
     :param most_cpu_s: after which a job is given up [s].
     """
     def give_up(_number: int, _frame: FrameType | None) -> None:
-        raise CrgameError(f'the {subject} takes more than {most_cpu_s:g} s to read; choose a '
-                          'smaller one')
+        raise _GivenUpError(f'the {subject} takes more than {most_cpu_s:g} s to read; choose a '
+                            'smaller one')
 
     signal.signal(signal.SIGPROF, give_up)
     # Ctrl-C is for the server, which closes the standard input when it ends.
@@ -79,15 +94,17 @@ def _answer(jobs: Mapping[str, Job], job: dict[str, Any], answers: BinaryIO,
             result = jobs[job.pop('job')](path, **job)
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
-        ok, text = True, json.dumps(result, allow_nan=False, separators=(',', ':'))
+        outcome, text = JobOutcome.DONE, json.dumps(result, allow_nan=False, separators=(',', ':'))
     except CrgameError as error:
         # Names of folders on this machine are nobody's business.
-        ok, text = False, str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
+        outcome = JobOutcome.GIVEN_UP if isinstance(error, _GivenUpError) else JobOutcome.REFUSED
+        text = str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
     except (MemoryError, RecursionError):
-        ok, text = False, f'the {subject} is too large to be read'
+        outcome, text = JobOutcome.GIVEN_UP, f'the {subject} is too large to be read'
     except Exception:
         traceback.print_exc()
-        ok, text = False, f'the {subject} cannot be read; the log of the server says why'
+        outcome = JobOutcome.REFUSED
+        text = f'the {subject} cannot be read; the log of the server says why'
     data = text.encode('utf-8', 'replace')
-    answers.write(HEADER.pack(ok, len(data)) + data)
+    answers.write(HEADER.pack(outcome, len(data)) + data)
     answers.flush()

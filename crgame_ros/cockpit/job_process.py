@@ -23,10 +23,9 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from crgame_ros.cockpit.job_loop import HEADER, JobOutcome
 from crgame_ros.errors import CrgameError, InputError
 
-# Kept apart: jobs import CommonRoad, which the server's process may not need.
-_HEADER_BYTES = 9
 MAX_QUEUED = 8
 TIMEOUT_S = 60.0
 # Between two looks at whether somebody still waits [s].
@@ -94,8 +93,9 @@ class JobProcess:
         done = False
         try:
             async with asyncio.timeout(self._timeout_s):
-                ok, answer = await self._wanted(job, unwanted)
-            done = True
+                outcome, answer = await self._wanted(job, unwanted)
+            # What was given up leaves half a gigabyte behind.
+            done = outcome is not JobOutcome.GIVEN_UP
         except TimeoutError as error:
             raise CrgameError(f'the {self._subject} takes more than {self._timeout_s:g} s to '
                               'read; choose a smaller one') from error
@@ -105,12 +105,12 @@ class JobProcess:
         finally:
             if not done:
                 await self.close()
-        if not ok:
+        if outcome is not JobOutcome.DONE:
             raise InputError(answer.decode('utf-8', 'replace'))
         return answer
 
     async def _wanted(self, job: dict[str, Any],
-                      unwanted: Callable[[], bool]) -> tuple[bool, bytes]:
+                      unwanted: Callable[[], bool]) -> tuple[JobOutcome, bytes]:
         """Exchange a job for its answer as long as somebody waits for that."""
         exchange = asyncio.create_task(self._exchange(json.dumps(job).encode() + b'\n'))
         try:
@@ -121,14 +121,13 @@ class JobProcess:
         finally:
             exchange.cancel()
 
-    async def _exchange(self, line: bytes) -> tuple[bool, bytes]:
+    async def _exchange(self, line: bytes) -> tuple[JobOutcome, bytes]:
         process = await self._running()
         assert process.stdin is not None and process.stdout is not None
         process.stdin.write(line)
         await process.stdin.drain()
-        header = await process.stdout.readexactly(_HEADER_BYTES)
-        answer = await process.stdout.readexactly(int.from_bytes(header[1:], 'little'))
-        return header[0] == 1, answer
+        outcome, size = HEADER.unpack(await process.stdout.readexactly(HEADER.size))
+        return JobOutcome(outcome), await process.stdout.readexactly(size)
 
     async def _running(self) -> asyncio.subprocess.Process:
         process = self._process

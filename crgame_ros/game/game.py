@@ -166,6 +166,8 @@ class AvSpec:
     :param tracker: the controller of a tracked AV.
     :param dynamics: the vehicle model of a tracked AV (FS 2).
     :param perception: how it perceives the world; None is perfectly.
+    :param lights: whether its planner is told of others' indicators and horn; None is as the
+        planner's class says.
     """
 
     FORM: ClassVar[Form] = _SEE
@@ -180,6 +182,7 @@ class AvSpec:
     tracker: TrackerSpec = TrackerSpec()
     dynamics: ModelSpec = ModelSpec('dynamic-bicycle')
     perception: PerceptionSpec | None = None
+    lights: bool | None = None
 
     @property
     def localisation_steers(self) -> bool:

@@ -19,9 +19,11 @@ Poses of the ego are rear-axle poses, those of obstacles are centre poses, all i
 scenario frame.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from crgame_ros.errors import InputError
+from crgame_ros.vehicle.lights import Light
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +41,8 @@ class PlanRequest:
     :param obstacle_ids: (M) names; keys of `PlannerContext.objects`.
     :param obstacle_poses: (P, M, 3) centre x, y, yaw at k, k + 1, …; NaN where absent.
     :param obstacle_velocities: (P, M, 3) derivatives of the poses; NaN where absent.
+    :param lights: what other driven vehicles show and sound now, by their ids; those that are
+        seen, for a planner that wants them (`Planner.wants_lights`), else empty.
     """
 
     stamp_ns: int
@@ -49,6 +53,7 @@ class PlanRequest:
     obstacle_poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((1, 0, 3)))
     obstacle_velocities: NDArray[np.float64] = field(
         default_factory=lambda: np.empty((1, 0, 3)))
+    lights: Mapping[str, Light] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import JointSeries, vehicle_to_joints, without_absent
 from crgame_ros.messages.request_layout import RequestLayout
+from crgame_ros.messages.request_lights import with_lights, without_lights
 from crgame_ros.occupancy.occupancy import OccupancyGrid, OccupancyMap
 from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.localisation import Localisation
@@ -162,11 +163,12 @@ class Perception:
         :return: the same times. The AV itself is where it takes itself to be; objects that are
             neither seen nor remembered are left out, driven vehicles are NaN then; all others are
             where they were seen, moved on. Their steering angles and accelerations are not
-            observable: NaN.
+            observable: NaN. So are lights of who is remembered only.
         :raises InputError: if it names something that was not described.
         """
         if self._localisation is None and not self._sensors:
             return request
+        request, lights = without_lights(request)
         arrays = [request.positions.copy(), request.velocities.copy(),
                   request.accelerations.copy()]
         if self._localisation is not None:
@@ -175,8 +177,18 @@ class Perception:
                 array[0, :4] = values
         if self._sensors:
             self._fill(request, *arrays)
-        return without_absent(JointSeries(
+        told = without_absent(JointSeries(
             request.stamp_ns, request.names, request.times_ns, *arrays), self._vehicles)
+        return with_lights(told, self._in_view(lights)) if lights else told
+
+    def _in_view(self, lights: dict[str, float]) -> dict[str, float]:
+        """Keep the lights of whom the last scans saw; of others they are NaN."""
+        if not self._sensors:
+            return lights
+        # Known even if nothing were remembered.
+        in_view = self._tracks.known(self._n + self._memory)
+        return {name: bits if in_view[self._ids.index(name)] else math.nan
+                for name, bits in lights.items()}
 
     def _scan(self, n: int, firing: Sequence[MountedSensor], vehicle_states: Array,
               object_poses: Array, object_velocities: Array) -> None:

@@ -75,9 +75,12 @@ class Planner(ABC):
 
     Options from the game file arrive as keyword arguments of the constructor; unknown ones
     must raise `InputError`, which a signature without `**kwargs` does through the registry.
+
+    A class that sets `wants_lights` is told of others' indicators and horn (`PlanRequest.lights`).
     """
 
     name: ClassVar[str]
+    wants_lights: ClassVar[bool] = False
 
     @abstractmethod
     def setup(self, context: PlannerContext) -> None:

@@ -103,6 +103,21 @@ class PlannerRegistry(ModelRegistry):
                              'give the class an attribute `name`')
         return found
 
+    def wants_lights(self, name: str) -> bool:
+        """
+        Tell whether a planner asks for others' lights.
+
+        One that cannot be found asks for nothing: who is to make it says why it cannot be.
+        """
+        if name not in self._given and (
+                name in BUILT_IN or name == EXTERNAL or name.startswith(POLICY)):
+            # None of ours does, and the packages behind some cost seconds to import.
+            return False
+        try:
+            return self.find(name).wants_lights
+        except InputError:
+            return False
+
 
 PLANNERS = PlannerRegistry()
 

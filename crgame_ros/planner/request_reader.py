@@ -23,6 +23,7 @@ from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.messages.joints import JointSeries, vehicles_from_joints
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.messages.request_layout import RequestLayout
+from crgame_ros.messages.request_lights import light_columns, light_of
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
@@ -45,6 +46,7 @@ class RequestReader:
         self._ids: tuple[str, ...] = ()
         self._columns = np.empty((0, 3), dtype=np.intp)
         self._to_center = np.empty(0)
+        self._lights: dict[str, int] = {}
 
     def read(self, series: JointSeries) -> PlanRequest:
         """
@@ -69,9 +71,12 @@ class RequestReader:
             rear, reach = poses[:, driven], self._to_center[driven]
             poses[:, driven] = shifted(rear, reach)
             velocities[:, driven] = shifted_velocities(rear[..., 2], velocities[:, driven], reach)
+        shown = ((name, light_of(float(series.positions[0, column])))
+                 for name, column in self._lights.items())
         return PlanRequest(
             series.stamp_ns, self._scheduler.k(tick), self._scheduler.time_step_s,
-            VehicleState(*ego.tolist()), self._ids, poses, velocities)
+            VehicleState(*ego.tolist()), self._ids, poses, velocities,
+            {name: light for name, light in shown if light is not None})
 
     def _learn(self, names: tuple[str, ...]) -> None:
         """Find out which columns hold which object; the joints stay the same over a run."""
@@ -80,4 +85,5 @@ class RequestReader:
         self._ids, self._columns = layout.ids, layout.columns
         self._to_center = np.array([self._objects[object_id].rear_to_center
                                     for object_id in layout.ids])
+        self._lights = light_columns(names)
         self._names = names

@@ -139,6 +139,11 @@ class Simulation:
         """States of the driven vehicles at n: humans, then AVs; simulation coordinates."""
         return [driven.state for driven in self._driven]
 
+    @property
+    def lights(self) -> list[int]:
+        """Bits of `Light` that each driven vehicle shows at n; an AV by itself shows none."""
+        return [0 if command is None else command.lights for command in self.commands]
+
     def begin(self) -> StepResult:
         """Give the requests and objects of step 0, before anything has moved."""
         self._localise()
@@ -276,7 +281,7 @@ class Simulation:
                 k, self.n, states, self.avs, objects, self._world.changed)
             stamp_ns = self.scheduler.stamp_ns(self.n)
             for av in asking:
-                request = self._requests.build(av.setup, stamp_ns, states, forecast)
+                request = self._requests.build(av.setup, stamp_ns, states, forecast, self.lights)
                 av.request_sent(self.n, stamp_ns, ego_of(request))
                 requests[av.setup.id] = request
         return StepResult(self.n, k, True, requests, objects, fired, self._world.agents_k,

@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 
+from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.messages.joints import (
     JointSeries,
@@ -24,6 +25,8 @@ from crgame_ros.messages.joints import (
     vehicle_to_joints,
     without_absent,
 )
+from crgame_ros.messages.request_lights import with_lights
+from crgame_ros.planner.planner_registry import PLANNERS
 from crgame_ros.scenario.courses import ObstacleCourses
 from crgame_ros.scenario.prediction import (
     LanePrediction,
@@ -85,6 +88,8 @@ class PlanRequests:
             self._order[av.id] = order
             names = [name for index in order for name in vehicle_joint_names(ids[index])]
             self._names[av.id] = (*names, *object_names)
+        self._ids = ids
+        self._lit = {av.id for av in setup.avs if _is_told_lights(setup, av)}
 
     def forecast(self, k: int, n: int, states: list[VehicleState],
                  avs: list[AutonomousVehicle], objects: ObjectStates,
@@ -127,12 +132,14 @@ class PlanRequests:
                                  state.yaw_rate)
 
     def build(self, av: AvSetup, stamp_ns: int, states: list[VehicleState],
-              forecast: Forecast) -> JointSeries:
+              forecast: Forecast, lights: Sequence[int]) -> JointSeries:
         """
         Pack the request of one AV, in its scenario coordinates.
 
         Point 0 is now; the AV itself is present in point 0 only. Objects that are nowhere are left
         out. Accelerations are known of driven vehicles in point 0, elsewhere they are NaN.
+
+        :param lights: bits of `Light` that each driven vehicle shows now, for who asks for them.
         """
         order = self._order[av.id]
         vehicles = len(order)
@@ -158,7 +165,19 @@ class PlanRequests:
         series = JointSeries(stamp_ns, self._names[av.id], self._times_ns,
                              positions, velocities, accelerations)
         # Who perceives may remember what is gone.
-        return series if av.spec.perception else without_absent(series, vehicles)
+        if not av.spec.perception:
+            series = without_absent(series, vehicles)
+        return series if av.id not in self._lit else with_lights(
+            series, {self._ids[index]: lights[index] for index in order[1:]})
+
+
+def _is_told_lights(setup: Setup, av: AvSetup) -> bool:
+    """Tell whether an AV's planner, or one that an event brings in, asks for others' lights."""
+    if av.spec.lights is not None:
+        return av.spec.lights
+    swaps = [event.action for event in setup.game.events if isinstance(event.action, PlannerSwap)]
+    names = {av.spec.planner, *(swap.planner for swap in swaps if swap.av == av.id)}
+    return any(map(PLANNERS.wants_lights, sorted(names)))
 
 
 def _to_scenario(av: AvSetup, vehicles: int, positions: Poses, velocities: Poses,

@@ -399,7 +399,7 @@ async def test_a_folder_that_is_gone_or_holds_anything_is_no_error(tmp_path: Pat
 
 @in_loop
 async def test_a_scenario_that_takes_much_of_the_processor_is_given_up(tmp_path: Path) -> None:
-    """In its own process, which then reads the next one."""
+    """Its process is ended, and with it what it has read; another reads the next one."""
     (tmp_path / 'slow.py').write_text(
         'from crgame_ros.cockpit import job_loop\n'
         'def spin(path):\n'
@@ -410,7 +410,10 @@ async def test_a_scenario_that_takes_much_of_the_processor_is_given_up(tmp_path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv('PYTHONPATH', str(tmp_path))
         reader = JobProcess('slow', 'scenario')
+        await reader.start()
+        given_up = reader._process
         with pytest.raises(InputError, match=r'takes more than 0\.2 s to read'):
             await reader.run('spin', path='/x')
+        assert given_up is not None and given_up.returncode is not None
         assert await reader.run('name', path='/a/b.xml') == b'{"name":"b.xml"}'
         await reader.close()

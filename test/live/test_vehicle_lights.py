@@ -19,6 +19,7 @@ from pathlib import Path
 
 from commonroad.common.file_reader import CommonRoadFileReader
 from crgame_ros.game.game_file import load_game
+from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.recording.export import export_scenario
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
@@ -47,6 +48,8 @@ def _game(folder: Path, name: str, keys: str) -> Path:
     game = yaml.safe_load((SCENARIOS / 'cut_in.yaml').read_text())
     game['scenario'] = str(SCENARIOS / game['scenario'])
     game['humans'][0]['driver'] = f'keys:{name}.keys.yaml'
+    if name == 'lit':
+        game['avs'][0]['lights'] = True
     (folder / f'{name}.keys.yaml').write_text(keys)
     path = folder / f'{name}.yaml'
     path.write_text(yaml.safe_dump(game))
@@ -76,10 +79,20 @@ def test_lights_are_recorded_and_change_no_motion(tmp_path: Path) -> None:
 
     cycles = read_cycles(bag)
     lights = cycles.commands('hv0')[:, 4]
+    # The planner asks for them: each request says what they are at its time.
+    log = read_run_log(bag)
+    shown = dict(zip(cycles.column('n').tolist(), lights.tolist(), strict=True))
+    with BagReader(bag) as reader:
+        requests = [from_joint_trajectory(item.message, item.topic)
+                    for item in reader.decoded(['/av0/plan_request'])]
+    asked = {log.game.scheduler.tick_of_stamp(each.stamp_ns):
+             each.positions[0, each.names.index('hv0/lights')] for each in requests}
+    assert len(asked) >= 10 and set(asked.values()) >= {1.0, 2.0, 4.0}
+    assert asked == {n: shown.get(n, 0.0) for n in asked}
     places = np.flatnonzero(np.diff(lights)) + 1
     assert [each['n'] for each in told][-len(places):] == cycles.column('n')[places].tolist()
 
-    exported = export_scenario(read_run_log(bag))
+    exported = export_scenario(log)
     (tmp_path / 'run.xml').write_text(exported.xml_text)
     scenario, _ = CommonRoadFileReader(str(tmp_path / 'run.xml')).open()
     obstacle = scenario.obstacle_by_id(exported.obstacle_ids['hv0'])

@@ -272,7 +272,7 @@ class SimOutputs:
                 String(data=json.dumps({'k': k, 'states': states})))
 
     def _publish_lights(self, simulation: Simulation) -> None:
-        lights = [command.lights if command else 0 for command in simulation.commands]
+        lights = simulation.lights
         if lights != self._vehicle_lights:
             self._vehicle_lights = lights
             self._latched['/vehicles/signals'].publish(String(data=signals_document(
