@@ -144,11 +144,13 @@ function calibrated(rest, moves) {
 }
 
 test('calibrating a wheel: each step ends by itself with what was moved', () => {
-  const run = calibrated({ axes: [0.02, 0, 1, 1], buttons: [0, 0, 0, 0, 0] }, [
+  const run = calibrated({ axes: [0.02, 0, 1, 1], buttons: [0, 0, 0, 0, 0, 0] }, [
     ['left', 'axes', 0, -0.9], ['right', 'axes', 0, 0.95], ['throttle', 'axes', 2, -1],
     ['brake', 'axes', 3, -0.8], ['reverse', 'buttons', 1, 1], ['left_indicator', 'buttons', 2, 1],
-    ['right_indicator', 'buttons', 3, 1], ['hazard', 'buttons', 4, 1], ['horn', 'buttons', 0, 1]]);
+    ['right_indicator', 'buttons', 3, 1], ['hazard', 'buttons', 4, 1], ['horn', 'buttons', 0, 1],
+    ['put_back', 'buttons', 5, 1]]);
   assert.equal(run.step, 'test');
+  assert.deepEqual(run.profile.put_back, [5]);
   // Button 3 was the hazard lights' by default, and does one thing alone now.
   assert.deepEqual(run.profile.lights,
     { left_indicator: [2], right_indicator: [3], hazard: [4], horn: [0] });
@@ -214,7 +216,7 @@ test('skipping keeps what was there', () => {
   const run = new CalibrationRun(before);
   run.feed({ axes: [0, 1, 1], buttons: [] }, 0);
   run.next();
-  for (let i = 0; i < 8; i += 1) {
+  for (let i = 0; i < 9; i += 1) {
     run.skip();
   }
   assert.equal(run.step, 'test');
