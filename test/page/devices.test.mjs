@@ -6,6 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { CalibrationRun } from '../../crgame_ros/cockpit/page/js/driving/calibration_run.js';
+import { PutBackNotice } from '../../crgame_ros/cockpit/page/js/driving/put_back_notice.js';
 import {
   defaultProfile, gearAfter, keepProfiles, loadProfile, pedalValue, rawValue, saveProfile,
   steeringValue,
@@ -221,4 +222,30 @@ test('skipping keeps what was there', () => {
   }
   assert.equal(run.step, 'test');
   assert.deepEqual(run.profile, before);
+});
+
+test('who asks in vain to be put back is told so, once', (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  /** @type {string[]} */
+  const told = [];
+  const stop = { name: 'contact of hv0 with o1', n: 5, k: 1, by: 'contact' };
+  const back = { name: 'put back hv0', n: 9, k: 1, by: 'driver' };
+  const store = /** @type {any} */ ({ fired: [], status: { run: 'running' },
+    receive: (/** @type {{text: string}} */ message) => told.push(message.text) });
+  const notice = new PutBackNotice(store);
+  /** @param {object[]} before @param {object[]} after what has happened when it asks, and then */
+  const ask = (before, after) => {
+    store.fired = before;
+    notice.take('hv0', true);
+    notice.take('hv0', true);
+    store.fired = after;
+    t.mock.timers.tick(2000);
+    notice.take('hv0', false);
+    return told.splice(0).length;
+  };
+  assert.equal(ask([], []), 0);
+  assert.equal(ask([stop], [stop]), 1);
+  assert.equal(ask([stop], [stop, back]), 0);
+  assert.equal(ask([stop, back], [stop, back]), 0);
+  assert.equal(ask([{ ...stop, name: 'contact of hv1 with hv0' }], []), 0);
 });
