@@ -9,4 +9,5 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=scripts/env.sh
 source "$root/scripts/env.sh"
 # Replaced by the launcher, so that whoever kills this process reaches the one that owns the nodes.
-exec "$CRGAME_PYTHON" -m crgame_ros.launcher.main "$@"
+# Ctrl-C is held back until the launcher listens: Python's own start answers it with a traceback.
+exec env --block-signal=INT "$CRGAME_PYTHON" -m crgame_ros.launcher.main "$@"

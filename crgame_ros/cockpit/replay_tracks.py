@@ -186,6 +186,7 @@ class TrackCollector:
             if key not in self._fired:
                 self._fired.add(key)
                 self._marks.add(event.n, 'trigger', event.name, f'by {event.by}')
+        self._status.take_events(fired, self._scheduler.dt_s)
         self._put('events', max((event.n for event in fired), default=newest),
                   {'fired': [asdict(event) for event in fired]})
 

@@ -19,11 +19,14 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.status_values import Status, status_truth
 
 OK, ERROR = 0, 2
 # Late traffic is told at each late tick, and never that it is in time again [s].
 LATE_TRAFFIC_S = 2.0
+# Whom a contact has stopped and who touches the same one this soon has one contact [s].
+SAME_CONTACT_S = 1.0
 _WORST, _OF, _THRESHOLD = 'worst_', '_of', 'threshold_'
 TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')
                  for name in ('lane', 'lateral', 'along', 'heading', 'speed'))
@@ -88,6 +91,7 @@ class RunStatus:
         self.devices = {}
         self.contacts: list[dict[str, Any]] = []
         self.departures: list[dict[str, Any]] = []
+        self._stops: dict[FiredEvent, float] = {}
         self._traffic_late_t = -math.inf
         self._calm()
 
@@ -141,6 +145,23 @@ class RunStatus:
                 'input_delay_ms': _number(values.get('input_delay_ms'))}
         elif node == 'driver_node':
             self._alarm('lost_device', vehicle, level == ERROR, text, t)
+
+    def take_events(self, fired: Sequence[FiredEvent], dt_s: float) -> None:
+        """
+        Take the contacts that stopped who drove: they overlap nobody, so no verdict tells of them.
+
+        :param fired: everything since the start of the run.
+        :param dt_s: of the simulation's steps [s]
+        """
+        for event in fired:
+            if event.touching is None or event in self._stops:
+                continue
+            vehicle, other = event.touching
+            t = self._stops[event] = event.n * dt_s
+            # Who drives on against somebody that a verdict names has that contact already.
+            if other not in self._hit(vehicle) and vehicle not in self._hit(other):
+                self.contacts.append({'vehicle': vehicle, 'with': other, 't': t})
+                self.verdicts += 1
 
     def lose(self) -> None:
         """Take note that the simulation is silent."""
@@ -227,15 +248,23 @@ class RunStatus:
     def _note_violations(self, vehicle: str, hit: Sequence[str], off_road: bool,
                          t: float) -> None:
         """Note what a verdict says that the one before did not."""
-        nothing: dict[str, Any] = {'hit': (), 'off_road': False}
-        before = self.drivability.get(vehicle, nothing)
         for other in hit:
             # Both of two driven vehicles tell of their contact.
-            told = vehicle in self.drivability.get(other, nothing)['hit']
-            if other not in before['hit'] and not told:
+            told = vehicle in self._hit(other) or self._was_stopped(vehicle, other, t)
+            if other not in self._hit(vehicle) and not told:
                 self.contacts.append({'vehicle': vehicle, 'with': other, 't': t})
-        if off_road and not before['off_road']:
+        if off_road and not self.drivability.get(vehicle, {}).get('off_road'):
             self.departures.append({'vehicle': vehicle, 't': t})
+
+    def _hit(self, vehicle: str) -> Sequence[str]:
+        """Give whom the last verdict on a vehicle names."""
+        hit: Sequence[str] = self.drivability.get(vehicle, {}).get('hit', ())
+        return hit
+
+    def _was_stopped(self, vehicle: str, other: str, t: float) -> bool:
+        """Tell whether one of two has just been stopped by the other."""
+        return any({*(event.touching or ())} == {vehicle, other}
+                   and abs(t - at_t) < SAME_CONTACT_S for event, at_t in self._stops.items())
 
     def _take_plans(self, vehicle: str, level: int, text: str, values: Mapping[str, str],
                     t: float) -> None:

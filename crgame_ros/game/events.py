@@ -297,6 +297,7 @@ EventList = Annotated[tuple[EventSpec, ...], Listed(0, MAX_EVENTS, 'event', 'nam
 FiredBy: TypeAlias = Literal['trigger', 'condition', 'driver', 'contact']
 # No event of a game has a space in its name.
 PUT_BACK = 'put back'
+_CONTACT, _WITH = 'contact of ', ' with '
 
 
 @dataclass(frozen=True)
@@ -319,7 +320,7 @@ class FiredEvent:
     @classmethod
     def contact(cls, vehicle_id: str, other_id: str, n: int, k: int) -> 'FiredEvent':
         """Tell that a vehicle was stopped where it touched somebody."""
-        return cls(f'contact of {vehicle_id} with {other_id}', n, k, 'contact')
+        return cls(f'{_CONTACT}{vehicle_id}{_WITH}{other_id}', n, k, 'contact')
 
     @classmethod
     def put_back(cls, vehicle_id: str, n: int, k: int) -> 'FiredEvent':
@@ -330,6 +331,14 @@ class FiredEvent:
     def vehicle(self) -> str | None:
         """Name the vehicle that was put back; None of any other event."""
         return self.name.removeprefix(f'{PUT_BACK} ') if self.by == 'driver' else None
+
+    @property
+    def touching(self) -> tuple[str, str] | None:
+        """Name the vehicle that a contact stopped, and whom it touched; None of other events."""
+        if self.by != 'contact':
+            return None
+        vehicle, _, other = self.name.removeprefix(_CONTACT).partition(_WITH)
+        return vehicle, other
 
     @property
     def is_of_game(self) -> bool:

@@ -102,6 +102,9 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
 def _let_go(output: int) -> None:
     """Give up what is the launcher's: its group, signals, files and terminal."""
     os.setpgid(0, 0)
+    # What the terminal sent to all of the group until now was meant for the launcher.
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     for number in ENDING:
         signal.signal(number, signal.SIG_DFL)
     nothing = os.open(os.devnull, os.O_RDONLY)

@@ -170,6 +170,9 @@ class Graph:
                 node.interrupt()
             self._wait_for(group)
         code = simulation.exit_code()
+        # One that was still loading has no handler yet.
+        if self._signal is not None and died is None and code == -signal.SIGTERM:
+            return 0
         return 0 if code == 0 else (code if code is not None and code > 0 else 1)
 
     def _wait_for(self, nodes: Sequence[NodeProcess]) -> None:

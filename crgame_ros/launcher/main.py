@@ -12,94 +12,39 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The command behind `run.sh`: check, run, and turn the recording into a scenario."""
+"""The command behind `run.sh`: loads what runs a game, and can be ended at any moment of that."""
 
 from collections.abc import Sequence
 import os
-import shutil
+import signal
 import sys
+from types import FrameType
 
-from crgame_ros.errors import CrgameError
-from crgame_ros.launcher.arguments import parse_arguments
-from crgame_ros.launcher.finisher import Finisher
-from crgame_ros.launcher.forked_node import load
-from crgame_ros.launcher.graph import Graph
-from crgame_ros.launcher.interruption import say, writing
-from crgame_ros.launcher.node_specs import node_specs, Roster, shared_modules
-from crgame_ros.launcher.run_plan import plan_run, RunPlan
-from crgame_ros.ros.environment import (
-    free_domain_id,
-    network_is_open,
-    prepare_environment,
-    require_ros,
-)
-from crgame_ros.ros.place import held
-from crgame_ros.ros.shared_memory import remove_stale
-from crgame_ros.traffic.cache import compile_now
+ENDED_EARLY = 'ended before the run began'
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """
     Run a game from the command line.
 
-    :return: exit code: 0 at a good end, 2 for bad input, 1 for other failures.
+    :return: exit code: 0 at a good end, 2 for bad input, 1 for other failures, 130 where a second
+        signal left files unwritten.
     """
-    began = False
-    try:
-        request = parse_arguments(sys.argv[1:] if arguments is None else arguments)
-        if request.replay is not None:
-            from crgame_ros.cockpit.access import new_token
-            from crgame_ros.cockpit.replay_server import serve_replay
-            return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
-                                new_token() if request.token else None, say=say)
-        require_ros()
-        plan = plan_run(request)
-        compile_now()
-        announce(plan)
-        # Killed processes leave 4 MB each.
-        remove_stale()
-        finisher = Finisher(plan.folder, say, not request.no_report)
-        try:
-            with held(os.environ['ROS_DOMAIN_ID'], request.namespace):
-                specs = node_specs(plan)
-                load(shared_modules(specs, plan))
-                graph = Graph(specs, say, Roster(plan.roster), finisher, request.namespace)
-                began = True
-                code = graph.run()
-        finally:
-            shutil.rmtree(plan.private, ignore_errors=True)
-            plan.roster.unlink(missing_ok=True)
-            plan.claim.unlink(missing_ok=True)
-        with writing(say):
-            code = max(code, finisher.finish_all(graph.was_asked_to_end))
-        finisher.write_reports()
-        say(f'again: ./run.sh {plan.game_file}; tools: ./crgame --help')
-        return code
-    except CrgameError as error:
-        print(f'error: {error}', file=sys.stderr, flush=True)
-        return error.exit_code
-    except KeyboardInterrupt:
-        if began:
-            return 130
-        say('ended before the run began')
-        return 0
+    before = signal.getsignal(signal.SIGINT)
+    # Who starts it in the background may have it ignored.
+    if before is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave)
+    # run.sh holds it back while Python itself starts.
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    from crgame_ros.launcher.launch import launch
+    signal.signal(signal.SIGINT, before)
+    return launch(arguments)
 
 
-def announce(plan: RunPlan) -> None:
-    """Say what is going to happen, and settle the DDS domain."""
-    prepare_environment()
-    os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
-    setup = plan.setup
-    drivers = ', '.join(f'{human.id} driven by {setup.game.humans[index].driver}'
-                        for index, human in enumerate(setup.humans))
-    planners = ', '.join(f'{av.id} planned by {av.spec.planner}' for av in setup.avs)
-    say(f'{setup.game.title or setup.loaded.benchmark_id}: '
-        + ('; '.join(text for text in (drivers, planners) if text)
-           or 'nobody drives, traffic is alone'))
-    for notice in setup.notices:
-        say(f'note: {notice}')
-    reach = 'open network' if network_is_open() else 'this machine only'
-    say(f'ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]} ({reach}); files go to {plan.folder}')
+def _leave(_number: int, _frame: FrameType | None) -> None:
+    """End at once: nothing has been made yet, and an import may not be broken off in order."""
+    print(ENDED_EARLY, flush=True)
+    os._exit(0)
 
 
 if __name__ == '__main__':

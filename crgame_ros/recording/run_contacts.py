@@ -18,6 +18,7 @@ from collections.abc import Sequence
 
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.joints import vehicles_from_joints
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.recording.epochs import Epoch
@@ -29,12 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability]
-                      ) -> tuple[Contact, ...]:
+def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability],
+                      fired: Sequence[FiredEvent]) -> tuple[Contact, ...]:
     """
     Find the contacts of a recorded run.
 
     :param verdicts: of the run's vehicles as they were recorded, in order.
+    :param fired: the run's events.
     :raises InputError: if the motion that led to one of them was not recorded.
     """
     known = {item.id for item in run.descriptions}
@@ -47,16 +49,18 @@ def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleD
         if new:
             told.update((verdict.vehicle_id, name) for name in new)
             touching.append(verdict._replace(hit=new))
-    if not touching:
+    stops = [event for event in fired if event.touching and known.issuperset(event.touching)]
+    steps = [(verdict.n, verdict.vehicle_id, verdict.hit[0]) for verdict in touching]
+    steps += [(event.n, *event.touching) for event in stops if event.touching]
+    if not steps:
         return ()
     motions = _read_motions(reader, run)
     recorded = np.flatnonzero(np.isfinite(motions.vehicle_states).all(axis=(1, 2)))
-    for verdict in touching:
-        if not recorded[0] <= verdict.n <= recorded[-1]:
-            raise InputError(f'no states of step {verdict.n}, at which {verdict.vehicle_id} '
-                             f'touches {verdict.hit[0]}', str(reader.path),
-                             'record from before the start of the run')
-    return find_contacts(motions, touching)
+    for n, vehicle, other in steps:
+        if not recorded[0] <= n <= recorded[-1]:
+            raise InputError(f'no states of step {n}, at which {vehicle} touches {other}',
+                             str(reader.path), 'record from before the start of the run')
+    return find_contacts(motions, touching, stops)
 
 
 def _read_motions(reader: BagReader, run: Epoch) -> Motions:

@@ -72,6 +72,19 @@ class RunRecord:
                 found[event.vehicle] = (*found.get(event.vehicle, ()), k)
         return found
 
+    def jumps(self, column: int) -> tuple[int, ...]:
+        """
+        Give the log's rows at which a driven vehicle stands where it was put back.
+
+        :param column: of the vehicle among the driven ones.
+        """
+        log = self.log
+        ks = self.put_back.get(log.vehicles[column].id, ())
+        steps = np.hypot(*np.diff(log.vehicle_states[:, column, :2], axis=0).T)
+        # Its own time may be a step behind.
+        return tuple(row + 1 + int(np.argmax(steps[row:row + 2]))
+                     for row in np.searchsorted(log.ks, ks).tolist() if row < len(steps))
+
     def ways(self) -> NDArray[np.float64]:
         """Give how far each driven vehicle has come (V) [m], but for where it was put back."""
         log = self.log

@@ -22,6 +22,8 @@ from typing import Any
 
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
+from crgame_ros.game.documents import EVENTS_TOPIC, parse_events_document
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.planner.adapter import reason_kind
@@ -80,7 +82,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None
         collected = _Collector(run)
         for message in reader.messages(collected.topics):
             collected.take(message, reader)
-        contacts, unknown = _contacts(reader, run, collected.verdicts)
+        contacts, unknown = _contacts(reader, run, collected.verdicts, collected.fired)
         return {
             **metrics.summary().as_dict(),
             'late_steps': late.as_dict(),
@@ -117,11 +119,12 @@ def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
     return report
 
 
-def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability]
-              ) -> tuple[list[dict[str, Any]] | None, tuple[str, ...]]:
+def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability],
+              fired: Sequence[FiredEvent]) -> tuple[list[dict[str, Any]] | None, tuple[str, ...]]:
     """Give the entries of the contacts, or None and why they are not known."""
     try:
-        return [item.as_dict() for item in recorded_contacts(reader, run, verdicts)], ()
+        return [item.as_dict() for item in recorded_contacts(
+            reader, run, verdicts, fired)], ()
     except (InputError, ValueError, GEOSException) as error:
         # Of states that somebody else sent there may be no outlines.
         return None, (f'contacts are not named: {error}',)
@@ -137,9 +140,10 @@ class _Collector:
         self._requests = {f'/{av}/plan_request': av for av in self.avs}
         self._plans = {f'/{av}/plan': av for av in self.avs}
         self._verdicts = {f'/{vehicle}/drivability': vehicle for vehicle in vehicles}
-        self.topics = (_DIAGNOSTICS, *self._requests, *self._plans, *self._verdicts)
+        self.topics = (_DIAGNOSTICS, EVENTS_TOPIC, *self._requests, *self._plans, *self._verdicts)
         self.violations: list[dict[str, Any]] = []
         self.verdicts: list[VehicleDrivability] = []
+        self.fired: tuple[FiredEvent, ...] = ()
         self._lasting: dict[str, set[str]] = defaultdict(set)
         self._open = OpenRequests()
         self._latencies_ms: dict[str, list[float]] = defaultdict(list)
@@ -155,6 +159,9 @@ class _Collector:
     def take(self, recorded: BagMessage, reader: BagReader) -> None:
         """Take one message; those of other runs, and those that are none, are passed over."""
         topic, _, log_time_ns, data = recorded
+        if topic == EVENTS_TOPIC:
+            self._take_events(recorded, reader)
+            return
         stamp_ns = header_stamp_ns(data)
         if not self._run.holds(stamp_ns, log_time_ns):
             return
@@ -174,6 +181,16 @@ class _Collector:
                     self._take_verdict(self._verdicts[topic], status)
                 else:
                     self._take_status(status, stamp_ns)
+
+    def _take_events(self, recorded: BagMessage, reader: BagReader) -> None:
+        """Take what has taken effect since the start of the run; each message tells all of it."""
+        try:
+            epoch, fired = parse_events_document(reader.decode(recorded).message.data)
+        except InputError:
+            reader.foreign[EVENTS_TOPIC] += 1
+            return
+        if epoch == self._run.game.epoch:
+            self.fired = fired
 
     def _take_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1

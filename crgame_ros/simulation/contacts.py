@@ -15,12 +15,13 @@
 """The contacts of driven vehicles in a finished run, each with the vehicle's part in it."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 from crgame_ros.drivability.contact import could_avoid, Course, Kind, kind_of, Side, touched_side
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.reference_point import shifted
@@ -129,38 +130,71 @@ def contacts_of(result: OfflineResult) -> tuple[Contact, ...]:
     return find_contacts(Motions(
         setup.descriptions, {av.id: av.vehicle.max_acceleration for av in setup.avs},
         setup.scheduler, result.vehicle_states, ticks, result.object_poses,
-        result.object_velocities), result.violations)
+        result.object_velocities), result.violations, result.fired)
 
 
-def find_contacts(motions: Motions,
-                  verdicts: Iterable[VehicleDrivability]) -> tuple[Contact, ...]:
+class _Touch(NamedTuple):
+    """One touched another at a step; `stopped` names who did not make that step for it."""
+
+    n: int
+    vehicle_id: str
+    other_id: str
+    stopped: str = ''
+
+
+def find_contacts(motions: Motions, verdicts: Iterable[VehicleDrivability],
+                  fired: Iterable[FiredEvent] = ()) -> tuple[Contact, ...]:
     """
     Find the first contact of each pair, in order.
 
     One between a human and an AV is told as the AV's, that of two AVs or humans by each. An AV
     brakes with its vehicle's greatest deceleration after one time step of the scenario, everybody
     else with 8 m/s^2 after 1 s, as if it looked; static obstacles cannot. Contacts with permanent
-    obstacles of a map stand among the violations only.
+    obstacles of a map stand among the violations only. Who is stopped by a contact overlaps
+    nobody: the event tells of it, once for both.
 
-    :param verdicts: in order, of steps whose states are known.
+    :param verdicts: of steps whose states are known.
+    :param fired: events, of steps whose states are known.
     """
-    columns = {item.id: column for column, item in enumerate(motions.descriptions)}
+    touches = [_Touch(verdict.n, verdict.vehicle_id, other) for verdict in verdicts
+               for other in verdict.hit if other != PERMANENT_OBSTACLE]
+    for event in fired:
+        if event.touching is not None:
+            vehicle, other = event.touching
+            of_av = other in motions.braking and vehicle not in motions.braking
+            pair = (other, vehicle) if of_av else (vehicle, other)
+            touches.append(_Touch(event.n, *pair, stopped=vehicle))
     found: dict[tuple[str, str], Contact] = {}
-    for verdict in verdicts:
-        for other in verdict.hit:
-            pair = verdict.vehicle_id, other
-            if other != PERMANENT_OBSTACLE and pair not in found and (
-                    pair[0] in motions.braking or other not in motions.braking):
-                found[pair] = _contact(motions, columns[pair[0]], columns[other], verdict.n)
+    for touch in sorted(touches, key=lambda item: item.n):
+        pair = touch.vehicle_id, touch.other_id
+        if pair not in found and (pair[0] in motions.braking or pair[1] not in motions.braking):
+            found[pair] = _contact(motions, touch)
     return tuple(found.values())
 
 
-def _contact(motions: Motions, mine: int, other: int, n: int) -> Contact:
-    own, theirs = motions.course(mine), motions.course(other)
+def _contact(motions: Motions, touch: _Touch) -> Contact:
+    columns = {item.id: column for column, item in enumerate(motions.descriptions)}
+    mine, other, n = columns[touch.vehicle_id], columns[touch.other_id], touch.n
     me, they = motions.descriptions[mine], motions.descriptions[other]
+    own, theirs = (
+        _unstopped(motions.course(column), n, motions.scheduler.dt_s)
+        if item.id == touch.stopped else motions.course(column)
+        for item, column in ((me, mine), (they, other)))
     side = touched_side(own, theirs, n)
     speed, other_speed = float(own.speeds[n]), float(theirs.speeds[n])
     able = [item.id for item, course, against in ((me, own, theirs), (they, theirs, own))
             if n and could_avoid(course, against, n, motions.scheduler.dt_s)]
     return Contact(me.id, they.id, they.role, n, side, kind_of(speed, other_speed, side),
                    speed, other_speed, tuple(able))
+
+
+def _unstopped(course: Course, n: int, dt_s: float) -> Course:
+    """Give the course of who was stopped at a step, as if it had gone on into what it touched."""
+    before = max(n - 1, 0)
+    poses, speeds = course.poses.copy(), course.speeds.copy()
+    yaw = float(poses[before, 2])
+    # Two steps: it turned as well, and the outlines must overlap.
+    way = 2.0 * dt_s * float(speeds[before])
+    poses[n:] = poses[before] + np.array((way * np.cos(yaw), way * np.sin(yaw), 0.0))
+    speeds[n:] = speeds[before]
+    return replace(course, poses=poses, speeds=speeds)

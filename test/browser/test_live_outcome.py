@@ -188,7 +188,7 @@ def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
     assert page.browser.console_errors() == []
 
 
-def test_again_and_another_game(page: LivePage) -> None:
+def test_again_another_and_the_next_game(page: LivePage) -> None:
     """The same once more, then traffic by itself; the card gives way to each run."""
     page.click('#outcome [data-action=again]')
     page.wait('crgame.store.status.run === "running"'
@@ -205,6 +205,14 @@ def test_again_and_another_game(page: LivePage) -> None:
     assert 'Traffic is alone' in page.text('#panel-drive')
     assert 'traffic was alone' in wait_for_card(page)
     assert folder_on_card(page).name == 'run_4'
+    page.click('#outcome [data-action=next]')
+    page.wait('document.querySelector("#outcome").hidden'
+              ' && crgame.store.scene.title === "A crash"',
+              'the game after the last of the list')
+    wait_for_card(page)
+    assert folder_on_card(page).name == 'run_5'
+    # An alarm stays to be seen for some seconds.
+    page.wait('crgame.alarms.kinds().length === 0', 'the alarms of the run to go')
     assert page.browser.console_errors() == []
 
 
@@ -222,11 +230,11 @@ def test_the_end_of_the_program_is_no_alarm(page: LivePage) -> None:
 def test_each_run_has_its_own_files(graph: Graph) -> None:
     """Bag, scenario, timing report and game of each, and nothing of another."""
     folders = run_folders(graph.launcher.out)
-    assert [folder.name for folder in folders] == ['run', 'run_2', 'run_3', 'run_4']
+    assert [folder.name for folder in folders] == ['run', 'run_2', 'run_3', 'run_4', 'run_5']
     # The first one was deleted.
     folders = folders[1:]
     schema = etree.XMLSchema(etree.parse(str(SCHEMA)))
-    for folder, scenario in zip(folders, (CUT_IN, CUT_IN, TRAFFIC), strict=True):
+    for folder, scenario in zip(folders, (CUT_IN, CUT_IN, TRAFFIC, CUT_IN), strict=True):
         game = load_game(folder / 'game.yaml')
         assert game.scenario.name == f'{scenario}.xml'
         (xml,) = folder.glob('*.xml')
@@ -237,7 +245,7 @@ def test_each_run_has_its_own_files(graph: Graph) -> None:
         assert len(root.findall('planningProblem')) == max(1, driven)
         contacts = json.loads((folder / 'timing.json').read_text())['contacts']
         assert [(item['vehicle'], item['with'], item['kind']) for item in contacts] == [
-            ('av0', 'hv0', 'stopped track')] * (folder in folders[:2])
+            ('av0', 'hv0', 'stopped track')] * (scenario == CUT_IN)
         assert not (folder / '.finished').exists()
         with BagReader(folder / 'bag') as reader:
             assert reader.complete

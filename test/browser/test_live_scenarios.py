@@ -138,3 +138,32 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
     page.wait('crgame.world.shown.vehicles[3] > arguments[0] + 1', 'a faster car', speed)
     page.release('w')
     assert page.browser.console_errors() == []
+
+
+def test_an_upload_is_deleted_after_a_question(page: LivePage) -> None:
+    """Its bin asks first, and it stays while its run goes on; then it is gone for good."""
+    row = '#panel-scenario [data-action="delete"]'
+    page.wait('document.querySelectorAll(arguments[0]).length === 1', 'the upload', row)
+    page.click(row)
+    page.click('dialog.confirm[open] .drive-button:not(.danger)')
+    page.wait('!document.querySelector("dialog.confirm[open]")')
+    assert page.run('return document.querySelectorAll(arguments[0]).length', row) == 1
+    page.click(row)
+    page.click('dialog.confirm[open] .danger')
+    page.wait_for_text('#panel-scenario', 'is the scenario of the present run')
+    errors = page.browser.console_errors()
+    page.browser.forget_errors()
+    assert all('/api/upload/delete' in error and '400' in error for error in errors)
+    page.click('button.scenario[title="game.yaml"]')
+    page.click('.start-area button.primary')
+    page.wait('crgame.store.scene.benchmark_id !== arguments[0]', 'another run', UPLOADED)
+    page.wait_for_run('running')
+    page.click(row)
+    page.click('dialog.confirm[open] .danger')
+    page.wait('document.querySelectorAll(arguments[0]).length === 0', 'it to be gone', row)
+    page.run('location.reload();')
+    page.open()
+    page.tab('scenario')
+    page.wait('document.querySelector("button.scenario")', 'the list')
+    assert page.run('return document.querySelectorAll(arguments[0]).length', row) == 0
+    assert page.browser.console_errors() == []

@@ -124,6 +124,21 @@ def test_once_more_needs_no_second_start(page: LivePage) -> None:
               ' && crgame.store.status.run === "paused"', 'a run that stands', epoch)
 
 
+def test_again_from_the_card_needs_no_second_start(page: LivePage) -> None:
+    """The run has ended; the seat has driven in it, and its next run begins by the one click."""
+    page.order('start')
+    page.wait_for_run('running')
+    page.order('stop')
+    page.wait_for_run('ended')
+    epoch = page.run('return crgame.store.status.epoch')
+    page.click('#outcome [data-action=again]')
+    page.wait('crgame.store.status.epoch > arguments[0] && crgame.store.status.run === "running"'
+              ' && crgame.store.status.n > 0', 'the next run to go on by itself', epoch)
+    assert page.run('return [crgame.driving.seat, document.querySelector("#outcome").hidden]'
+                    ) == ['hv0', True]
+    assert page.browser.console_errors() == []
+
+
 def test_the_screen_is_filled_and_left_again(page: LivePage) -> None:
     for pressed in ('true', 'false'):
         page.click('#fullscreen')

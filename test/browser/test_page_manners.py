@@ -109,6 +109,20 @@ def test_nothing_is_cut_off_and_the_road_is_free(
     assert free > 0.7
     size_px, where = page.run(SMALLEST)
     assert size_px >= 12.0, where
+    # Every key can be read, and lies beside what else is told.
+    assert page.run("""
+        const told = [...document.querySelectorAll('.hud-kmh, .hud-limit, .hud-gear, .hud-pedals, '
+          + '.hud-steering')].filter((node) => node.checkVisibility());
+        const caps = [...document.querySelectorAll('.cap')];
+        const covers = (one, other) => one !== other && !one.contains(other) && (() => {
+          const [a, b] = [one, other].map((node) => node.getBoundingClientRect());
+          return a.left < b.right - 0.5 && b.left < a.right - 0.5 && a.top < b.bottom - 0.5
+            && b.top < a.bottom - 0.5;
+        })();
+        return [caps.length, caps.filter((cap) => !cap.checkVisibility()
+          || cap.scrollWidth > cap.clientWidth + 1 || cap.scrollHeight > cap.clientHeight + 1
+          || [...told, ...caps].some((other) => covers(cap, other)))
+          .map((node) => node.className)];""") == [10, []]
 
 
 def test_fingers_drive(page: Browser) -> None:

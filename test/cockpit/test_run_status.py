@@ -17,6 +17,7 @@
 from collections.abc import Mapping
 
 from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.status_values import Status
 
 
@@ -242,3 +243,27 @@ def test_a_silent_simulation_is_no_end_that_it_told_itself() -> None:
     _take(status, 'sim_node: run', 0, 'ended', {'reason': 'stop'}, 2.0)
     status.lose()
     assert status.reason == 'stop'
+
+
+def test_a_contact_that_stops_a_driver_is_counted_once() -> None:
+    """Told by the event alone, by the event and then a verdict, and by a verdict and then it."""
+    status = _begun()
+    stops = [FiredEvent.contact('hv0', 'av0', 70, 7), FiredEvent.put_back('hv0', 200, 20),
+             FiredEvent.contact('hv0', 'av0', 500, 50), FiredEvent.contact('hv0', 'o12', 900, 90)]
+    free = {'collision': 'false', 'road_compliance': 'true', 'hit': ''}
+    touches = free | {'collision': 'true', 'hit': 'hv0'}
+    status.take_events(stops[:1], 0.01)
+    status.take_events(stops[:2], 0.01)
+    assert status.contacts == [{'vehicle': 'hv0', 'with': 'av0', 't': 70 * 0.01}]
+    assert status.verdicts == 1
+    # The AV drives on against it.
+    _take(status, 'av0/drivability', 2, 'collision', touches, 0.9)
+    _take(status, 'av0/drivability', 0, 'valid', free, 2.0)
+    assert len(status.contacts) == 1
+    _take(status, 'av0/drivability', 2, 'collision', touches, 4.9)
+    status.take_events(stops[:3], 0.01)
+    assert [item['t'] for item in status.contacts] == [70 * 0.01, 4.9]
+    status.take_events(stops, 0.01)
+    assert status.contacts[-1] == {'vehicle': 'hv0', 'with': 'o12', 't': 9.0}
+    status.begin(('hv0', 'av0'))
+    assert status.contacts == []

@@ -14,13 +14,17 @@
 # limitations under the License.
 """However a run ends, its files are there and nobody is left behind."""
 
+from collections.abc import Callable
 import os
 from pathlib import Path
+import re
+import shlex
 import signal
 import subprocess
 import sys
 
 from crgame_ros.launcher.interruption import writing
+from crgame_ros.launcher.main import ENDED_EARLY
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, ROOT, wait_until
 import pytest
@@ -61,6 +65,68 @@ def test_a_pipe_that_nobody_reads_any_more_ends_it_without_a_traceback(tmp_path:
     process.wait(60.0)
     assert 'Traceback' not in errors and 'Exception' not in errors
     process.stderr.close()
+
+
+def _of_session(session: int) -> list[str]:
+    """Name the processes of a session; its number is the sixth field of proc(5)'s stat."""
+    found = []
+    for stat in Path('/proc').glob('[0-9]*/stat'):
+        try:
+            name, _, rest = stat.read_text().partition('(')[2].rpartition(')')
+        except OSError:
+            continue
+        if int(rest.split()[3]) == session and rest.split()[0] != 'Z':
+            found.append(name)
+    return found
+
+
+def _is_python(process: subprocess.Popen[str], _said: list[str]) -> bool:
+    return Path(f'/proc/{process.pid}/cmdline').read_bytes().startswith(
+        f'{sys.executable}\0-m\0crgame_ros.launcher.main\0'.encode())
+
+
+def _loads_numpy(process: subprocess.Popen[str], _said: list[str]) -> bool:
+    return '_multiarray_umath' in Path(f'/proc/{process.pid}/maps').read_text()
+
+
+def _says(pattern: str) -> Callable[[subprocess.Popen[str], list[str]], bool]:
+    def heard(process: subprocess.Popen[str], said: list[str]) -> bool:
+        assert process.stdout is not None
+        said.append(process.stdout.readline())
+        assert said[-1], said
+        return re.search(pattern, said[-1]) is not None
+    return heard
+
+
+@pytest.mark.parametrize(('moment', 'early'), [
+    (_is_python, True), (_loads_numpy, True), (_says('^sim_node: process'), False)],
+    ids=['Python starts', 'imports', 'first node'])
+def test_ctrl_c_during_the_start_is_a_line_and_no_traceback(
+        moment: Callable[[subprocess.Popen[str], list[str]], bool], early: bool,
+        tmp_path: Path) -> None:
+    """As run.sh starts it, with everybody at the terminal getting the signal."""
+    line = (ROOT / 'run.sh').read_text().splitlines()[-1]
+    words = [{'$CRGAME_PYTHON': sys.executable}.get(word, word) for word in shlex.split(line)]
+    assert words[0] == 'exec' and words[-1] == '$@'
+    process = subprocess.Popen(
+        [*words[1:-1], str(CUT_IN), '--headless', '--no-report', '--out', str(tmp_path / 'run')],
+        cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        text=True, start_new_session=True,
+        env=os.environ | {'ROS_DOMAIN_ID': str(own_domain_id())})
+    said: list[str] = []
+    with process:
+        try:
+            wait_until(lambda: moment(process, said), 'the moment')
+            os.killpg(process.pid, signal.SIGINT)
+            assert process.stdout is not None
+            text = ''.join(said) + process.stdout.read()
+            assert process.wait(60.0) == 0, text
+            assert 'Traceback' not in text, text
+            last = text.splitlines()[-1]
+            assert last == ENDED_EARLY if early else last.startswith('again: ./run.sh'), text
+            wait_until(lambda: not _of_session(process.pid), 'the end of everybody', 20.0)
+        finally:
+            process.kill()
 
 
 def test_a_stopped_node_does_not_outlive_a_killed_launcher(tmp_path: Path) -> None:

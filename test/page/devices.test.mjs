@@ -6,6 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { CalibrationRun } from '../../crgame_ros/cockpit/page/js/driving/calibration_run.js';
+import { PutBackNotice } from '../../crgame_ros/cockpit/page/js/driving/put_back_notice.js';
 import {
   defaultProfile, gearAfter, keepProfiles, loadProfile, pedalValue, rawValue, saveProfile,
   steeringValue,
@@ -144,11 +145,13 @@ function calibrated(rest, moves) {
 }
 
 test('calibrating a wheel: each step ends by itself with what was moved', () => {
-  const run = calibrated({ axes: [0.02, 0, 1, 1], buttons: [0, 0, 0, 0, 0] }, [
+  const run = calibrated({ axes: [0.02, 0, 1, 1], buttons: [0, 0, 0, 0, 0, 0] }, [
     ['left', 'axes', 0, -0.9], ['right', 'axes', 0, 0.95], ['throttle', 'axes', 2, -1],
     ['brake', 'axes', 3, -0.8], ['reverse', 'buttons', 1, 1], ['left_indicator', 'buttons', 2, 1],
-    ['right_indicator', 'buttons', 3, 1], ['hazard', 'buttons', 4, 1], ['horn', 'buttons', 0, 1]]);
+    ['right_indicator', 'buttons', 3, 1], ['hazard', 'buttons', 4, 1], ['horn', 'buttons', 0, 1],
+    ['put_back', 'buttons', 5, 1]]);
   assert.equal(run.step, 'test');
+  assert.deepEqual(run.profile.put_back, [5]);
   // Button 3 was the hazard lights' by default, and does one thing alone now.
   assert.deepEqual(run.profile.lights,
     { left_indicator: [2], right_indicator: [3], hazard: [4], horn: [0] });
@@ -214,9 +217,35 @@ test('skipping keeps what was there', () => {
   const run = new CalibrationRun(before);
   run.feed({ axes: [0, 1, 1], buttons: [] }, 0);
   run.next();
-  for (let i = 0; i < 8; i += 1) {
+  for (let i = 0; i < 9; i += 1) {
     run.skip();
   }
   assert.equal(run.step, 'test');
   assert.deepEqual(run.profile, before);
+});
+
+test('who asks in vain to be put back is told so, once', (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  /** @type {string[]} */
+  const told = [];
+  const stop = { name: 'contact of hv0 with o1', n: 5, k: 1, by: 'contact' };
+  const back = { name: 'put back hv0', n: 9, k: 1, by: 'driver' };
+  const store = /** @type {any} */ ({ fired: [], status: { run: 'running' },
+    receive: (/** @type {{text: string}} */ message) => told.push(message.text) });
+  const notice = new PutBackNotice(store);
+  /** @param {object[]} before @param {object[]} after what has happened when it asks, and then */
+  const ask = (before, after) => {
+    store.fired = before;
+    notice.take('hv0', true);
+    notice.take('hv0', true);
+    store.fired = after;
+    t.mock.timers.tick(2000);
+    notice.take('hv0', false);
+    return told.splice(0).length;
+  };
+  assert.equal(ask([], []), 0);
+  assert.equal(ask([stop], [stop]), 1);
+  assert.equal(ask([stop], [stop, back]), 0);
+  assert.equal(ask([stop, back], [stop, back]), 0);
+  assert.equal(ask([{ ...stop, name: 'contact of hv1 with hv0' }], []), 0);
 });

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import math
 from pathlib import Path
 
+from crgame_ros.analysis.behaviour.lane_keeping import keep_lane
 from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.analysis.validation import validate
 from crgame_ros.driver.replay_driver import ReplayDriver
@@ -29,12 +30,13 @@ from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.recorded_inputs import inputs_of
 from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.put_back import PutBack
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np
 import pytest
 import shapely
@@ -184,6 +186,38 @@ def test_the_same_commands_lead_to_the_same_states(cut_in: LoadedScenario) -> No
     # While it was placed there was no contact: the first one ends there.
     assert not [item for item in result.violations
                 if item.vehicle_id == 'hv0' and item.n >= 401 and item.collision]
+
+
+def test_the_contact_is_named_once_with_the_speed_before_it(cut_in: LoadedScenario) -> None:
+    """No verdict tells of it: it overlaps nobody; braking in time would have avoided it."""
+    result = run_with_put_back(cut_in)
+    event = next(item for item in result.fired if item.touching == ('hv0', 'hv1'))
+    (contact,) = contacts_of(result)
+    assert (contact.vehicle_id, contact.other_id, contact.n) == ('hv0', 'hv1', event.n)
+    before = result.states_of('hv0')[event.n - 1, StateColumn.SPEED]
+    assert contact.speed == before > 5.0
+    assert (contact.side, contact.kind) == ('front', 'stopped track')
+
+
+def test_the_jump_is_no_change_of_lane(cut_in: LoadedScenario) -> None:
+    """Where the vehicle was moved to a neighbouring lane, it has come to that anew."""
+    record = run_record_of(run_with_put_back(cut_in))
+    (row,) = record.jumps(0)
+    states = record.log.vehicle_states[:, 0].copy()
+    steps = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    assert row == 1 + int(np.argmax(steps))
+    roads = support.setup_of(cut_in).network
+    lane = roads.lanelet_at(*states[row, :2])
+    assert lane is not None
+    found = roads.lanelet_network.find_lanelet_by_id(lane)
+    beside = found.adj_left if found.adj_left is not None else found.adj_right
+    # As if the contact had been in the lane beside.
+    width = roads.locate(beside, *states[row, :2])[1]
+    side = np.array((-np.sin(states[row, 2]), np.cos(states[row, 2])))
+    states[:row, :2] -= width * side
+    vehicle = record.log.game.vehicles[0].vehicle
+    keeping = [keep_lane(roads, states, vehicle, 0.1, jumps) for jumps in ((), (row,))]
+    assert [len(each.changes) for each in keeping] == [1, 0]
 
 
 def test_score_way_and_export_know_of_the_jump(cut_in: LoadedScenario, tmp_path: Path) -> None:

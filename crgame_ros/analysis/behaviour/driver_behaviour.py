@@ -124,7 +124,8 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
     transform = everybody.transform(number)
     states = log.vehicle_states[:, number].copy()
     states[:, :3] = transform.to_scenario(states[:, :3])
-    keeping = keep_lane(everybody.roads, states, vehicle, everybody.step_s)
+    keeping = keep_lane(everybody.roads, states, vehicle, everybody.step_s,
+                        record.jumps(number))
     dt_s = game.scheduler.dt_s
     controls = DriverControls.of(record.times_s, record.commands[:, number],
                                  vehicle.max_steering_wheel_angle, dt_s)

@@ -14,8 +14,9 @@
 # limitations under the License.
 """How well a driver kept the lane: lateral offsets, lane changes, and SDLP without these."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 import math
 
 from crgame_ros.analysis.behaviour.lane_crossing import lane_crossing
@@ -90,10 +91,11 @@ class LaneKeeping:
 
 
 def keep_lane(roads: RoadNetwork, states: FloatArray, vehicle: VehicleParameters,
-              step_s: float) -> LaneKeeping:
+              step_s: float, jumps: Sequence[int] = ()) -> LaneKeeping:
     """
     Follow a vehicle along its lanes.
 
+    :param jumps: rows at which it stands elsewhere, put there: it comes anew to that lane.
     :param states: (K, 8) rear-axle states where the roads are, columns as in `StateColumn`.
     :param step_s: between them [s]
     """
@@ -101,7 +103,7 @@ def keep_lane(roads: RoadNetwork, states: FloatArray, vehicle: VehicleParameters
     speed, yaw_rate = states[:, StateColumn.SPEED], states[:, StateColumn.YAW_RATE]
     centers = shifted(rear, vehicle.rear_to_center)
     wheels = wheels_of(rear, vehicle.wheelbase, vehicle.width)
-    visits = LaneVisits(roads).follow(centers)
+    visits = tuple(_visits(LaneVisits(roads), centers, jumps))
     strips = tuple(strip_of(roads, visits, number) for number in range(len(visits)))
     offset, sideways, beyond, tlc, linear = np.full((5, len(states)), np.nan)
     for visit, strip in zip(visits, strips, strict=True):
@@ -115,6 +117,13 @@ def keep_lane(roads: RoadNetwork, states: FloatArray, vehicle: VehicleParameters
             strip, wheels[rows], rear[rows], speed[rows], yaw_rate[rows])
     changes = _changes(visits, strips, centers, wheels, sideways, round(LONGEST_HALF_S / step_s))
     return LaneKeeping(visits, strips, offset, beyond, tlc, linear, changes)
+
+
+def _visits(lanes: LaneVisits, centers: FloatArray, jumps: Sequence[int]) -> Iterator[LaneVisit]:
+    """Give the stays in lanes, those between two jumps by themselves."""
+    for first, end in pairwise((0, *sorted({*jumps} - {0, len(centers)}), len(centers))):
+        for visit in lanes.follow(centers[first:end]):
+            yield visit._replace(first=first + visit.first, end=first + visit.end)
 
 
 def sdlp(offset: FloatArray, kept: NDArray[np.bool_], speed: FloatArray) -> float:

@@ -236,6 +236,7 @@ class CockpitFeed:
             epoch, events = parse_events_document(fired.data)
             if epoch == self.scenario.game.epoch:
                 self._hub.set_document('events', {'fired': [asdict(event) for event in events]})
+                self.status.take_events(events, self.scenario.game.scheduler.dt_s)
         if signals is not None:
             k, states = parse_signals_document(signals.data)
             self._hub.set_document('signals', {'k': k, 'states': states})

@@ -14,11 +14,17 @@
 # limitations under the License.
 """The study's node in the graph: it chooses games, starts and stops runs, and follows them."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from crgame_ros.cockpit.run_status import RunStatus
-from crgame_ros.errors import CrgameError
-from crgame_ros.game.documents import GameDocument, MALFORMED, parse_game_document
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.documents import (
+    GameDocument,
+    MALFORMED,
+    parse_events_document,
+    parse_game_document,
+)
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
@@ -48,6 +54,7 @@ class Director:
         self._orders = CockpitOrders(self._node, endpoints)
         self._clock = endpoints.polled('/clock')
         self._games = endpoints.polled('/scenario/game')
+        self._events = endpoints.polled('/scenario/events')
         self._diagnostics = endpoints.polled('/diagnostics', depth=_QUEUE)
         self._verdicts: PolledSubscription | None = None
         self._seat = ''
@@ -70,6 +77,7 @@ class Director:
         """Take what has come."""
         self._take_game()
         self._take_clock()
+        self._take_events()
         for slot in (self._diagnostics, self._verdicts):
             for _ in range(_QUEUE):
                 message = None if slot is None else slot.take()
@@ -128,6 +136,16 @@ class Director:
             self.game = game
             self._stamp_ns = game.scheduler.clock_offset_ns
             self.status.begin([vehicle.id for vehicle in game.vehicles])
+
+    def _take_events(self) -> None:
+        message = self._events.latest()
+        if message is None or self.game is None:
+            return
+        # What another program publishes there may be no such document.
+        with suppress(InputError):
+            epoch, fired = parse_events_document(message.data)
+            if epoch == self.game.epoch:
+                self.status.take_events(fired, self.game.scheduler.dt_s)
 
     def _take_clock(self) -> None:
         message = self._clock.latest()

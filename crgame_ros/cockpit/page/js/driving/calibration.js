@@ -25,6 +25,8 @@ const TEXTS = {
   right_indicator: ['Indicator right', 'Press the button that shall indicate to the right.'],
   hazard: ['Hazard', 'Press the button of the hazard lights.'],
   horn: ['Horn', 'Press the button of the horn.'],
+  put_back: ['Back on the lane', 'Press the button that shall put the vehicle back on its lane '
+    + 'after a contact.'],
   test: ['Test', 'Try it. Dead zones and directions can be changed here; Save keeps everything '
     + 'in this browser for this device.'],
 };

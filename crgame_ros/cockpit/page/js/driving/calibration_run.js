@@ -17,7 +17,7 @@ import { LIGHT_BUTTONS } from '../lights.js';
  */
 
 /**
- * @typedef {'centre'|'left'|'right'|'throttle'|'brake'|'reverse'|'test'
+ * @typedef {'centre'|'left'|'right'|'throttle'|'brake'|'reverse'|'put_back'|'test'
  *   |typeof LIGHT_BUTTONS[number]} CalibrationStep
  * @typedef {Control['kind']} Kind
  * @typedef {{kind: Kind, index: number}} Place of an axis or button
@@ -25,7 +25,8 @@ import { LIGHT_BUTTONS } from '../lights.js';
 
 /** The steps in their order. */
 export const STEPS = Object.freeze(/** @type {CalibrationStep[]} */ ([
-  'centre', 'left', 'right', 'throttle', 'brake', 'reverse', ...LIGHT_BUTTONS, 'test',
+  'centre', 'left', 'right', 'throttle', 'brake', 'reverse', ...LIGHT_BUTTONS, 'put_back',
+  'test',
 ]));
 
 // A smaller movement of an axis or button is none that was asked for.
@@ -148,6 +149,9 @@ export class CalibrationRun {
     } else if (isLight(this.step)) {
       this.#free(index);
       this.profile.lights[this.step] = [index];
+    } else if (this.step === 'put_back') {
+      this.#free(index);
+      this.profile.put_back = [index];
     } else if (this.step === 'throttle' || this.step === 'brake') {
       const rest = this.#rest(kind, index);
       const full = farther(low, high, rest);
@@ -190,7 +194,7 @@ export class CalibrationRun {
     /** @type {(Place & {span: number})|null} */
     let best = null;
     /** @type {Kind[]} */
-    const kinds = this.step === 'reverse' || isLight(this.step) ? ['button'] : ['axis', 'button'];
+    const kinds = isButton(this.step) ? ['button'] : ['axis', 'button'];
     for (const kind of kinds) {
       for (const index of listOf(this.#sample, kind).keys()) {
         const span = valueOf(this.#high, kind, index) - valueOf(this.#low, kind, index);
@@ -263,6 +267,14 @@ export class CalibrationRun {
  */
 function isLight(step) {
   return LIGHT_BUTTONS.some((name) => name === step);
+}
+
+/**
+ * @param {CalibrationStep} step
+ * @returns {boolean} whether it asks for a button
+ */
+function isButton(step) {
+  return step === 'reverse' || step === 'put_back' || isLight(step);
 }
 
 /**

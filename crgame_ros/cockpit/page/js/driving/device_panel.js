@@ -31,8 +31,8 @@ export class DevicePanel {
     const { active, devices } = this.#gamepads;
     this.#list.replaceChildren(
       this.#row('Keyboard', 'W A S D or arrows, space brakes, R reverse; comma and period '
-        + 'indicate, J hazard lights, G horn', active === null,
-        () => this.#gamepads.choose(null)),
+        + 'indicate, J hazard lights, G horn, Backspace back on the lane after a contact',
+      active === null, () => this.#gamepads.choose(null)),
       ...devices.map((device) => this.#row(shortName(device.id),
         device.calibrated ? 'calibrated' : 'default mapping, not calibrated', device === active,
         () => this.#gamepads.choose(device.index), device.index)));

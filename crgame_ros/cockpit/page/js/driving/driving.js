@@ -11,6 +11,7 @@ import { Focus } from './focus.js';
 import { Gamepads } from './gamepad.js';
 import { Hud } from './hud.js';
 import { Keyboard } from './keyboard.js';
+import { PutBackNotice } from './put_back_notice.js';
 import { describeSeat } from './seat_text.js';
 import { InputSender } from './sender.js';
 
@@ -34,6 +35,7 @@ export class Driving {
   // What the instruments say while there is no connection.
   #lost = '';
   #toldDevice = '';
+  #putBackNotice;
 
   /**
    * @param {HTMLElement} root `#hud`, or an ancestor of it
@@ -43,12 +45,17 @@ export class Driving {
   constructor(root, store, connection) {
     this.#store = store;
     this.#connection = connection;
+    this.#putBackNotice = new PutBackNotice(store);
     this.focus = new Focus(store, (reason) => this.#focusChanged(reason));
     this.keyboard = new Keyboard(() => this.seat !== null && this.focus.reason === null, {
       changed: () => this.#moved(this.keyboard.anyHeld),
       reversed: () => this.#setReverse(!this.#reverse),
     });
-    this.#sender = new InputSender(connection, () => this.hands);
+    this.#sender = new InputSender(connection, () => {
+      const { hands } = this;
+      this.#putBackNotice.take(this.seat, 'put_back' in hands && hands.put_back === 1);
+      return hands;
+    });
     this.gamepads = new Gamepads({
       changed: () => this.#moved(this.gamepads?.active !== null),
       gear: (change) => this.#setReverse(change(this.#reverse)),

@@ -39,7 +39,8 @@ export class Keycaps {
     }
     this.node = element('div', { class: 'keycaps', role: 'group',
       'aria-label': 'Keys: W throttle, A left, S brake, D right, space brake, R reverse, '
-        + 'comma and period indicators, J hazard lights, G horn' },
+        + 'comma and period indicators, J hazard lights, G horn, Backspace back on the lane '
+        + 'after a contact' },
     ...this.#caps.values());
     this.#takeLayout();
   }

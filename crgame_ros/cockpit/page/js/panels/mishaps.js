@@ -15,7 +15,7 @@ import { clockTime, oneLine } from './format.js';
  * @param {string} mine the vehicle
  * @returns {Mishap[]}
  */
-export function mishapsOf({ fired, scene, status }, mine) {
+export function mishapsOf({ status }, mine) {
   const { contacts = [], departures = [] } = status ?? {};
   /** @type {(t: number, other: string) => Mishap} */
   const touched = (t, other) => ({
@@ -23,9 +23,6 @@ export function mishapsOf({ fired, scene, status }, mine) {
   return [
     ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map(
       (item) => touched(item.t, item.vehicle === mine ? item.with : item.vehicle)),
-    // Who is stopped by a contact overlaps nobody, so that no verdict tells of it.
-    ...fired.filter(({ by, name }) => by === 'contact' && name.split(' ')[2] === mine).map(
-      ({ n, name }) => touched(n * (scene?.time.dt_s ?? NaN), name.split(' ')[4])),
     ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
       t, touched: false, text: `You left the road at ${clockTime(t)}.` })),
   ].sort((a, b) => a.t - b.t);
