@@ -86,8 +86,8 @@ setup(
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={PACKAGE: ['py.typed', 'cockpit/page/*', 'cockpit/page/**/*',
                             'analysis/report/page/*', 'evaluation/summary/page/*',
-                             'study/data/page/*', 'study/scales/*', 'study/desk/words/*',
-                             'study/desk/page/*', 'study/desk/page/**/*']},
+                            'study/data/page/*', 'study/scales/*', 'study/desk/words/*',
+                            'study/desk/page/*', 'study/desk/page/**/*']},
     data_files=data_files(),
     zip_safe=False,
     # What is imported, at the versions of requirements.txt. Those that other packages need in turn

@@ -16,7 +16,8 @@ import { SampleRing } from './samples.js';
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
 /** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
-/** @import { DeviceDelay, PeopleMessage, Present, Rights, YouMessage } from './people_messages.js' */
+/** @import { DeviceDelay, PeopleMessage, Present, Rights } from './people_messages.js' */
+/** @import { YouMessage } from './people_messages.js' */
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
 /** @import { TasksMessage } from './tasks/task_messages.js' */
 
@@ -97,17 +98,9 @@ export class Store {
 
   /** Counts resets; -1 before the first frame. */
   epoch = -1;
-  /**
-   * The newest plan by vehicle's index.
-   *
-   * @type {Map<number, PlanFrame>}
-   */
+  /** @type {Map<number, PlanFrame>} the newest plan by vehicle's index */
   plans = new Map();
-  /**
-   * The newest predictions by index of the asking AV.
-   *
-   * @type {Map<number, PredictionFrame>}
-   */
+  /** @type {Map<number, PredictionFrame>} the newest predictions by index of the asking AV */
   predictions = new Map();
   /** What AVs perceive, and the map of permanent obstacles. */
   perceived = new Perceived();
