@@ -107,6 +107,8 @@ def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> 
         person.go_on()
         person.shows('wait')
         browser.driver.switch_to.window(own)
+        # Orders are about what the experimenter sees: one about the item before is refused.
+        browser.wait('document.querySelector("#items tr:nth-child(2)").dataset.state === "now"')
         give_order(person, 'Skip this item', 'asked elsewhere')
         browser.wait('document.querySelector("#items tr:nth-child(2)").dataset.state'
                      ' === "skipped"')

@@ -132,6 +132,8 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
     page.wait('crgame.driving.seat === "hv0"', 'the seat again')
     assert page.run('return crgame.tasks.prompts.every((prompt) => prompt.answered'
                     ' || prompt.open.number !== arguments[0])', reloaded)
+    page.wait('crgame.store.tasks.open.every((each) => each.number !== arguments[0])',
+              'the end of the light that a reload interrupted', reloaded)
     page.give_back('hv0')
     page.tab('events')
     page.click('[data-task="call"] button')

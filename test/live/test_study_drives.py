@@ -20,6 +20,7 @@ import os
 from pathlib import Path
 import signal
 import threading
+import time
 from typing import Any
 
 from crgame_ros.paths import scenarios_directory
@@ -97,6 +98,13 @@ class Participant:
         self._page.hold_keys('hv0', [1, 0, 0, 0])
         self.loop.call_soon_threadsafe(self.drives.ready, item)
 
+    def stands(self) -> None:
+        """Assert that a trial does not begin by itself under who is in its seat."""
+        assert self._page is not None
+        time.sleep(1.0)
+        assert self._page.documents['status']['run'] == 'paused'
+        assert self._page.documents['status']['n'] == 0
+
     def call(self, function: Any, *arguments: Any) -> None:
         self.loop.call_soon_threadsafe(function, *arguments)
 
@@ -115,6 +123,8 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str,
         person.wait_for(DrivePhase.DRIVING, 'main/2')
         wait_until(lambda: (person.drives.state.time_s or 0.0) > 1.0, 'a second of the run')
         person.call(person.drives.abort, 'a telephone rang')
+        person.wait_for(DrivePhase.READY, 'main/2')
+        person.stands()
         person.begin('main/2')
         person.begin('main/3')
         person.wait_for(DrivePhase.DRIVING, 'main/3')

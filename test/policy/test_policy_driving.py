@@ -73,7 +73,7 @@ def test_a_policy_drives_a_human_along_the_lane() -> None:
 
 def test_pedals_of_a_policy_are_the_commands_of_its_seat() -> None:
     commands = driven('cut_in', 'by_pedals', av=False, seconds=1.0).commands[1:, 0]
-    assert (commands == np.array((np.float32(0.5), 0.0, np.float32(0.01), 0.0, 0.0))).all()
+    assert (commands == np.array((np.float32(0.5), 0.0, np.float32(0.01), 0.0, 0.0, 0.0))).all()
 
 
 def test_a_policy_that_fails_brakes_as_every_planner_that_fails() -> None:

@@ -48,7 +48,8 @@ ONLY_WITH_A_JOY_NODE = ('/<hv>/joy', 'driver_node')
 ONLY_WITH_DRIVABILITY_STOP = ('/<v>/drivability', 'sim_node')
 # No test has a wheel; test_live_force.py looks at what one brings.
 ONLY_WITH_A_MOTOR = frozenset({('/<v>/odom', 'driver_node'), ('/<v>/drivability', 'driver_node')})
-OPTIONAL = frozenset({ONLY_WITH_A_JOY_NODE, ONLY_WITH_DRIVABILITY_STOP})
+ONLY_WITH_TASKS = ('/tasks/report', 'sim_node')
+OPTIONAL = frozenset({ONLY_WITH_A_JOY_NODE, ONLY_WITH_DRIVABILITY_STOP, ONLY_WITH_TASKS})
 ONLY_WITH_PERCEPTION = (('/<av>/plan_request', 'sim_node'), ('/<av>/localization', 'cockpit_node'),
                         ('/<av>/scan', 'cockpit_node'))
 # Processes that only a game with reactive traffic and a map has.
@@ -129,6 +130,7 @@ def _full_game(folder: Path) -> Path:
     game['drivability']['stop'] = True
     game['avs'][1]['perception'] = {}
     game['traffic'] = {'agents': 2}
+    game['tasks'] = [{'name': 'radio', 'secondary_task': {}}]
     assert main(['rasterize', game['scenario'], str(folder / 'map')]) == 0
     game['occupancy'] = str(folder / 'map' / 'map.yaml')
     path = folder / 'full.yaml'
