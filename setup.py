@@ -127,7 +127,7 @@ setup(
             'flake8-blind-except', 'flake8-builtins', 'flake8-class-newline',
             'flake8-comprehensions', 'flake8-deprecated', 'flake8-docstrings',
             'flake8-import-order', 'flake8-quotes', 'gymnasium>=1.4,<2', 'jsonschema>=4.26,<5',
-            'mcap-ros2-support>=0.6,<1', 'mypy>=2.4,<3', 'pettingzoo>=1.27,<2',
+            'mcap-ros2-support>=0.6,<1', 'mypy>=2.4,<3', 'pandas>=3.1,<4', 'pettingzoo>=1.27,<2',
             'polars>=2.1,<3', 'psutil>=7,<8', 'pytest>=7.4,<8', 'pytest-xdist>=3.8,<4',
             'ros-ament-flake8==0.17.3', 'ros-ament-pep257==0.17.3', 'ruff>=0.17.5,<0.18',
             'selenium>=4.51,<5', 'types-PyYAML>=6.0.12,<7',

@@ -100,6 +100,10 @@ def check(file: Path, out: Path, sessions: list[StudySession]) -> list[str]:
                           if session.answers.get(name) != value]
         wrong += [f"{session.folder.name}: {name} is {late_s} s from the page's clock"
                   for name, late_s in marker_errors(session) if not abs(late_s) <= MARKER_S]
+        told = Counter(row['name'] for row in table(out, 'events')
+                       if (row['participant'], row['kind']) == (session.folder.name, 'marker'))
+        wrong += [f'events.csv has {name} of {session.folder.name} {told[name]} times'
+                  for name, _ in session.marked if told[name] != 1]
     rows = table(out, 'trials')
     keys = Counter((row['participant'], row['trial']) for row in rows)
     expected = {(session.folder.name, str(number)) for session in sessions

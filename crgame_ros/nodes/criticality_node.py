@@ -73,10 +73,12 @@ class CriticalityNode(ObserverNode[Criticality]):
             return
         self._n = observer.n
         rows = criticality_rows(observer, self.epoch, observer.n)
-        self._message.layout.dim[0].size = len(rows)
-        self._message.layout.dim[0].stride = rows.size
-        self._message.data = array('d', rows.tobytes())
-        self._rows.publish(self._message)
+        # A table without rows would not even tell of which step it is.
+        if len(rows):
+            self._message.layout.dim[0].size = len(rows)
+            self._message.layout.dim[0].stride = rows.size
+            self._message.data = array('d', rows.tobytes())
+            self._rows.publish(self._message)
         beats = time.monotonic() - self._heartbeat_s > HEARTBEAT_S
         if beats:
             self._heartbeat_s = time.monotonic()

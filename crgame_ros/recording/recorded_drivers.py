@@ -29,6 +29,7 @@ from crgame_ros.recording.reader import BagReader
 _DIAGNOSTICS = '/diagnostics'
 # Of people at pages, and of devices at the machine of the game.
 _DRIVER = re.compile('(?:cockpit|driver)_node: (.+) driver')
+_DELAYS = ('input_delay_ms', 'round_trip_ms')
 
 
 class RecordedDriver(NamedTuple):
@@ -38,10 +39,12 @@ class RecordedDriver(NamedTuple):
     :param spell: who, which seat, from which step to which.
     :param input_delay_ms: median from the hand to the page's picture, of a device at the machine
         to the first state that obeys [ms]; None if not measured.
+    :param round_trip_ms: median from the page to the simulation and back [ms]; likewise.
     """
 
     spell: DrivingSpell
     input_delay_ms: float | None
+    round_trip_ms: float | None
 
 
 def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, ...]:
@@ -57,7 +60,8 @@ def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, 
             return ()
         wanted = read_epoch(reader, epoch).game.epoch
         spells: tuple[DrivingSpell, ...] = ()
-        delays_ms: dict[tuple[str, str], list[float]] = defaultdict(list)
+        # By seat, person and name of the value.
+        delays_ms: dict[tuple[str, str, str], list[float]] = defaultdict(list)
         for message in reader.messages([DRIVERS_TOPIC, _DIAGNOSTICS]):
             content = reader.decode(message).message
             if message.topic == DRIVERS_TOPIC:
@@ -65,10 +69,12 @@ def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, 
             else:
                 for status in map(read_status, content.status):
                     if found := _DRIVER.fullmatch(status.name):
-                        _note(delays_ms[found[1], status.values.get('person', '')],
-                              status.values.get('input_delay_ms', ''))
-    return tuple(RecordedDriver(item, _median(delays_ms.get(
-        (item.seat, '' if item.person is None else item.person.id)))) for item in spells)
+                        for name in _DELAYS:
+                            _note(delays_ms[found[1], status.values.get('person', ''), name],
+                                  status.values.get(name, ''))
+    return tuple(RecordedDriver(item, *(_median(delays_ms.get(
+        (item.seat, '' if item.person is None else item.person.id, name)))
+        for name in _DELAYS)) for item in spells)
 
 
 def _newer(spells: tuple[DrivingSpell, ...], text: str,

@@ -35,6 +35,7 @@ class SessionEvent(StrEnum):
     """What an entry of the journal says."""
 
     BEGUN = 'begun'
+    OPENED = 'opened'
     STARTED = 'started'
     FINISHED = 'finished'
     ABORTED = 'aborted'
@@ -85,6 +86,10 @@ class ParticipantSession:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.journal.close()
+
+    def open(self, software: Mapping[str, str | None]) -> None:
+        """Say with which programs the session begins, or goes on after an end."""
+        self._add(SessionEvent.OPENED, software=dict(software))
 
     @property
     def done(self) -> frozenset[str]:

@@ -99,8 +99,8 @@ class StudySession:
         assert self._process.stdout is not None
         self._process.stdout.readline()
         links = [re.findall(r'http\S+', self._process.stdout.readline()) for _ in range(2)]
-        self.page, self._link = links[0][0], links[1][0]
-        self._experimenter = Experimenter(self._link)
+        self.page, self.link = links[0][0], links[1][0]
+        self._experimenter = Experimenter(self.link)
 
     def _open(self) -> None:
         self._profile = Path(tempfile.mkdtemp(prefix='crgame_study_'))
@@ -108,6 +108,12 @@ class StudySession:
         self._browser = self._end_browser.__enter__()
         self._browser.open(self.page)
         self._robot = StudyRobot(self._browser)
+
+    @property
+    def browser(self) -> Browser:
+        """Give the participant's browser."""
+        assert self._browser is not None
+        return self._browser
 
     @property
     def entries(self) -> list[dict[str, Any]]:
@@ -138,7 +144,7 @@ class StudySession:
         if time_s is not None:
             with suppress(OSError, websocket.WebSocketException):
                 self._experimenter.order('mark', name=name)
-            self.marked.append((name, time_s))
+                self.marked.append((name, time_s))
 
     def kill(self, victim: str) -> bool:
         """Kill one of `VICTIMS` (-9); tell whether there was one."""

@@ -80,6 +80,9 @@ def test_the_tables_hold_each_trial_once(conducted: StudySession) -> None:
     trials = table(out / 'data' / 'trials.csv')
     assert [(row['trial'], row['condition'], row['outcome']) for row in trials] == [
         ('1', 'idm', 'time'), ('2', 'steady', 'time')]
+    for row in trials:
+        assert 0.0 < float(row['link_delay_s']) < 1.0
+        assert (out / row['report']).stat().st_size > 10_000
     answers = {row['text'] for row in table(out / 'data' / 'answers.csv')
                if row['question'] == 'why'}
     assert answers == {conducted.answers['why']}

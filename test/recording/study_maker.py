@@ -116,7 +116,7 @@ class StudyMaker:
             attempt = session.start(run)
             self.record(session, item.what, run, rng)
             session.finish(run=run, attempt=attempt, outcome='time', end_time_s=DURATION_S,
-                           start_at=self.clock_s - DURATION_S, link_delay_ms=4.0)
+                           start_at=self.clock_s - DURATION_S)
         elif isinstance(item.what, Fields):
             session.finish({'age': int(rng.integers(18, 80))})
         elif isinstance(item.what, Questions):
@@ -159,6 +159,8 @@ def take_part(make: StudyMaker) -> Studied:
     """Let four people take part: two wholly, one with troubles, one who leaves."""
     for place, name in enumerate(('P01', 'P02')):
         with make.session(name, place) as session:
+            for _ in range(2):
+                session.open({'crgame_ros': '9.8', 'commit': 'abc'})
             rng = np.random.default_rng(place)
             while session.next_item is not None:
                 make.do(session, rng, NASTY if name == 'P01' else None)

@@ -25,6 +25,7 @@ import subprocess
 import sys
 import time
 
+from crgame_ros import __version__
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.cli import main
 from crgame_ros.recording.run_folder import FINISHED_MARK
@@ -67,7 +68,10 @@ def test_a_trial_that_counts_is_one_row(studied: Studied) -> None:
     planner = {'idm': 'idm', 'cv': 'constant-velocity'}
     assert trials['av_planner'].to_list() == [planner[name] for name in trials['condition']]
     assert trials['random_seed'].unique().to_list() == [3]
-    assert trials['link_delay_s'].unique().to_list() == [0.004]
+    # Nobody sat at a page.
+    assert trials['link_delay_s'].null_count() == len(ROWS)
+    for row in trials.iter_rows(named=True):
+        assert row['run'] in (studied.folder / row['report']).read_text('utf-8')
     assert trials['recording'][4] == 'participants/P03/runs/1/run_3'
     # Williams: both orders of two conditions.
     assert {tuple(trials.filter(participant=name)['condition']) for name in ('P01', 'P02')} == {
@@ -238,6 +242,9 @@ def test_the_dictionary_names_every_column(studied: Studied) -> None:
     assert source['files']['study/study.yaml'] == hashlib.sha256(
         (studied.folder / 'study' / 'study.yaml').read_bytes()).hexdigest()
     assert 'Kennedy' in json.dumps(source['questionnaires'])
+    (used,) = source['sessions_run_by']['P01']
+    assert used == {'crgame_ros': '9.8', 'commit': 'abc'}
+    assert source['data_written_by']['crgame_ros'] == __version__
 
 
 def test_twice_gives_the_same_and_measures_nothing_again(copied: Path) -> None:

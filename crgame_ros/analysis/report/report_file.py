@@ -12,26 +12,20 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The file of a report: written whole or not at all, and what wrote it."""
+"""The file of a report: written whole or not at all."""
 
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
-import os
 from pathlib import Path
-import platform
 
-from crgame_ros import __version__
 from crgame_ros.analysis.report.report_page import report_html
 from crgame_ros.analysis.report.report_run import ReportRun
 from crgame_ros.analysis.report.run_section import software_note
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import write_text
+from crgame_ros.software import software
 
 # More lines nobody tells apart.
 MOST_RUNS = 12
-# Of those that compute what a report tells.
-_PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker',
-             'plotly')
 
 
 def write_report(runs: Sequence[ReportRun], path: Path, driven_here: bool = False) -> None:
@@ -63,25 +57,3 @@ def check_report_runs(count: int) -> None:
     """Refuse more runs than anybody could compare, by their number."""
     if count > MOST_RUNS:
         raise InputError(f'{count} runs', 'report', f'give {MOST_RUNS} at most')
-
-
-def software() -> tuple[tuple[str, str], ...]:
-    """Name the software and the machine: nothing that changes from one minute to the next."""
-    found = [('crgame_ros', __version__), ('Python', platform.python_version())]
-    for name in _PACKAGES:
-        try:
-            found.append((name, version(name)))
-        except PackageNotFoundError:
-            continue
-    machine = f'{platform.system()} {platform.release()}, {platform.machine()}'
-    return (*found, ('on', f'{machine}, {_processor()}'))
-
-
-def _processor() -> str:
-    count = f'{os.cpu_count()} cores'
-    try:
-        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8', errors='replace').splitlines()
-    except OSError:
-        return count
-    names = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
-    return f'{names[0]}, {count}' if names else count

@@ -153,7 +153,7 @@ def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
 def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
     """Say who was in the seats of cockpits, and whose device at the machine drove."""
     last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
-    for spell, delay_ms in run.record.drivers:
+    for spell, delay_ms, _ in run.record.drivers:
         person = spell.person
         until_n = last_n if spell.until_n is None else spell.until_n
         if person is None and delay_ms is not None:

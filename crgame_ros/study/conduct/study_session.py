@@ -23,6 +23,7 @@ import signal
 from urllib.parse import urlsplit
 
 from crgame_ros.cockpit.access import Access
+from crgame_ros.software import software_with_commit
 from crgame_ros.study.conduct.live_drives import LiveDrives
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.desk_server import serve_desk
@@ -68,6 +69,7 @@ def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
         if session.next_item is None:
             say(f'{request.participant} is done: nothing is left')
             return True
+        session.open(software_with_commit())
         asyncio.run(_conduct(session, request, say))
         return session.next_item is None
 

@@ -126,7 +126,10 @@ def _summary(run: TabulatedRun) -> dict[str, Any]:
         'benchmark_id': game.benchmark_id, 'seed': game.seed, 'epoch': game.epoch,
         'humans': {item.id: item.driver for item in game.humans},
         'planners': {item.id: item.planner for item in game.avs},
-        'input_delay_ms': {item.spell.seat: item.input_delay_ms for item in run.record.drivers},
+        # Whoever had a seat last of those whose delay is known.
+        **{name: {item.spell.seat: delay_ms for item in run.record.drivers
+                  if (delay_ms := getattr(item, name)) is not None}
+           for name in ('input_delay_ms', 'round_trip_ms')},
         # Of each seat which view its page showed, from when to when.
         'views': (run.timing or {}).get('view') or {},
         'tasks': [{

@@ -148,6 +148,16 @@ class ParticipantRecord:
         return float(self.entries[0]['at'])
 
     @property
+    def software(self) -> list[dict[str, Any]]:
+        """Tell with which programs the session was run, each once, in their order."""
+        found: list[dict[str, Any]] = []
+        for entry in self.entries:
+            if entry['entry'] == SessionEvent.OPENED and entry.get('software') not in (
+                    None, *found):
+                found.append(entry['software'])
+        return found
+
+    @property
     def ended_at(self) -> float:
         """Give when the last entry was made [s since 1970]."""
         return float(self.entries[-1]['at'])

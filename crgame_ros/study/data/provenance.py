@@ -18,17 +18,15 @@ from collections.abc import Mapping
 import hashlib
 from pathlib import Path
 import statistics
-import subprocess
 from typing import Any
 
-from crgame_ros.analysis.report.report_file import software
 from crgame_ros.schema.writing import write
+from crgame_ros.software import software_with_commit
 from crgame_ros.study.data.conducted_study import STUDY
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.timing_quality import BOUNDS
 from crgame_ros.study.trial_plan import conditions_of
 
-_GIT_S = 10.0
 # Columns of the table of trials about the picture.
 _VIEWS = ('view_across_deg', 'screen_width_m', 'eye_distance_m', 'view_rate_hz')
 
@@ -45,10 +43,9 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
         'study': study.name, 'title': study.title.in_language(study.language),
         'file': folder.relative(folder.study_path), 'seed': study.seed,
         'files': {folder.relative(path): _digest(path) for path in files},
-        'data_written_by': dict(software()) | {'commit': commit()},
-        # Of what the sessions themselves have noted.
-        'sessions_run_by': {record.id: record.entries[0].get('software')
-                            for record in data.records},
+        'data_written_by': software_with_commit(),
+        # As the sessions have noted it: more than one where it changed on the way.
+        'sessions_run_by': {record.id: record.software for record in data.records},
         'conditions': {f'{block.name}: {condition.name}': _plain(write(condition.settings))
                        for block in study.blocks for condition in conditions_of(study, block)},
         'random_seeds': sorted({row['random_seed'] for row in _rows(data)
@@ -67,19 +64,6 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
             'positions and motion of vehicles': 'rear axle',
             'gaps, distances, times to collision': 'footprints, bumper to bumper',
             'lane keeping': 'center'}}
-
-
-def commit() -> str | None:
-    """Name the commit of this program; None of one that is installed."""
-    root = Path(__file__).resolve().parents[3]
-    if not (root / '.git').exists():
-        return None
-    try:
-        done = subprocess.run(['git', '-C', str(root), 'rev-parse', 'HEAD'], timeout=_GIT_S,
-                              capture_output=True, text=True, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return done.stdout.strip()
 
 
 def spread(values: list[float | None]) -> dict[str, float] | None:

@@ -26,7 +26,8 @@ from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
 # Entries of the journal that have other names here, and those that say of what they are.
-_OF_SESSION = {SessionEvent.BEGUN: 'session_begun', SessionEvent.ENDED: 'session_ended'}
+_OF_SESSION = {SessionEvent.BEGUN: 'session_begun', SessionEvent.OPENED: 'program_started',
+               SessionEvent.ENDED: 'session_ended'}
 _OF_ITEM = (SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
             SessionEvent.SKIPPED, SessionEvent.REPEATED)
 GAME_EVENT = 'game_event'

@@ -15,9 +15,14 @@
 """What a study has found, so far: its tables, written again and again while it goes on."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
+from crgame_ros.analysis.report.report_command import REPORT_FILE
+from crgame_ros.analysis.report.report_file import write_report
+from crgame_ros.analysis.report.report_run import read_report_run
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.errors import CrgameError
 from crgame_ros.study.data.answers_table import answer_rows, ANSWERS
@@ -89,12 +94,13 @@ class StudyData:
 
 def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
                     progress: Callable[[str, float], object] = lambda _what, _share: None,
-                    ) -> StudyData:
+                    reports: bool = False) -> StudyData:
     """
     Read what a study has found; runs that were not measured before are.
 
     :param say: takes one line for people.
     :param progress: is told what is under way, and how much of it is done, 0 to 1.
+    :param reports: whether each trial that counts gets the report of its run, in its folder.
     :raises InputError: if the study cannot be read, or its folder not be written.
     """
     asked = AskedQuestions(folder.study)
@@ -109,6 +115,8 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
             run, problem = _run(folder, record, attempt, runs, say, progress)
             if run is not None:
                 measured[item] = run
+                if reports and attempt.folder is not None:
+                    _report(attempt.folder, _name(record, attempt.folder), say, progress)
             data.trials.append(CountedTrial(record, attempt, run, data.trials_table.row(
                 record, attempt, run, problem)))
         events += event_rows(record, measured)
@@ -136,8 +144,23 @@ def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttemp
     problem = finished_recording(attempt.folder, record.folder, say)
     if problem:
         return None, problem
-    name = f'{record.id}/{attempt.folder.relative_to(record.folder).as_posix()}'
     try:
-        return runs.measured(attempt.folder, name, progress), ''
+        return runs.measured(attempt.folder, _name(record, attempt.folder), progress), ''
     except CrgameError as error:
         return None, str(error)
+
+
+def _name(record: ParticipantRecord, run: Path) -> str:
+    return f'{record.id}/{run.relative_to(record.folder).as_posix()}'
+
+
+def _report(run: Path, name: str, say: Callable[[str], object],
+            progress: Callable[[str, float], object]) -> None:
+    """Write the report of a run that has none, under the name that it has in tables."""
+    if (run / REPORT_FILE).exists():
+        return
+    try:
+        told = read_report_run(run, None, partial(progress, f'reporting {run}'))
+        write_report([replace(told, name=name)], run / REPORT_FILE)
+    except CrgameError as error:
+        say(f'note: {run}: has no report: {error}')

@@ -33,6 +33,8 @@ def add_data_arguments(what: Any) -> None:
     data.add_argument('folder', type=Path, help='of the study')
     data.add_argument('--bids', action='store_true',
                       help='events and participants as BIDS has them, too')
+    data.add_argument('--no-reports', action='store_true',
+                      help='without the report of each run, which takes some seconds')
     data.set_defaults(command=data_command)
     report = what.add_parser('report', help='write one HTML file about the study')
     report.add_argument('folder', type=Path, help='of the study')
@@ -60,7 +62,7 @@ def data_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
-        data = _read(folder)
+        data = _read(folder, reports=not values.no_reports)
         rows = write_study_data(data)
         if values.bids:
             from crgame_ros.study.data.bids_folder import write_bids
@@ -110,7 +112,7 @@ def rerun_command(values: argparse.Namespace) -> int:
     return 0
 
 
-def _read(folder: Any) -> 'StudyData':
+def _read(folder: Any, reports: bool = False) -> 'StudyData':
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.data.study_data import read_study_data
     progress = Progress(_say, '')
@@ -119,7 +121,7 @@ def _read(folder: Any) -> 'StudyData':
         progress.what = what
         progress(share)
 
-    data = read_study_data(folder, _say, tell)
+    data = read_study_data(folder, _say, tell, reports)
     for problem in data.problems:
         _say(f'note: {problem}')
     return data

@@ -82,7 +82,7 @@ _RUN_COLUMNS = ('benchmark_id', 'scenario_sha256', 'game_sha256', 'duration_s',
 _TIMING = (
     Column('input_delay_s', NUMBER, 's', "median from the participant's hand to the page's "
            'picture', empty='nobody measured it'),
-    Column('link_delay_s', NUMBER, 's', 'of the link between page and simulation',
+    Column('link_delay_s', NUMBER, 's', 'median from the page to the simulation and back',
            empty='nobody measured it'),
     *(Column(name, kind, unit, what, variant='of the view that was shown longest',
              empty='nobody recorded it') for name, kind, unit, what in (
@@ -156,8 +156,6 @@ class TrialsTable:
             **self._drive(record, attempt), 'problem': problem or None}
         if run is not None:
             row |= self._measured(attempt, run)
-        link_ms = attempt.says('link_delay_ms')
-        row['link_delay_s'] = 1e-3 * link_ms if isinstance(link_ms, int | float) else None
         faults = timing_faults(row)
         row |= {'timing_flag': bool(faults), 'timing_reason': '; '.join(faults)}
         return row | self._answers(record, trial)
@@ -189,13 +187,13 @@ class TrialsTable:
         vehicle = seat if seat in humans else humans[0] if humans else None
         told = run.row('runs')
         measures = run.row('vehicles', id=vehicle)
-        delay_ms = summary['input_delay_ms'].get(vehicle)
         return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],
                 'av_planner': '+'.join(dict.fromkeys(summary['planners'].values())),
                 **task_values(run.table('detection_scores').to_pylist(),
                               run.table('take_over_requests').to_pylist()),
                 **_view(summary.get('views', {}).get(vehicle, ())),
-                'input_delay_s': None if delay_ms is None else 1e-3 * delay_ms,
+                'input_delay_s': _seconds(summary['input_delay_ms'].get(vehicle)),
+                'link_delay_s': _seconds(summary['round_trip_ms'].get(vehicle)),
                 **{name: told[name] for name in _RUN_COLUMNS},
                 **{column.name: measures.get(name) for name, column in self._measures.items()}}
 
@@ -224,6 +222,10 @@ def _view(periods: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             'screen_width_m': longest.get('screen_width_m'),
             'eye_distance_m': longest.get('eye_distance_m'),
             'view_rate_hz': longest.get('rate_hz'), 'view_changes': len(periods) - 1}
+
+
+def _seconds(delay_ms: float | None) -> float | None:
+    return None if delay_ms is None else 1e-3 * delay_ms
 
 
 def _count(value: Any) -> int | None:

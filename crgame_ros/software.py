@@ -1,0 +1,74 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""With which programs something was computed, and on which machine."""
+
+from importlib.metadata import PackageNotFoundError, version
+import os
+from pathlib import Path
+import platform
+import subprocess
+
+from crgame_ros import __version__
+
+# Of those that compute what a report tells.
+_PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker',
+             'plotly')
+_GIT_S = 10.0
+
+
+def software() -> tuple[tuple[str, str], ...]:
+    """Name the software and the machine: nothing that changes from one minute to the next."""
+    found = [('crgame_ros', __version__), ('Python', platform.python_version())]
+    for name in _PACKAGES:
+        try:
+            found.append((name, version(name)))
+        except PackageNotFoundError:
+            continue
+    machine = f'{platform.system()} {platform.release()}, {platform.machine()}'
+    return (*found, ('on', f'{machine}, {_processor()}'))
+
+
+def _processor() -> str:
+    count = f'{os.cpu_count()} cores'
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8', errors='replace').splitlines()
+    except OSError:
+        return count
+    names = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
+    return f'{names[0]}, {count}' if names else count
+
+
+def software_with_commit() -> dict[str, str | None]:
+    """Name versions, machine and commit: nothing that changes from one minute to the next."""
+    return dict(software()) | {'commit': _commit()}
+
+
+def _commit() -> str | None:
+    """Name the commit of this program, with a + if it was changed since; None if installed."""
+    root = Path(__file__).resolve().parents[1]
+    if not (root / '.git').exists():
+        return None
+    commit = _git(root, 'rev-parse', 'HEAD')
+    changed = _git(root, 'status', '--porcelain', '--untracked-files=no')
+    return commit and commit + ('+' if changed else '')
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    try:
+        done = subprocess.run(['git', '-C', str(root), *arguments], timeout=_GIT_S,
+                              capture_output=True, text=True, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()
