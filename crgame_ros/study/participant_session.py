@@ -87,7 +87,7 @@ class ParticipantSession:
                  trace: TracebackType | None) -> None:
         self.journal.close()
 
-    def open(self, software: Mapping[str, str | None]) -> None:
+    def note_software(self, software: Mapping[str, str | None]) -> None:
         """Say with which programs the session begins, or goes on after an end."""
         self._add(SessionEvent.OPENED, software=dict(software))
 

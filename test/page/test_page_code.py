@@ -15,78 +15,30 @@
 """The page's own checks: types by tsc, rules by eslint, unit tests by Node's runner."""
 
 from collections.abc import Callable
-import fcntl
 import json
 import os
 from pathlib import Path
 import re
 import shutil
-import subprocess
 
+from page_tools import HERE, installed_tools, is_stale, missing, ROOT, run
 import pytest
 
 # In a worker with what else walks through this folder: npm writes into it.
 pytestmark = pytest.mark.xdist_group('test_lint')
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
 PAGE = ROOT / 'crgame_ros' / 'cockpit' / 'page' / 'js'
 DESK = ROOT / 'crgame_ros' / 'study' / 'desk' / 'page' / 'js'
 REPORT = ROOT / 'crgame_ros' / 'analysis' / 'report' / 'page'
 HEAD = ['// Copyright 2026 The crgame_ros authors', '// SPDX-License-Identifier: Apache-2.0']
-# What eslint itself needs.
-NODE = (20, 19)
 MAX_LINES = 400
 MAX_COLUMNS = 99
-# Seconds each, on a machine that has nothing else to do.
-INSTALL_S, CHECK_S = 600.0, 600.0
-
-
-def missing(path: str | None = None) -> str:
-    """
-    Say in a few words what these tests lack on this machine, empty if nothing.
-
-    :param path: where programs are looked for, by default as everywhere.
-    """
-    lacking = [name for name in ('node', 'npm') if shutil.which(name, path=path) is None]
-    if lacking:
-        return f'{" and ".join(lacking)} missing'
-    node = str(shutil.which('node', path=path))
-    said = subprocess.run([node, '--version'], capture_output=True, text=True).stdout.strip()
-    version = re.match(r'v(\d+)\.(\d+)', said)
-    if version is None or (int(version[1]), int(version[2])) < NODE:
-        return f'node is {said}, older than {NODE[0]}.{NODE[1]}'
-    return ''
-
-
-def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> None:
-    """Run a tool and fail with what it says."""
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=timeout_s)
-    if done.returncode != 0:
-        pytest.fail(f'{Path(command[0]).name} {command[1]}:\n{done.stdout}{done.stderr}',
-                    pytrace=False)
-
-
-def is_stale(folder: Path) -> bool:
-    """Tell whether node_modules is absent, incomplete or older than the lock file."""
-    # npm writes it when everything else is there.
-    installed = folder / 'node_modules' / '.package-lock.json'
-    lock = folder / 'package-lock.json'
-    return not installed.exists() or installed.stat().st_mtime < lock.stat().st_mtime
 
 
 @pytest.fixture(scope='module')
 def tools() -> Path:
-    """Give the folder of the tools that package-lock.json pins, installed if they are not."""
-    why = missing()
-    if why:
-        pytest.skip(f'the checks of the page are not run: {why}')
-    # Another call of pytest in this clone waits.
-    with (HERE / 'package-lock.json').open() as handle:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        if is_stale(HERE):
-            run('npm', 'ci', '--no-progress', cwd=HERE, timeout_s=INSTALL_S)
-    return HERE / 'node_modules'
+    """Give the folder of the tools that package-lock.json pins."""
+    return installed_tools()
 
 
 def check_types(root: Path) -> None:

@@ -160,7 +160,7 @@ def take_part(make: StudyMaker) -> Studied:
     for place, name in enumerate(('P01', 'P02')):
         with make.session(name, place) as session:
             for _ in range(2):
-                session.open({'crgame_ros': '9.8', 'commit': 'abc'})
+                session.note_software({'crgame_ros': '9.8', 'commit': 'abc'})
             rng = np.random.default_rng(place)
             while session.next_item is not None:
                 make.do(session, rng, NASTY if name == 'P01' else None)

@@ -34,6 +34,7 @@ from crgame_ros.study.data.bids_folder import escaped
 from crgame_ros.study.session_journal import JOURNAL, SessionJournal
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
+import pandas
 import polars
 import pytest
 from study_maker import DURATION_S, lines_of, NASTY, Studied
@@ -145,6 +146,21 @@ def test_texts_come_back_as_they_were(studied: Studied) -> None:
     assert polars.read_csv(data / 'trials.csv')['remarks_remark'][0] == NASTY
     seen = table(studied.folder, 'answers').filter(question='seen')['text'][0]
     assert json.loads(seen) == ['car', 'sign']
+
+
+def test_pandas_reads_the_same(studied: Studied) -> None:
+    """From the path alone."""
+    data = studied.folder / 'data'
+    trials = table(studied.folder, 'trials')
+    for frame in (pandas.read_csv(data / 'trials.csv'),
+                  pandas.read_parquet(data / 'trials.parquet')):
+        assert frame.columns.tolist() == trials.columns and len(frame) == trials.height
+        assert frame['remarks_remark'][0] == NASTY
+        assert frame['mean_speed_m_per_s'].tolist() == pytest.approx(
+            trials['mean_speed_m_per_s'].to_list(), rel=1e-15)
+        assert frame['problem'].isna().all()
+    runs = pandas.read_parquet(data / 'runs' / 'vehicles.parquet')
+    assert set(runs['participant']) == {'P01', 'P02', 'P03'}
 
 
 def test_r_reads_the_same(studied: Studied, tmp_path: Path) -> None:

@@ -206,7 +206,8 @@ def test_the_whole_world_is_mapped_for_each_planner(shared_scenarios: Path) -> N
     run.drive(20, commands=lambda n: [GAS])
     plain = setup_without_transforms(setup)
     reference = PlanRequests(plain).build(plain.avs[0], 0, run.simulation.states, PlanRequests(
-        plain).forecast(2, 20, run.simulation.states, run.simulation.avs, run.result.objects, ()))
+        plain).forecast(2, 20, run.simulation.states, run.simulation.avs, run.result.objects, ()),
+        run.simulation.lights)
     found_objects = 0
     for av_id in ('av0', 'av1'):
         request = run.result.requests[av_id]

@@ -69,7 +69,7 @@ def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
         if session.next_item is None:
             say(f'{request.participant} is done: nothing is left')
             return True
-        session.open(software_with_commit())
+        session.note_software(software_with_commit())
         asyncio.run(_conduct(session, request, say))
         return session.next_item is None
 

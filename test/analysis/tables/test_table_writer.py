@@ -32,6 +32,7 @@ from crgame_ros.analysis.tables.column import (
 )
 from crgame_ros.analysis.tables.table_writer import FORMATS, TableWriter
 import numpy as np
+import pandas
 import polars
 import pyarrow.parquet as pq
 import pytest
@@ -88,7 +89,6 @@ def test_polars_reads_both(tmp_path: Path) -> None:
 
 def test_pandas_reads_both(tmp_path: Path) -> None:
     """The same in pandas, without an option."""
-    pandas = pytest.importorskip('pandas')
     for file_format, read, texts in (('parquet', pandas.read_parquet, TEXTS),
                                      ('csv', pandas.read_csv, guarded(TEXTS))):
         frame = read(write(tmp_path, file_format, ROWS))

@@ -1,0 +1,47 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The cockpit's page has no barriers that axe finds: WCAG 2.2, levels A and AA."""
+
+from axe_support import barriers
+from browser_support import Browser
+from crgame_ros.paths import scenarios_directory
+import pytest
+from world_support import RecordedRun, RunBackend, served
+
+ALARMS = [{'id': f'{kind}:{subject}', 'kind': kind, 'subject': subject, 'text': 'so',
+           'since_t': 1.0} for kind, subject in (('collision', 'hv0'), ('off_road', 'hv0'))]
+
+
+@pytest.mark.parametrize('theme', ['light', 'dark'])
+def test_every_tab(browser: Browser, theme: str) -> None:
+    """With the alarms of a vehicle that somebody drives."""
+    found = []
+    with served(RunBackend(RecordedRun(scenarios_directory() / 'traffic.yaml', 4.0),
+                           every=2)) as server:
+        browser.open(server.address)
+        browser.wait('window.crgame?.ready && crgame.world.shown && crgame.store.me.id')
+        browser.run('document.documentElement.dataset.theme = arguments[0]', theme)
+        server.publish('alarms', {'active': ALARMS})
+        browser.wait('document.querySelectorAll(".alarm").length >= 2')
+        # One is taken note of, and both of them are over then: each looks another way.
+        browser.run('document.querySelector(".alarm").click()')
+        found += barriers(browser)
+        server.publish('alarms', {'active': []})
+        browser.wait('document.querySelectorAll(".alarm.ended").length')
+        for tab in browser.run(
+                'return [...document.querySelectorAll("[role=tab]")].map(({id}) => id)'):
+            browser.run('document.getElementById(arguments[0]).click()', tab)
+            found += [f'{tab}: {text}' for text in barriers(browser)]
+    assert not found, '\n'.join(found)

@@ -1,0 +1,76 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The tools that look at pages: npm installs what package-lock.json pins, once."""
+
+import fcntl
+from pathlib import Path
+import re
+import shutil
+import subprocess
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+# What eslint itself needs.
+NODE = (20, 19)
+# Seconds each, on a machine that has nothing else to do.
+INSTALL_S, CHECK_S = 600.0, 600.0
+
+
+def missing(path: str | None = None) -> str:
+    """
+    Say in a few words what these tests lack on this machine, empty if nothing.
+
+    :param path: where programs are looked for, by default as everywhere.
+    """
+    lacking = [name for name in ('node', 'npm') if shutil.which(name, path=path) is None]
+    if lacking:
+        return f'{" and ".join(lacking)} missing'
+    node = str(shutil.which('node', path=path))
+    said = subprocess.run([node, '--version'], capture_output=True, text=True).stdout.strip()
+    version = re.match(r'v(\d+)\.(\d+)', said)
+    if version is None or (int(version[1]), int(version[2])) < NODE:
+        return f'node is {said}, older than {NODE[0]}.{NODE[1]}'
+    return ''
+
+
+def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> None:
+    """Run a tool and fail with what it says."""
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=timeout_s)
+    if done.returncode != 0:
+        pytest.fail(f'{Path(command[0]).name} {command[1]}:\n{done.stdout}{done.stderr}',
+                    pytrace=False)
+
+
+def is_stale(folder: Path) -> bool:
+    """Tell whether node_modules is absent, incomplete or older than the lock file."""
+    # npm writes it when everything else is there.
+    installed = folder / 'node_modules' / '.package-lock.json'
+    lock = folder / 'package-lock.json'
+    return not installed.exists() or installed.stat().st_mtime < lock.stat().st_mtime
+
+
+def installed_tools() -> Path:
+    """Give the folder of the tools, installed if they are not; skip the test without npm."""
+    why = missing()
+    if why:
+        pytest.skip(f'the checks of the page are not run: {why}')
+    # Another call of pytest in this clone waits.
+    with (HERE / 'package-lock.json').open() as handle:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        if is_stale(HERE):
+            run('npm', 'ci', '--no-progress', cwd=HERE, timeout_s=INSTALL_S)
+    return HERE / 'node_modules'
