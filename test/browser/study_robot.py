@@ -87,6 +87,7 @@ class StudyRobot:
         self.answers: dict[str, dict[str, Any]] = {}
         self.drives: list[str] = []
         self._refused = 0
+        self._acts = 0
 
     def act(self) -> str:
         """
@@ -127,11 +128,19 @@ class StudyRobot:
             self.answers[what] = self._browser.run(_ANSWER, self._text)
         if shown == 'drive':
             self._drive(what)
+            # A key that meets a frame just as it is loaded anew may wait for it for a minute.
+            if self.time_s() is not None:
+                self._tap(Keys.ARROW_LEFT if self._acts % 2 else Keys.ARROW_RIGHT)
         elif shown in ('language', 'page', 'questions', 'break', 'device', 'elsewhere'):
             self._browser.run(
                 'const button = document.querySelector("#sheet button.primary:not([disabled])");'
                 'button?.click();')
         return str(shown)
+
+    def _tap(self, key: str) -> None:
+        """Touch a key: the way from hands to the picture is measured where they do something."""
+        self._acts += 1
+        ActionChains(self._browser.driver).key_down(key).pause(0.03).key_up(key).perform()
 
     def _move_everything(self) -> None:
         self._browser.run('document.activeElement?.blur()')

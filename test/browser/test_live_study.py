@@ -63,7 +63,8 @@ def test_each_item_is_finished_once(conducted: StudySession) -> None:
     finished = Counter(entry['item'] for entry in entries if entry['entry'] == 'finished')
     assert finished == dict.fromkeys(
         ('fields', 'main/1', 'main/1/after/1', 'main/2', 'main/2/after/1'), 1)
-    assert sum(entry['entry'] == 'started' for entry in entries) == 4
+    # A page that is back within two seconds goes on with its drive.
+    assert sum(entry['entry'] == 'started' for entry in entries) in (3, 4)
     for entry in entries:
         if entry['entry'] == 'finished':
             assert entry['answers'].items() <= conducted.answers.items()
@@ -82,6 +83,7 @@ def test_the_tables_hold_each_trial_once(conducted: StudySession) -> None:
         ('1', 'idm', 'time'), ('2', 'steady', 'time')]
     for row in trials:
         assert 0.0 < float(row['link_delay_s']) < 1.0
+        assert 0.0 < float(row['input_delay_s']) < 2.0
         assert (out / row['report']).stat().st_size > 10_000
     answers = {row['text'] for row in table(out / 'data' / 'answers.csv')
                if row['question'] == 'why'}
