@@ -60,7 +60,12 @@ def take_session(folder: Path) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     with study_session(folder / 'study' / 'study.yaml', folder / 'data', 'P01', PORT) as session, \
             open_browser(folder / 'profile') as browser:
-        browser.open(session.link)
+        # Somebody who is known already: the link itself was good for once.
+        page = session.link.partition('?')[0]
+        browser.open(page)
+        name, _, value = session.experimenter.cookie.partition('=')
+        browser.driver.add_cookie({'name': name, 'value': value})
+        browser.open(page)
         until(session, lambda: ready(session))
         shoot(session.browser, 'ready')
         until(session, lambda: (session.time_s() or 0.0) > DRIVEN_S)

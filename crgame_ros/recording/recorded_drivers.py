@@ -37,8 +37,8 @@ class RecordedDriver(NamedTuple):
     One stretch of a run that somebody drove.
 
     :param spell: who, which seat, from which step to which.
-    :param input_delay_ms: median from the hand to the page's picture, of a device at the machine
-        to the first state that obeys [ms]; None if not measured.
+    :param input_delay_ms: median from the hand to the first later state, at the page (drawing is
+        more) or at the machine of a device [ms]; None if not measured.
     :param round_trip_ms: median from the page to the simulation and back [ms]; likewise.
     """
 

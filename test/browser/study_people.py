@@ -48,16 +48,17 @@ class Experimenter:
     """
     The experimenter's connection.
 
-    :param link: that the program has printed.
+    :param link: that the program has printed; it lets one in, once.
+    :ivar cookie: by which the same person comes in again, name=value.
     """
 
     def __init__(self, link: str) -> None:
         opener = urllib.request.build_opener(_KeepRedirect)
         try:
             opener.open(link)
-            self._cookie = ''
+            self.cookie = ''
         except urllib.error.HTTPError as answer:
-            self._cookie = answer.headers['Set-Cookie'].partition(';')[0]
+            self.cookie = answer.headers['Set-Cookie'].partition(';')[0]
         self._address = link.partition('/experimenter')[0]
         self._count = 0
 
@@ -65,7 +66,7 @@ class Experimenter:
         """Send an order, over a connection of its own: nothing else is listened to."""
         self._count += 1
         with closing(websocket.create_connection(
-                f'{self._address.replace("http", "ws", 1)}/ws/experimenter', cookie=self._cookie,
+                f'{self._address.replace("http", "ws", 1)}/ws/experimenter', cookie=self.cookie,
                 origin=self._address, timeout=30)) as connection:
             connection.send(json.dumps({'type': kind, 'id': self._count, **fields}))
 
@@ -100,7 +101,7 @@ class StudySession:
         self._process.stdout.readline()
         links = [re.findall(r'http\S+', self._process.stdout.readline()) for _ in range(2)]
         self.page, self.link = links[0][0], links[1][0]
-        self._experimenter = Experimenter(self.link)
+        self.experimenter = Experimenter(self.link)
 
     def _open(self) -> None:
         self._profile = Path(tempfile.mkdtemp(prefix='crgame_study_'))
@@ -143,7 +144,7 @@ class StudySession:
         time_s = self._robot.time_s()
         if time_s is not None:
             with suppress(OSError, websocket.WebSocketException):
-                self._experimenter.order('mark', name=name)
+                self.experimenter.order('mark', name=name)
                 self.marked.append((name, time_s))
 
     def kill(self, victim: str) -> bool:

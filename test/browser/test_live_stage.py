@@ -150,9 +150,8 @@ def test_a_driver_takes_the_seat_gets_ready_drives_and_steers_nothing_else(
     assert browser.run('return window.told.every(({ origin, crgame, kind }) => '
                        'origin + "/" === arguments[0] && crgame === 1 && kind === "stage")',
                        graph.address)
-    with within(browser):
-        browser.wait("document.querySelector('.stage-line').textContent"
-                     " === 'Zum Fahren hier klicken.'")
+    # The page around asks for readiness, and has the focus for it.
+    assert waiting['trouble'] == ''
     browser.driver.find_element(By.TAG_NAME, 'button').click()
     browser.run("window.order({ kind: 'ready', ready: 'yes' }); window.order({ kind: 'start' });"
                 "window.order({ kind: 'focus' })")
@@ -161,6 +160,13 @@ def test_a_driver_takes_the_seat_gets_ready_drives_and_steers_nothing_else(
     wait_for_state(browser, 's.countdown_s > 0 || s.run === "running"')
     running = wait_for_state(browser, 's.run === "running" && s.time_s > 0.2')
     assert running['epoch'] == waiting['epoch'] and running['device'] == 'Keyboard'
+    browser.run("document.querySelector('button').focus()")
+    wait_for_state(browser, 's.trouble === "focus"')
+    with within(browser):
+        browser.wait("document.querySelector('.stage-line').textContent"
+                     " === 'Zum Fahren hier klicken.'")
+    browser.run("window.order({ kind: 'focus' })")
+    wait_for_state(browser, 's.hasInput && s.trouble === ""')
 
     ActionChains(browser.driver).key_down('w').perform()
     graph.wait_for_command('hv0', THROTTLE, 0.2, 1.0)

@@ -22,7 +22,9 @@ from crgame_ros.study.data.condition_means import ConditionMean
 import numpy as np
 
 # Of the picture, which is scaled as a whole [px].
-WIDTH, _PLOT, _TOP, _BOTTOM, _LEFT = 420, 170, 10, 40, 52
+WIDTH, _PLOT, _TOP, _BOTTOM, _LEFT = 420, 170, 10, 22, 52
+# Of a line of words, and of one of their characters [px].
+_LINE, _CHARACTER = 17, 8.3
 # Points of equal height stand side by side up to so far from the middle [px].
 _SPREAD, _NEAR = 26.0, 7.0
 _LONGEST_NAME = 60
@@ -46,18 +48,23 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
     marks = [f'<line class="grid" x1="{_LEFT}" x2="{WIDTH}" y1="{y(tick):.1f}" '
              f'y2="{y(tick):.1f}"/><text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
              f'{format(tick, "g").replace("-", "−")}</text>' for tick in ticks]
+    # A condition is called by its levels, one a line.
+    lines = max(each.condition.count('/') + 1 for each in conditions)
     for place, each in enumerate(conditions):
         middle = _LEFT + wide * (place + 0.5)
-        name = _fitting(each.condition, wide)
-        marks.append(f'<text class="name" x="{middle:.1f}" y="{_TOP + _PLOT + 20}">{plain(name)}'
-                     f'<title>{plain(each.condition)}</title></text>')
+        spans = ''.join(
+            f'<tspan x="{middle:.1f}" dy="{_LINE}">{plain(_fitting(level, wide))}</tspan>'
+            for level in each.condition.split('/'))
+        marks.append(f'<text class="name" y="{_TOP + _PLOT + 4}">'
+                     f'<title>{plain(each.condition)}</title>{spans}</text>')
         marks += _points(each, middle, wide, y)
         if not math.isnan(each.mean):
             marks.append(_mean(each, middle + min(0.32 * wide, 40.0), y))
     told = '; '.join(f'{each.condition}: mean {number(each.mean, digits)}' + (
         '' if math.isnan(each.half) else f' ± {number(each.half, digits)}')
         for each in conditions)
-    return (f'<svg class="conditions" viewBox="0 0 {WIDTH} {_TOP + _PLOT + _BOTTOM}" role="img" '
+    return (f'<svg class="conditions" viewBox="0 0 {WIDTH} '
+            f'{_TOP + _PLOT + _BOTTOM + _LINE * lines}" role="img" '
             f'aria-label="{plain(f"{words}; {told}")}">{"".join(marks)}</svg>')
 
 
@@ -88,7 +95,7 @@ def _mean(each: ConditionMean, x: float, y: Callable[[float], float]) -> str:
 
 
 def _fitting(name: str, wide: float) -> str:
-    most = max(3, min(_LONGEST_NAME, int(wide / 7.0)))
+    most = max(3, min(_LONGEST_NAME, int(wide / _CHARACTER)))
     return name if len(name) <= most else f'{name[:most - 1]}…'
 
 

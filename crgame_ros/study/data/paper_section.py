@@ -45,7 +45,7 @@ def paper_section(data: StudyData) -> str:
     html += table('Delays, medians of each trial', (
         '', 'least [ms]', 'median [ms]', 'greatest [ms]', 'trials'),
         [_delay(words, told['delays_s'][name]) for name, words in (
-            ('input_delay_s', 'from the hand to the picture'),
+            ('input_delay_s', 'from the hand to the answer at the page'),
             ('link_delay_s', 'of the link between page and simulation'))], 'numbers')
     html += table('Reference points', (), [
         (plain(what[:1].upper() + what[1:]), plain(point))

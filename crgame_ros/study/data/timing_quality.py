@@ -29,7 +29,7 @@ class TimingBounds:
     :param real_time_ratio_final: least of simulated over wall time, over the whole run.
     :param resets: of drift resets.
     :param gaps: of cycles that were not recorded.
-    :param input_delay_s: of the median delay from the hand to the picture [s]
+    :param input_delay_s: of the median delay from the hand to the answer at the page [s]
     """
 
     max_cumulative_error_s: float = 0.1

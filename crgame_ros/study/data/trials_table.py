@@ -80,8 +80,8 @@ _RUN_COLUMNS = ('benchmark_id', 'scenario_sha256', 'game_sha256', 'duration_s',
                 'real_time_ratio_mean', 'real_time_ratio_min', 'time_efficiency',
                 'precision_ratio', 'resets', 'gaps', 'catch_up_steps')
 _TIMING = (
-    Column('input_delay_s', NUMBER, 's', "median from the participant's hand to the page's "
-           'picture', empty='nobody measured it'),
+    Column('input_delay_s', NUMBER, 's', "median from the participant's hand to the first later "
+           'state at the page, which is drawn after that', empty='nobody measured it'),
     Column('link_delay_s', NUMBER, 's', 'median from the page to the simulation and back',
            empty='nobody measured it'),
     *(Column(name, kind, unit, what, variant='of the view that was shown longest',

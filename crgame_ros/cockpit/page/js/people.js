@@ -87,7 +87,7 @@ class People {
     const me = client === this.#store.me.id ? ' (you)' : '';
     const delays = [
       round_trip_ms === null ? '' : `${round_trip_ms.toFixed(0)} ms there and back`,
-      input_delay_ms === null ? '' : `${input_delay_ms.toFixed(0)} ms from hand to picture`,
+      input_delay_ms === null ? '' : `${input_delay_ms.toFixed(0)} ms from hand to answer`,
     ].filter(Boolean).join(', ');
     return element('li', { 'data-client': client },
       element('strong', { text: `${name}${me}` }),

@@ -23,7 +23,7 @@ export {};
  * @property {string|null} seat
  * @property {boolean} away whether the hands are off the controls
  * @property {number|null} round_trip_ms
- * @property {number|null} input_delay_ms from the hand to the picture
+ * @property {number|null} input_delay_ms from the hand to the answer, at the page
  */
 
 /**

@@ -198,7 +198,9 @@ export class Stage {
       return null;
     }
     const away = driving?.away;
-    return away === 'unplugged' ? away : away === 'focus' ? away
+    // Before a drive the page around it asks, and has the focus.
+    const isAsked = window.parent !== window && status?.run !== 'running' && !seats[seat]?.ready;
+    return away === 'unplugged' || (away === 'focus' && !isAsked) ? away
       : status?.seats_lost?.[seat] && status.run === 'running' ? 'silent' : null;
   }
 

@@ -33,7 +33,7 @@ export {};
  * @property {string} away why they are not: focus, hidden, dialog, connection, unplugged
  * @property {string} device what the hands are on
  * @property {number|null} delay_ms of the way to the server and back
- * @property {number|null} input_delay_ms from the hand to the picture
+ * @property {number|null} input_delay_ms from the hand to the answer, at the page
  * @property {string} trouble what keeps the driver from driving, in English; empty for nothing
  */
 

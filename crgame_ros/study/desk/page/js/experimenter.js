@@ -148,7 +148,7 @@ class ExperimenterPage {
     const delay = page.round_trip_ms === undefined ? ''
       : `, ${Math.round(page.round_trip_ms)} ms there and back`;
     const drive = page.drive_delay_ms === undefined ? ''
-      : `, ${Math.round(page.drive_delay_ms)} ms from hand to picture`;
+      : `, ${Math.round(page.drive_delay_ms)} ms from hand to answer`;
     const more = page.open > 1 ? `, ${page.open} tabs` : '';
     setText(node, page.connected ? `Participant's page: connected${delay}${drive}${more}`
       : "Participant's page: not connected");
