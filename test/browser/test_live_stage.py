@@ -160,8 +160,8 @@ def test_a_driver_takes_the_seat_gets_ready_drives_and_steers_nothing_else(
     wait_for_state(browser, 's.countdown_s > 0 || s.run === "running"')
     running = wait_for_state(browser, 's.run === "running" && s.time_s > 0.2')
     assert running['epoch'] == waiting['epoch'] and running['device'] == 'Keyboard'
-    browser.run("document.querySelector('button').focus()")
-    wait_for_state(browser, 's.trouble === "focus"')
+    browser.driver.find_element(By.TAG_NAME, 'button').click()
+    wait_for_state(browser, 's.away === "focus" && s.trouble.startsWith("Hands off")')
     with within(browser):
         browser.wait("document.querySelector('.stage-line').textContent"
                      " === 'Zum Fahren hier klicken.'")
