@@ -10,6 +10,7 @@ const { above, chasing, mountedAt } = await import(`${VIEW}/cameras.js`);
 const { acrossAngle, heightAngle, readSeat, trueAngle } = await import(
   `${VIEW}/field_of_view.js`);
 const { wantsHeadlights } = await import(`${VIEW}/headlights.js`);
+const { KeyAnswer } = await import(`${VIEW}/key_answer.js`);
 const { localOrigin } = await import(`${VIEW}/local_origin.js`);
 const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirror_optics.js`);
 const { DETAILS, isSoftware, Quality } = await import(`${VIEW}/quality.js`);
@@ -43,6 +44,17 @@ test('a chosen field of view is across the picture, within what can be drawn', (
   near(acrossAngle(null, 500, 800, 1920), 140 * DEGREE, 1e-9);
   near(heightAngle(90 * DEGREE, 2), 2 * Math.atan(0.5), 1e-9);
   assert.ok(heightAngle(140 * DEGREE, 0.5) <= 110 * DEGREE);
+});
+
+test('pictures come out of turn just when a vehicle may answer a key', () => {
+  const answer = new KeyAnswer();
+  assert.ok(!answer.isDue(3));
+  answer.pressed(3);
+  // Shown is what was simulated some time before the newest state, which is no answer yet.
+  const due = [2.98, 3, 3.005, 3.02, 3.03, 3.045, 3.06, 9].filter((t) => answer.isDue(t));
+  assert.deepEqual(due, [3.02, 3.03, 3.045]);
+  answer.pressed(8.99);
+  assert.ok(!answer.isDue(3.02) && answer.isDue(9.01));
 });
 
 test('what is no screen is not taken for one', () => {

@@ -6,6 +6,7 @@ import { element } from '../dom.js';
 import { isTyping } from '../driving/focus.js';
 import { VIEWPOINTS } from './cameras.js';
 import { acrossAngle, heightAngle } from './field_of_view.js';
+import { KeyAnswer } from './key_answer.js';
 import { SeatClock } from './seat_clock.js';
 import { createViewButtons } from './view_buttons.js';
 import { ViewSettings } from './view_settings.js';
@@ -43,6 +44,7 @@ export class View3d {
   #due = 0;
   #drawn_ms = -Infinity;
   #shown_t = NaN;
+  #answer = new KeyAnswer();
   #wasLost = false;
 
   /**
@@ -62,6 +64,10 @@ export class View3d {
     });
     this.redraw();
     window.addEventListener('keydown', (event) => this.#pressed(event));
+    for (const name of /** @type {const} */ (['keydown', 'keyup'])) {
+      // Driving keeps its keys from others behind it: they are seen before that.
+      window.addEventListener(name, (event) => this.#awaitAnswer(event), true);
+    }
     new ResizeObserver(() => this.#resize()).observe(stage);
     for (const name of /** @type {const} */ (['scene', 'epoch', 'plan', 'state', 'signals'])) {
       store.on(name, () => { this.#due = PICTURES_AFTER_CHANGE; });
@@ -177,6 +183,14 @@ export class View3d {
     }
   }
 
+  /** @param {KeyboardEvent} event */
+  #awaitAnswer(event) {
+    const newest = this.#store.latest;
+    if (!event.repeat && newest !== undefined && window.crgame.driving?.seat) {
+      this.#answer.pressed(newest.t);
+    }
+  }
+
   #resize() {
     if (this.#on && this.#stage.clientWidth > 0 && this.#stage.clientHeight > 0) {
       this.picture?.resize(this.#stage.clientWidth, this.#stage.clientHeight);
@@ -193,8 +207,9 @@ export class View3d {
     this.#tellLoss(this.picture);
     this.#clock.follow(now_ms);
     const shown = this.#store.displayed(now_ms);
-    if (shown === null || now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS
-        || (shown.t === this.#shown_t && this.#due === 0)) {
+    if (shown === null || (shown.t === this.#shown_t && this.#due === 0)
+        || (now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS
+          && !this.#answer.isDue(shown.t))) {
       return;
     }
     const { vehicle } = this;
