@@ -41,7 +41,7 @@ from crgame_ros.gym.driving_game import DrivingGame
 from crgame_ros.messages.status_values import Status
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.timing.cycle_rows import NO_COMMAND
+from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 
@@ -143,8 +143,8 @@ class PageViewer:
         self._due_s += scheduler.time_step_s
         place = (self._epoch, n, scheduler.k(n), n * scheduler.dt_s)
         objects = game.objects
-        commands = np.array([command or NO_COMMAND for command in game.simulation.commands],
-                            dtype=np.float64).reshape(-1, len(NO_COMMAND))
+        commands = np.array(game.simulation.command_rows, dtype=np.float64).reshape(
+            -1, len(COMMAND_COLUMNS))
         made = {
             'state': frames.encode_state(*place, state_rows(
                 stacked(game.simulation.states), commands)),

@@ -64,7 +64,7 @@ def side_lanes(driving: DrivingPath, s: float, vehicle: VehicleParameters) -> li
     found = []
     for neighbour_of in (RoadNetwork.left_of, RoadNetwork.right_of):
         beside = neighbour_of(roads, driving.lanelets[first])
-        if beside not in roads.lanelet_ids or not roads.is_for_cars(beside):
+        if beside is None or not roads.is_for_cars(beside):
             continue
         along, aside = roads.line(beside).project(point)
         offset = -float(aside[0])

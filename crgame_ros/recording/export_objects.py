@@ -33,7 +33,7 @@ from crgame_ros.scenario.export_elements import (
 )
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
-from crgame_ros.vehicle.lights import HAZARD, Light
+from crgame_ros.vehicle.lights import BRAKING, HAZARD, Light
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
@@ -103,16 +103,22 @@ class ObjectWriter:
         return ''.join(part for group in _GROUPS for part in self._parts[group])
 
     def _signals(self, column: int) -> list[tuple[bool, ...]]:
-        """Give the signals of a vehicle at each step, as far as somebody drove it."""
+        """Give the signals of a vehicle at each step, if somebody drove it or it showed any."""
         commands = self._log.commands
-        if commands is None or np.isnan(commands[1:, column, _BRAKE]).all():
+        if commands is None:
             return []
+        driven = np.isfinite(commands[:, column, _BRAKE])
         rows = np.nan_to_num(commands[:, column])
         lights = rows[:, _LIGHTS].astype(int)
+        if not driven[1:].any() and not lights.any():
+            return []
+        speed, acceleration = self.vehicle_rows[:, column, 3:5].T
+        brakes = np.where(driven, rows[:, _BRAKE] > BRAKE_LIGHTS,
+                          acceleration * np.sign(speed) < -BRAKING)
         hazard = lights & HAZARD == HAZARD
         return list(zip(*(each.tolist() for each in (
             lights & Light.HORN > 0, ~hazard & (lights & Light.LEFT > 0),
-            ~hazard & (lights & Light.RIGHT > 0), rows[:, _BRAKE] > BRAKE_LIGHTS, hazard)),
+            ~hazard & (lights & Light.RIGHT > 0), brakes, hazard)),
             strict=True))
 
     def _type(self, item: ObjectDescription, known: frozenset[str]) -> str:

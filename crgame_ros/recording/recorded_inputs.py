@@ -83,7 +83,7 @@ def inputs_of(result: OfflineResult) -> RecordedInputs:
                for place, human in enumerate(result.setup.humans)}
     drivers.update({av.id: ReplayDriver(result.av_commands[1:, place])
                     for place, av in enumerate(result.setup.avs)
-                    if np.isfinite(result.av_commands[1:, place]).any()})
+                    if np.isfinite(result.av_commands[1:, place, 0]).any()})
     return RecordedInputs(drivers, result.intervals_s[1:, 0])
 
 

@@ -100,17 +100,29 @@ class RoadNetwork:
         :param poses: (N, 3) finite x [m], y [m], yaw [rad]
         :return: (N) positions in `lanelet_ids`, -1 off the road
         """
+        rows, lanes, scores = self.candidates(poses)
+        result = np.full(len(poses), -1, dtype=np.int64)
+        order = np.lexsort((scores, rows))
+        first = np.unique(rows[order], return_index=True)
+        result[first[0]] = lanes[order][first[1]]
+        return result
+
+    def candidates(
+            self, poses: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
+        """
+        Find all lanelets in which poses may be, for they overlap in junctions.
+
+        :param poses: (N, 3) finite x [m], y [m], yaw [rad]
+        :return: (M) places of poses, (M) positions in `lanelet_ids`, and (M) how badly the pose
+            agrees with the lane
+        """
         points = shapely.points(poses[:, :2])
         rows, lanes = self._tree.query(points, predicate='intersects')
         scores = np.empty(len(rows))
         for lane in np.unique(lanes):
             mine = lanes == lane
             scores[mine] = self._scores(int(lane), poses[rows[mine], :2], poses[rows[mine], 2])
-        result = np.full(len(poses), -1, dtype=np.int64)
-        order = np.lexsort((scores, rows))
-        first = np.unique(rows[order], return_index=True)
-        result[first[0]] = lanes[order][first[1]]
-        return result
+        return rows, lanes, scores
 
     def pose_on(self, lanelet_id: int, s: float, d: float = 0.0) -> tuple[float, float, float]:
         """
@@ -146,6 +158,14 @@ class RoadNetwork:
             length -= line.length
         return np.concatenate(parts)
 
+    def successors(self, lanelet_id: int) -> tuple[int, ...]:
+        """List where a lanelet leads, as far as the map has it."""
+        return tuple(x for x in self._lanelet(lanelet_id).successor if x in self._index)
+
+    def predecessors(self, lanelet_id: int) -> tuple[int, ...]:
+        """List from where one comes to a lanelet, as far as the map has it."""
+        return tuple(x for x in self._lanelet(lanelet_id).predecessor if x in self._index)
+
     def straightest_successor(self, lanelet_id: int) -> int | None:
         """Choose the successor that turns least up to its end; lanes for cars first."""
         return self._straightest(lanelet_id, self._lanelet(lanelet_id).successor, -1)
@@ -179,12 +199,12 @@ class RoadNetwork:
     def left_of(self, lanelet_id: int) -> int | None:
         """Name the neighbour on the left that has the same direction."""
         lanelet = self._lanelet(lanelet_id)
-        return lanelet.adj_left if lanelet.adj_left_same_direction else None
+        return self._in_map(lanelet.adj_left) if lanelet.adj_left_same_direction else None
 
     def right_of(self, lanelet_id: int) -> int | None:
         """Name the neighbour on the right that has the same direction."""
         lanelet = self._lanelet(lanelet_id)
-        return lanelet.adj_right if lanelet.adj_right_same_direction else None
+        return self._in_map(lanelet.adj_right) if lanelet.adj_right_same_direction else None
 
     def opposite_of(self, lanelet_id: int) -> int | None:
         """Name the neighbour that has the other direction, on whichever side it is."""
@@ -192,8 +212,16 @@ class RoadNetwork:
         for neighbour, same in ((lanelet.adj_left, lanelet.adj_left_same_direction),
                                 (lanelet.adj_right, lanelet.adj_right_same_direction)):
             if neighbour is not None and not same:
-                return int(neighbour)
+                return self._in_map(neighbour)
         return None
+
+    def abreast(self, lanelet_id: int) -> frozenset[int]:
+        """List a lanelet and all lanes of its direction beside it."""
+        found = [lanelet_id]
+        for each in found:
+            found += [other for other in (self.left_of(each), self.right_of(each))
+                      if other is not None and other not in found]
+        return frozenset(found)
 
     def width_at(self, lanelet_id: int, s: float) -> float:
         """Give the distance between the bounds at arc length s of the centre line [m]."""
@@ -242,6 +270,10 @@ class RoadNetwork:
             raise InputError(f'there is no lanelet {lanelet_id}', 'scenario',
                              'name a lanelet of the scenario')
         return self._lanelets[index]
+
+    def _in_map(self, neighbour: int | None) -> int | None:
+        """Pass over neighbours that a map names but does not have."""
+        return neighbour if neighbour in self._index else None
 
     def _best(self, hits: NDArray[np.int64], x: float, y: float, yaw: float | None) -> int | None:
         if len(hits) == 1:

@@ -138,12 +138,11 @@ def _shortest(roads: RoadNetwork, start: int, start_s: float,
 
 def _edges(roads: RoadNetwork, lanelet: int,
            available: float) -> Iterator[tuple[int, float, bool]]:
-    for successor in roads.lanelet_network.find_lanelet_by_id(lanelet).successor:
-        if successor in roads.lanelet_ids:
-            yield successor, available, False
+    for successor in roads.successors(lanelet):
+        yield successor, available, False
     squeeze = CHANGE_COST * (1.0 + max(0.0, CHANGE_LENGTH / available - 1.0))
     for neighbour in (roads.left_of(lanelet), roads.right_of(lanelet)):
-        if neighbour in roads.lanelet_ids and roads.is_for_cars(neighbour):
+        if neighbour is not None and roads.is_for_cars(neighbour):
             yield neighbour, squeeze, True
 
 
@@ -161,9 +160,7 @@ def _onward(roads: RoadNetwork, lanelet: int) -> int | None:
     """Choose the successor that turns least; one at which the road ends only if need be."""
     network = roads.lanelet_network
     scored = []
-    for successor in network.find_lanelet_by_id(lanelet).successor:
-        if successor not in roads.lanelet_ids:
-            continue
+    for successor in roads.successors(lanelet):
         headings = roads.line(successor).heading
         turn = abs(float(headings[-1] - headings[0]))
         turn += abs(wrap_pi(float(headings[0] - roads.line(lanelet).heading[-1])))

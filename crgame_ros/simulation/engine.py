@@ -35,6 +35,7 @@ from crgame_ros.simulation.av_models import (
     make_vehicle_model,
     published,
 )
+from crgame_ros.simulation.plan_indicator import PlanIndicators
 from crgame_ros.simulation.plan_requests import PlanRequests
 from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.run_events import RunEvents
@@ -42,6 +43,7 @@ from crgame_ros.simulation.run_tasks import RunTasks
 from crgame_ros.simulation.setup import AvSetup, Setup
 from crgame_ros.simulation.stopped_drivers import StoppedDrivers
 from crgame_ros.simulation.world import TrafficFeed, World
+from crgame_ros.timing.cycle_rows import lights_alone
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
@@ -119,6 +121,7 @@ class Simulation:
         self._events = RunEvents(setup) if setup.game.events else None
         self._tasks = RunTasks(setup) if setup.game.tasks else None
         self._task_names = {task.name for task in setup.game.tasks}
+        self._indicators = PlanIndicators(setup)
         self._world = World(setup, self._events, feed)
         self._requests = PlanRequests(
             setup, None if self._events is None else self._events.obstacles)
@@ -141,8 +144,16 @@ class Simulation:
 
     @property
     def lights(self) -> list[int]:
-        """Bits of `Light` that each driven vehicle shows at n; an AV by itself shows none."""
-        return [0 if command is None else command.lights for command in self.commands]
+        """Bits of `Light` that each driven vehicle shows at n; an AV by itself as it plans."""
+        planned = chain([0] * len(self.humans), self._indicators.shown)
+        return [bits if command is None else command.lights
+                for bits, command in zip(planned, self.commands, strict=True)]
+
+    @property
+    def command_rows(self) -> list[Sequence[float]]:
+        """`COMMAND_COLUMNS` of each driven vehicle at n; lights alone where nobody drives."""
+        return [lights_alone(bits) if command is None else command
+                for bits, command in zip(self.lights, self.commands, strict=True)]
 
     def begin(self) -> StepResult:
         """Give the requests and objects of step 0, before anything has moved."""
@@ -273,6 +284,7 @@ class Simulation:
         if self._tasks is not None:
             self._tasks.at_tick(self.n, k, self.states, objects, fired)
         objects = self._world.settle(self.states)
+        self._indicators.look(k, self.avs)
         asking = [av for av in self.avs if av.wants_request(self.n)]
         requests: dict[str, JointSeries] = {}
         if asking:

@@ -87,8 +87,8 @@ class OfflineResult:
     :param fired: events that took effect, in order.
     :param stop: the human's violation that ended the run, where the game has it so; its n is that
         of the last state.
-    :param av_commands: (n + 1, A, 6) the same commands of those who took over an AV; NaN while it
-        followed its plan.
+    :param av_commands: (n + 1, A, 6) the same commands of those who took over an AV; NaN but for
+        the lights while it followed its plan.
     :param tasks: what happened in the game's tasks, in order.
     """
 
@@ -316,9 +316,8 @@ class _Trace:
             self.vehicles[n] = states
         for index in range(self.commands.shape[1]):
             self.commands[n, index] = simulation.commands[index] or RELEASED
-        for index, command in enumerate(simulation.commands[self.commands.shape[1]:]):
-            if command is not None:
-                self.av_commands[n, index] = command
+        if simulation.avs:
+            self.av_commands[n] = simulation.command_rows[self.commands.shape[1]:]
         if result.objects is not None:
             self.objects.append(result.objects.poses)
             self.object_velocities.append(result.objects.velocities)

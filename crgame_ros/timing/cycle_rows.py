@@ -21,7 +21,6 @@ import math
 from crgame_ros.errors import InputError
 from crgame_ros.timing.late_step import Causes, NO_CAUSES, Phase
 from crgame_ros.timing.time_controller import Cycle
-from crgame_ros.vehicle.driver_command import DriverCommand
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,7 +33,11 @@ LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights', 'put_back')
 # Where in a row they begin.
 _LATE, _COMMANDS = len(TIMING_COLUMNS), len(TIMING_COLUMNS) + len(LATE_COLUMNS)
-NO_COMMAND = (math.nan,) * len(COMMAND_COLUMNS)
+
+
+def lights_alone(lights: int) -> tuple[float, ...]:
+    """Give the row of an AV that follows its plan: nobody drives, but others see its lights."""
+    return tuple(float(lights) if name == 'lights' else math.nan for name in COMMAND_COLUMNS)
 
 
 class CycleRows:
@@ -59,12 +62,12 @@ class CycleRows:
         return self.count == self.capacity
 
     def add(self, epoch: int, k: int, cycle: Cycle, busy_s: float, sleep_s: float,
-            commands: Sequence[DriverCommand | None], causes: Causes = NO_CAUSES,
+            commands: Sequence[Sequence[float]], causes: Causes = NO_CAUSES,
             late_in: Phase | None = None) -> None:
         """
         Add one cycle, with the time it worked and slept [s].
 
-        :param commands: of each vehicle; None of an AV that followed its plan, which gives NaN.
+        :param commands: of each vehicle (`Simulation.command_rows`).
         :param causes: of its lateness [s]
         :param late_in: phase in which most of it came; None if it was not late.
         """
@@ -77,7 +80,7 @@ class CycleRows:
         place = _COMMANDS
         for command in commands:
             end = place + len(COMMAND_COLUMNS)
-            row[place:end] = NO_COMMAND if command is None else command
+            row[place:end] = command
             place = end
         self.count += 1
 
@@ -141,8 +144,8 @@ class CycleTable:
         """
         Give (R, 6) consumed throttle, brake, steering, reverse, lights, put_back of a vehicle.
 
-        Rows are NaN where nobody drove it: those of an AV that followed its plan. What earlier
-        versions did not record was off.
+        Rows are NaN but for the lights where nobody drove it: those of an AV that followed its
+        plan. What earlier versions did not record was off.
 
         :raises InputError: if the vehicle took no part.
         """

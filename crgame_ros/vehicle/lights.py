@@ -31,6 +31,8 @@ class Light(IntFlag):
     HORN = 4
 
 
+# ECE R13-H: below this deceleration a car must not show brake lights of its own accord [m/s^2].
+BRAKING = 0.7
 HAZARD = int(Light.LEFT | Light.RIGHT)
 ALL_LIGHTS = int(HAZARD | Light.HORN)
 INDICATORS = {0: 'off', int(Light.LEFT): 'left', int(Light.RIGHT): 'right', HAZARD: 'hazard'}

@@ -34,7 +34,6 @@ from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.time_controller import Cycle
-from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import pytest
@@ -168,8 +167,7 @@ class RunRecorder:
         names = [name for item in setup.vehicle_ids for name in vehicle_joint_names(item)]
         others = [name for item in setup.obstacles.descriptions
                   for name in object_joint_names(item.id)]
-        humans = [human.id for human in setup.humans]
-        rows = CycleRows(humans, 1)
+        rows = CycleRows(setup.vehicle_ids, 1)
         self.rows = np.zeros((len(result.vehicle_states), len(rows.columns)))
         # With every interval as it was measured, their sum is ahead of n dt by the lag.
         lags_s = np.zeros(len(self.rows)) if intervals_s is None else np.concatenate(
@@ -193,7 +191,7 @@ class RunRecorder:
                 cycle = Cycle(n, n * scheduler.dt_s, n * scheduler.dt_s + lags_s[n],
                               dt_s - scheduler.dt_s, lags_s[n], dt_s, 0, 0.0)
                 rows.add(epoch, scheduler.k(n), cycle, 0.001, 0.009,
-                         [DriverCommand(*row) for row in result.commands[n]])
+                         [*result.commands[n], *result.av_commands[n]])
                 self.rows[n] = rows.taken()
                 found.append(('/timing/cycle', 'std_msgs/msg/Float64MultiArray', at_ns,
                               self.cycle_rows(rows.columns, self.rows[n:n + 1])))

@@ -28,7 +28,6 @@ from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
 from crgame_ros.recording.run_record import read_run_record, run_record_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.timing.cycle_rows import CycleRows, NO_COMMAND
 import numpy as np
 import pytest
 
@@ -56,13 +55,7 @@ def taken_over() -> OfflineResult:
 def bag(taken_over: OfflineResult, recorder: Any, samples: Any,
         tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record it, with the commands of the AV and the orders of the seats."""
-    messages = [each for each in recorder.messages(taken_over) if each[0] != '/timing/cycle']
-    columns = CycleRows(['hv0', 'av0'], 1).columns
-    for row, command in zip(recorder.rows, taken_over.av_commands[1:, 0], strict=True):
-        rows = np.array([[*row, *(NO_COMMAND if np.isnan(command[0]) else command)]])
-        n = int(row[1])
-        messages.append(('/timing/cycle', 'std_msgs/msg/Float64MultiArray',
-                         LOG_NS + 10_000_000 * n + 1_500_000, recorder.cycle_rows(columns, rows)))
+    messages = recorder.messages(taken_over)
     for n, text in ((180, '{"seat": "av0", "source": "game"}'), (230, 'no order'),
                     (240, '{"seat": 7, "source": "cockpit"}'),
                     (250, '{"seat": "av0", "source": "cockpit"}'),

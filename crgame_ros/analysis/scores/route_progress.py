@@ -59,7 +59,7 @@ class ComparedRoute:
                 continue
             if self._blocks:
                 start += roads.line(self._blocks[-1].lanelet).length
-            beside = _road(roads, lanelet)
+            beside = roads.abreast(lanelet)
             area = shapely.buffer(roads.area_of(beside), 0.01)
             shapely.prepare(area)
             self._blocks.append(_Block(lanelet, area, start))
@@ -141,12 +141,3 @@ def route_of(roads: RoadNetwork, poses: FloatArray) -> ComparedRoute:
 def progress_ratio(own: float, expert: float) -> float:
     """Give the share of the expert's way that was driven, 0 to 1 (nuplan-devkit)."""
     return 0.0 if own < -NOISE else min(1.0, max(own, NOISE) / max(expert, NOISE))
-
-
-def _road(roads: RoadNetwork, lanelet: int) -> frozenset[int]:
-    """List a lanelet and all lanes of its direction beside it."""
-    found = [lanelet]
-    for each in found:
-        found += [other for other in (roads.left_of(each), roads.right_of(each))
-                  if other in roads.lanelet_ids and other not in found]
-    return frozenset(found)

@@ -46,6 +46,7 @@ REAR_AXLE, CENTER = 'rear axle', 'center'
 OF_OBJECTS = 'of objects, which nobody drives in this run'
 OFF_ROAD = 'off the road'
 UNCONSUMED = 'nobody drove it: of objects, of AVs on their plans, at the start, unrecorded cycles'
+UNLIT = 'it has none: objects, humans at the start, unrecorded cycles, AVs of early versions'
 IN_LANE = 'nearest point of the centre line, whose heading is interpolated between its vertices'
 
 STATES = TableDeclaration(
@@ -80,10 +81,11 @@ STATES = TableDeclaration(
         Column('reverse', FLAG, '', 'whether the gear was reverse, of the same step',
                empty=UNCONSUMED),
         Column('left_indicator', FLAG, '', 'whether the left indicator was on (with the right '
-               'one: hazard lights), of the same step', empty=UNCONSUMED),
+               'one: hazard lights), of the same step; an AV by itself '
+               'indicates what its plan is about to do', empty=UNLIT),
         Column('right_indicator', FLAG, '', 'whether the right indicator was on, of the same step',
-               empty=UNCONSUMED),
-        Column('horn', FLAG, '', 'whether the horn sounded, of the same step', empty=UNCONSUMED),
+               empty=UNLIT),
+        Column('horn', FLAG, '', 'whether the horn sounded, of the same step', empty=UNLIT),
         Column('lanelet_id', INTEGER, '', 'of the lanelet under it; of several, whose direction '
                'agrees best', CENTER, empty=OFF_ROAD),
         Column('lane_s', NUMBER, 'm', "arc length along that lanelet's centre line, from its "
@@ -201,7 +203,8 @@ def _consumed(commands: FloatArray) -> dict[str, Any]:
     # Being put back is an event (`events`).
     found: dict[str, Any] = {name: column for name, column in zip(
         COMMAND_COLUMNS, commands.T, strict=True) if name != 'put_back'}
-    lights, nobody = np.nan_to_num(found.pop('lights')).astype(int), np.isnan(found['reverse'])
-    flags = {'reverse': found['reverse'] > 0.5, 'left_indicator': lights & Light.LEFT > 0,
-             'right_indicator': lights & Light.RIGHT > 0, 'horn': lights & Light.HORN > 0}
-    return found | {name: pa.array(each, FLAG, mask=nobody) for name, each in flags.items()}
+    shown, reverse = found.pop('lights'), found['reverse']
+    lights = np.nan_to_num(shown).astype(int)
+    flags = {name: pa.array(lights & light > 0, FLAG, mask=np.isnan(shown)) for name, light in (
+        ('left_indicator', Light.LEFT), ('right_indicator', Light.RIGHT), ('horn', Light.HORN))}
+    return found | {'reverse': pa.array(reverse > 0.5, FLAG, mask=np.isnan(reverse))} | flags

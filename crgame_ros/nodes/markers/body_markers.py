@@ -32,8 +32,6 @@ FloatArray = NDArray[np.float64]
 
 # Viewers drop what nobody has renewed for so long [s]: a scene that froze is no scene.
 LIFETIME_S = 5
-# ECE R13-H: below this deceleration [m/s^2] a car must not show brake lights of its own accord.
-BRAKING = 0.7
 LABEL_HEIGHT = 1.2
 LIGHT_DIAMETER = 1.2
 LIGHT_Z = 3.0

@@ -24,7 +24,6 @@ from crgame_ros.messages.request_layout import RequestLayout
 from crgame_ros.nodes.markers import marker_style as style
 from crgame_ros.nodes.markers.body_markers import (
     Body,
-    BRAKING,
     Item,
     LIFETIME_S,
     LightMarker,
@@ -33,6 +32,7 @@ from crgame_ros.nodes.markers.body_markers import (
 from crgame_ros.nodes.markers.map_markers import light_positions, map_markers
 from crgame_ros.ros.ros_messages import set_time
 from crgame_ros.ros.scenario_documents import ScenarioSet
+from crgame_ros.vehicle.lights import BRAKING
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray

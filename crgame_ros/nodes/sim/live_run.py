@@ -329,7 +329,7 @@ class LiveRun:
         busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S
         slept_s = (start_ns - self._pacer.idle_from_ns) / NS_PER_S
         outputs.rows.add(self._epoch, result.k, cycle, busy_s * factor, slept_s * factor,
-                         simulation.commands, causes, late_in)
+                         simulation.command_rows, causes, late_in)
 
     def _at_tick(self, result: StepResult) -> None:
         """Do what is due with the scenario's time."""

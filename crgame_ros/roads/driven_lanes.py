@@ -1,0 +1,66 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""On which lanelets a path leads, where lanelets overlap as they do in junctions."""
+
+from collections.abc import Collection
+
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.turns import Turns
+import numpy as np
+from numpy.typing import NDArray
+
+# How unlikely steps are, beside how badly poses agree with lanes (`RoadNetwork.candidates`):
+# to the lane beside, and to one that has nothing to do with the one before.
+_BESIDE, _STRANGE = 1.0, 4.0
+# A lane that is not on the way to the goal is a little less likely.
+_OFF_ROUTE = 0.05
+
+
+def driven_lanes(roads: RoadNetwork, turns: Turns, poses: NDArray[np.float64],
+                 route: Collection[int]) -> list[int]:
+    """
+    Find the likeliest lanelets of successive poses, all of them together (Viterbi).
+
+    :param roads: the roads.
+    :param turns: of these roads.
+    :param poses: (N, 3) finite x [m], y [m], yaw [rad]
+    :param route: lanelets that are preferred where poses alone leave it open.
+    :return: the lanelets one after the other, each once in a row; none off the road
+    """
+    rows, lanes, scores = roads.candidates(poses)
+    ids = [roads.lanelet_ids[lane] for lane in lanes.tolist()]
+    costs = scores + [0.0 if lanelet in route else _OFF_ROUTE for lanelet in ids]
+    best: dict[int, tuple[float, tuple[int, ...]]] = {}
+    for row in np.unique(rows):
+        here = {ids[i]: float(costs[i]) for i in np.flatnonzero(rows == row).tolist()}
+        best = {lanelet: min(_continued(turns, best, lanelet, cost))
+                for lanelet, cost in sorted(here.items())}
+    return list(min(best.values())[1]) if best else []
+
+
+def _continued(turns: Turns, best: dict[int, tuple[float, tuple[int, ...]]], lanelet: int,
+               cost: float) -> list[tuple[float, tuple[int, ...]]]:
+    """Give what it costs to have come to a lanelet, and the way to it, in each possible way."""
+    if not best:
+        return [(cost, (lanelet,))]
+    return [(before + cost + _step(turns, path[-1], lanelet),
+             path if path[-1] == lanelet else (*path, lanelet))
+            for before, path in best.values()]
+
+
+def _step(turns: Turns, before: int, after: int) -> float:
+    if before == after or turns.between(before, after):
+        return 0.0
+    return _STRANGE if turns.side_of(before, after) is None else _BESIDE
