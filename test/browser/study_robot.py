@@ -62,6 +62,10 @@ return document.body.dataset.show === 'drive' && state && state.run === 'running
 """
 
 
+# Steering, and the answer to a light that may be there.
+_TOUCHED = (Keys.ARROW_RIGHT, Keys.ENTER, Keys.ARROW_LEFT)
+
+
 class Page(Protocol):
     """What a browser has to do for the robot."""
 
@@ -130,7 +134,7 @@ class StudyRobot:
             self._drive(what)
             # A key that meets a frame just as it is loaded anew may wait for it for a minute.
             if self.time_s() is not None:
-                self._tap(Keys.ARROW_LEFT if self._acts % 2 else Keys.ARROW_RIGHT)
+                self._tap(_TOUCHED[self._acts % len(_TOUCHED)])
         elif shown in ('language', 'page', 'questions', 'break', 'device', 'elsewhere'):
             self._browser.run(
                 'const button = document.querySelector("#sheet button.primary:not([disabled])");'

@@ -17,6 +17,7 @@
 from collections import Counter
 from collections.abc import Iterator
 import csv
+import math
 from pathlib import Path
 import subprocess
 import sys
@@ -28,6 +29,11 @@ import pytest
 from study_people import study_session, StudySession
 import yaml
 
+# In the first drive alone; the light comes twice.
+TASKS = [
+    {'name': 'light', 'detection_response': {'interval': [2.5, 2.6]}, 'when': {'time': 0}},
+    {'name': 'radio', 'secondary_task': {'show': True}, 'label': 'Radio',
+     'when': {'time': 1}, 'until': {'time': 3}}]
 # Longer than a page may be gone [s].
 DURATION_S = 6.0
 PATIENCE_S = 240.0
@@ -41,7 +47,7 @@ def conducted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudySession
     (folder / 'study.yaml').write_text(yaml.safe_dump({
         'name': 'killed', 'settings': {'duration': DURATION_S, 'game': game, 'view': 'map'},
         'factors': [{'name': 'planner', 'levels': [
-            {'name': 'idm', 'planner': 'idm'},
+            {'name': 'idm', 'planner': 'idm', 'tasks': TASKS},
             {'name': 'steady', 'planner': 'constant-velocity'}]}],
         'fields': [{'name': 'why', 'text': {}}],
         'blocks': [{'name': 'main', 'order': 'given',
@@ -89,6 +95,26 @@ def test_the_tables_hold_each_trial_once(conducted: StudySession) -> None:
                if row['question'] == 'why'}
     assert answers == {conducted.answers['why']}
     assert '<b>' in conducted.answers['why']
+
+
+def test_the_tables_tell_of_tasks_in_drives_that_count(conducted: StudySession) -> None:
+    folder = conducted.folder.parents[1] / 'data'
+    told = [row for row in table(folder / 'events.csv') if row['name'] in ('light', 'radio')]
+    # It was begun several times, for the page and the program were killed in it.
+    assert len({(row['trial'], row['attempt']) for row in told}) == 1
+    assert [(row['kind'], row['time_s'], row['duration_s']) for row in told
+            if row['name'] == 'radio'] == [('secondary_task_span', '1.0', '2.0')]
+    lights = [row for row in told if row['kind'] == 'detection_response_stimulus']
+    assert len(lights) == 2 and 2.5 <= float(lights[0]['time_s']) <= 2.61
+    outcomes = [row['text'] for row in lights]
+    assert {*outcomes} <= {'hit', 'premature', 'miss', 'open'}
+    hits = [float(row['response_time_s']) for row in lights if row['text'] == 'hit']
+    trials = table(folder / 'trials.csv')
+    assert [float(row['detection_hit_rate']) for row in trials] == pytest.approx(
+        [len(hits) / rated if (rated := len(hits) + outcomes.count('miss')) else math.nan,
+         math.nan], nan_ok=True)
+    assert float(trials[0]['detection_response_mean_s']) == pytest.approx(
+        sum(hits) / len(hits) if hits else math.nan, nan_ok=True)
 
 
 def test_who_is_done_is_not_asked_again(conducted: StudySession) -> None:
