@@ -107,11 +107,11 @@ def test_the_tables_tell_of_tasks_in_drives_that_count(conducted: StudySession) 
     lights = [row for row in told if row['kind'] == 'detection_response_stimulus']
     assert len(lights) == 2 and 2.5 <= float(lights[0]['time_s']) <= 2.61
     outcomes = [row['text'] for row in lights]
-    assert {*outcomes} <= {'hit', 'premature', 'miss', 'open'}
+    assert {*outcomes} <= {'hit', 'premature', 'missed', 'open'}
     hits = [float(row['response_time_s']) for row in lights if row['text'] == 'hit']
     trials = table(folder / 'trials.csv')
     assert [float(row['detection_hit_rate']) for row in trials] == pytest.approx(
-        [len(hits) / rated if (rated := len(hits) + outcomes.count('miss')) else math.nan,
+        [len(hits) / rated if (rated := len(hits) + outcomes.count('missed')) else math.nan,
          math.nan], nan_ok=True)
     assert float(trials[0]['detection_response_mean_s']) == pytest.approx(
         sum(hits) / len(hits) if hits else math.nan, nan_ok=True)
