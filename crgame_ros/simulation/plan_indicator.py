@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 LOOK_AHEAD_S = 5.0
 POSES = 11
 # Nobody sees whether an indicator begins a moment later: the AVs take turns, tick by tick.
-EVERY_TICKS = 3
+EVERY_TICKS = 5
 # A vehicle that plans to stop before a fork shows from there on where its route goes [m].
 BEFORE_FORK = 30.0
 # A turn is over when so much of it is left [rad].
@@ -129,7 +129,12 @@ class PlanIndicator:
 
 
 class PlanIndicators:
-    """What all AVs of a run indicate, in their order."""
+    """
+    What all AVs of a run indicate, in their order.
+
+    :param setup: of the run.
+    :ivar shown: bits of `Light` of each AV.
+    """
 
     def __init__(self, setup: Setup) -> None:
         self._time_step_s = setup.scheduler.time_step_s
