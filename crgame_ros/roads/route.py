@@ -81,7 +81,8 @@ def find_route(roads: RoadNetwork, start: int, start_s: float, goals: frozenset[
     :param goals: lanelets of the goal, possibly none.
     :param length: distance that the route shall go on beyond the goal [m]
     """
-    chain = _shortest(roads, start, start_s, goals)
+    # To look for nothing would mean to look everywhere.
+    chain = _shortest(roads, start, start_s, goals) if goals else []
     goal = chain[-1][0] if chain else None
     chain = chain or [(start, False)]
     legs: list[list[int]] = [[]]

@@ -96,12 +96,11 @@ class PlanIndicator:
             return None
         side, left_behind = self._changing
         aside = self._roads.locate(here, x, y)[1]
-        still = aside < -SETTLED if side is Light.LEFT else aside > SETTLED
-        # Not yet over the line, it is up to the plan; it may have been given up.
-        if here == left_behind or not still:
-            self._changing = None if here != left_behind else self._changing
-            return None
-        return side
+        # Not yet over the line, it is up to the plan: the change may have been given up.
+        if here != left_behind and (aside < -SETTLED if side is Light.LEFT else aside > SETTLED):
+            return side
+        self._changing = None
+        return None
 
     def _ahead(self, lanelets: Sequence[int], yaw: float) -> Light | None:
         """Give what the plan does first."""

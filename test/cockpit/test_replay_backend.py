@@ -103,7 +103,9 @@ def test_every_state_is_that_of_the_message(bag: Path, backend: ReplayBackend,
         np.testing.assert_array_equal(rows[:, :3], joints[0][:, :3])
         np.testing.assert_array_equal(rows[:, :8], vehicles_from_joints(*joints))
     commands = np.array([body[1:].reshape(2, 13)[:, 8:] for _, _, body in frames.states])
-    assert np.isnan(commands[0]).all() and np.isnan(commands[:, 1]).all()
+    # Of an AV nothing but the lights that its plans show.
+    assert np.isnan(commands[0]).all() and np.isnan(commands[:, 1, :4]).all()
+    assert np.all(commands[1:, 1, 4] == 0.0)
     # Whether one is to be put back is no part of a frame.
     np.testing.assert_array_equal(commands[1:, 0], parked.commands[1:, 0, :5])
 
