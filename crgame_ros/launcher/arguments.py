@@ -78,6 +78,7 @@ class RunRequest:
     :param no_report: without the report, one HTML file, at the end of each run.
     :param drivers: driver sources of humans by their ids.
     :param countdown_s: from when all drivers at pages are ready to the start [s]
+    :param start_paused: whether every game waits for an order to start.
     :param framed_by: origin of the one page that may show the cockpit's within it; empty for none.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
@@ -104,6 +105,7 @@ class RunRequest:
     no_report: bool = False
     drivers: tuple[tuple[str, str], ...] = ()
     countdown_s: float = 3.0
+    start_paused: bool = False
     framed_by: str = ''
 
 
@@ -156,6 +158,9 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         'and --token')
     add('--countdown', type=_countdown, default=3.0, metavar='S', dest='countdown_s',
         help='seconds from when all drivers at pages are ready to the start (default: 3)')
+    add('--start-paused', action='store_true',
+        help='begin nothing until somebody starts it in the page or by /sim/start, neither this '
+        'game nor those chosen later (default: only who drives in the page is waited for)')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--namespace', type=_namespace, default='/', metavar='/NAME',

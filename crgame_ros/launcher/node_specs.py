@@ -57,6 +57,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
         'folder': f'"{plan.folder}"',
         'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
         'realtime_priority': str(request.realtime_priority).lower(),
+        'start_paused': str(request.start_paused).lower(),
         'scenario_directories': f'[{directories}]', 'roster': f'"{plan.roster}"',
         'wait_for': f'[{waiting}]'})
     return [simulation, *companions, *viewers]

@@ -86,7 +86,8 @@ class SimNode(Node):
             # With a driver in the browser a run begins when somebody says so, but once more the
             # same for the same people goes on.
             if not (self._control.started or again):
-                self._control.paused |= any(item.driver == COCKPIT for item in setup.humans)
+                self._control.paused |= self._control.starts_paused or any(
+                    item.driver == COCKPIT for item in setup.humans)
             run = LiveRun(self, self._executor, self._control, setup, epoch, offset_ns,
                           self._recorded)
             outcome = run.run(stop)

@@ -194,14 +194,22 @@ class ParticipantSession:
         if not isinstance(item.what, PracticeDrives):
             raise InputError('is no practice', item.id, 'finish it')
         self._add(SessionEvent.PRACTISED, item=item.id, good=good, **told)
-        drives = [entry['good'] for entry in self.journal.entries
-                  if entry['entry'] == SessionEvent.PRACTISED and entry['item'] == item.id]
+        drives = self._practice_drives(item.id)
         practice = item.what.practice
-        over = len(drives) >= practice.at_least and (
-            good or 0 < practice.at_most <= len(drives))
+        over = drives >= practice.at_least and (good or 0 < practice.at_most <= drives)
         if over:
-            self._add(SessionEvent.FINISHED, item=item.id, answers={}, drives=len(drives))
+            self._add(SessionEvent.FINISHED, item=item.id, answers={}, drives=drives,
+                      criterion_met=good)
         return over
+
+    def _practice_drives(self, item: str) -> int:
+        """Count the drives of a practice since it began, or began anew."""
+        drives = 0
+        for entry in self.journal.entries:
+            if entry.get('item') == item:
+                drives += entry['entry'] == SessionEvent.PRACTISED
+                drives *= entry['entry'] != SessionEvent.REPEATED
+        return drives
 
     def abort(self, reason: str, item: str = '') -> None:
         """
@@ -218,10 +226,21 @@ class ParticipantSession:
         self._add(SessionEvent.SKIPPED, item=self._now().id, reason=reason)
 
     def repeat(self, item: str, reason: str) -> None:
-        """Let an item that is done come again: what was told of it before stays in the journal."""
-        if item not in self._ids or item not in self.done:
+        """
+        Let an item that is done come again: what was told of it before stays in the journal.
+
+        With a trial come the questions after it: they are about how it was driven last.
+        """
+        done = self.done
+        if item not in self._ids or item not in done:
             raise InputError('is not done', item[:60], 'name an item that is')
         self._add(SessionEvent.REPEATED, item=item, reason=reason)
+        what = self._ids[item].what
+        if not isinstance(what, PlannedTrial):
+            return
+        for after in self.items:
+            if after.trial == what.number and after.id in done and self.questions(after):
+                self._add(SessionEvent.REPEATED, item=after.id, reason=reason)
 
     def note(self, text: str, **told: Any) -> None:
         """Keep what the experimenter remarks."""

@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game, HumanSpec
 from crgame_ros.game.game_file import load_game
@@ -34,16 +35,20 @@ PERFECT, NONE = 'perfect', 'none'
 
 def seat_of(settings: TrialSettings, game: Game) -> str:
     """
-    Name the vehicle that the participant drives.
+    Name the vehicle in which the participant sits: a human's, or an AV that may be taken over.
 
-    :raises InputError: if the game has no human, or none of that name.
+    :param game: whose AVs are listed.
+    :raises InputError: if the game has no human, or no vehicle of that name.
     """
-    ids = [human.id for human in game.humans]
-    seat = settings.seat or (ids[0] if ids else '')
+    humans = [human.id for human in game.humans]
+    ids = [*humans, *(av.id for av in game.avs or ())]
+    if settings.seat is None and not humans:
+        raise InputError('has no human', settings.game or 'trial', 'give the game one: humans: '
+                         '[{id: hv0, driver: cockpit}], or name an AV as "seat"')
+    seat = humans[0] if settings.seat is None else settings.seat
     if seat not in ids:
-        raise InputError(f'has no human "{seat}"' if seat else 'has no human',
-                         settings.game or 'trial', f'name {" or ".join(ids)} as "seat"' if ids
-                         else 'give the game one: humans: [{id: hv0, driver: cockpit}]')
+        raise InputError(f'has no human or AV "{seat}"', settings.game or 'trial',
+                         f'name {" or ".join(ids)} as "seat"')
     return seat
 
 
@@ -56,19 +61,28 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
     :raises InputError: if a file cannot be used, or the settings do not fit the game.
     """
     game = _written_game(settings)
-    seat = seat_of(settings, game)
-    game = replace(game, humans=tuple(
-        replace(human, driver=driver) if human.id == seat else human for human in game.humans),
-        events=(*game.events, *settings.events),
+    game = replace(
+        game, events=(*game.events, *settings.events),
         tasks=tasks_over(game.tasks, settings.tasks),
         sound='on' if settings.sound else 'none')
     if settings.duration is not None:
         game = replace(game, duration=settings.duration)
-    return adapt_game(
+    return _seated(settings, driver, adapt_game(
         game, load_scenario(game.scenario), seed=settings.seed or 0,
         planner=settings.planner or OWN, options=settings.options,
         perception=_spec(PerceptionSpec, settings.perception, PERFECT, 'perception'),
-        traffic=_spec(TrafficSpec, settings.traffic, NONE, 'traffic'))
+        traffic=_spec(TrafficSpec, settings.traffic, NONE, 'traffic')))
+
+
+def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
+    """Give the participant's vehicle its driver; there is nobody else to drive."""
+    seat = seat_of(settings, game)
+    for human in game.humans:
+        if human.id != seat and human.driver == COCKPIT:
+            raise InputError(f'{human.id} waits for a second person', settings.game or 'trial',
+                             'give it another driver, such as idle, or take it out of the game')
+    return replace(game, humans=tuple(
+        replace(human, driver=driver) if human.id == seat else human for human in game.humans))
 
 
 def _written_game(settings: TrialSettings) -> Game:
@@ -80,7 +94,9 @@ def _written_game(settings: TrialSettings) -> Game:
     if scenario is None:
         raise InputError('names no game', 'trial', 'give "game" or "scenario" to the study, a '
                          'block or a level')
-    return Game(scenario, humans=(HumanSpec('hv0'),))
+    # Without a human only AVs drive there, and the participant sits in one of them.
+    humans = (HumanSpec('hv0'),) if settings.seat in (None, 'hv0') else ()
+    return Game(scenario, humans=humans)
 
 
 def _spec(kind: type[Any], name: str | None, nothing: str, what: str) -> Any:

@@ -35,7 +35,8 @@ class TrialSettings:
     :param game: game file.
     :param scenario: CommonRoad file instead of the game's; without a game anybody drives near its
         first AV.
-    :param seat: the vehicle that the participant drives; the game's first human by default.
+    :param seat: the vehicle in which the participant sits; the game's first human by default. An
+        AV drives itself until the participant takes it over.
     :param planner: of all AVs, instead of the game's.
     :param options: of that planner.
     :param perception: file with the `perception` of all AVs, `perfect`, or `own` for the game's.

@@ -254,7 +254,7 @@ def test_who_is_in_an_av_rides_along(
     around.shown.append(f'{graph.address}?stage=av0&view=map')
     browser.open(around.origin)
     told = wait_for_state(browser, 's.connected && s.time_s !== null && s.trouble === ""')
-    assert not told['seated'] and not told['hasInput']
+    assert told['rides'] and not told['seated'] and not told['hasInput']
     with within(browser):
         browser.wait("crgame.world.followed === 'av0'")
         assert browser.run('return crgame.store.seats.av0.holder') is None

@@ -34,6 +34,9 @@ TASKS = [
     {'name': 'light', 'detection_response': {'interval': [2.5, 2.6]}, 'when': {'time': 0}},
     {'name': 'radio', 'secondary_task': {'show': True}, 'label': 'Radio',
      'when': {'time': 1}, 'until': {'time': 3}}]
+# In an AV that drives itself until the participant is asked.
+HANDOVER = {'seat': 'av0', 'tasks': [
+    {'name': 'over', 'take_over': {'lead': 3}, 'seat': 'av0', 'when': {'time': 1}}]}
 # Longer than a page may be gone [s].
 DURATION_S = 6.0
 PATIENCE_S = 240.0
@@ -41,14 +44,15 @@ PATIENCE_S = 240.0
 
 @pytest.fixture(scope='module')
 def conducted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudySession]:
-    """Conduct a session of two drives: a page, then the program is killed in the middle of one."""
+    """Conduct four drives: a page, then the program is killed in the middle of one."""
     folder = tmp_path_factory.mktemp('study')
     game = str(scenarios_directory() / 'cut_in.yaml')
     (folder / 'study.yaml').write_text(yaml.safe_dump({
         'name': 'killed', 'settings': {'duration': DURATION_S, 'game': game, 'view': 'map'},
         'factors': [{'name': 'planner', 'levels': [
             {'name': 'idm', 'planner': 'idm', 'tasks': TASKS},
-            {'name': 'steady', 'planner': 'constant-velocity'}]}],
+            {'name': 'steady', 'planner': 'constant-velocity'},
+            {'name': 'over', **HANDOVER}, {'name': 'again', **HANDOVER}]}],
         'fields': [{'name': 'why', 'text': {}}],
         'blocks': [{'name': 'main', 'order': 'given',
                     'after_trial': [{'questions': 'van_der_laan'}]}]}))
@@ -68,9 +72,10 @@ def test_each_item_is_finished_once(conducted: StudySession) -> None:
     entries = conducted.entries
     finished = Counter(entry['item'] for entry in entries if entry['entry'] == 'finished')
     assert finished == dict.fromkeys(
-        ('fields', 'main/1', 'main/1/after/1', 'main/2', 'main/2/after/1'), 1)
+        ('fields', *(f'main/{trial}{what}' for trial in range(1, 5) for what in ('', '/after/1'))),
+        1)
     # A page that is back within two seconds goes on with its drive.
-    assert sum(entry['entry'] == 'started' for entry in entries) in (3, 4)
+    assert sum(entry['entry'] == 'started' for entry in entries) in (5, 6)
     for entry in entries:
         if entry['entry'] == 'finished':
             assert entry['answers'].items() <= conducted.answers.items()
@@ -86,11 +91,14 @@ def test_the_tables_hold_each_trial_once(conducted: StudySession) -> None:
     assert done.returncode == 0, done.stderr
     trials = table(out / 'data' / 'trials.csv')
     assert [(row['trial'], row['condition'], row['outcome']) for row in trials] == [
-        ('1', 'idm', 'time'), ('2', 'steady', 'time')]
+        ('1', 'idm', 'time'), ('2', 'steady', 'time'), ('3', 'over', 'time'),
+        ('4', 'again', 'time')]
+    assert [row['vehicle'] for row in trials] == ['hv0', 'hv0', 'av0', 'av0']
     for row in trials:
         assert 0.0 < float(row['link_delay_s']) < 1.0
-        assert 0.0 < float(row['input_delay_s']) < 2.0
         assert (out / row['report']).stat().st_size > 10_000
+    for row in trials[:2]:
+        assert 0.0 < float(row['input_delay_s']) < 2.0
     answers = {row['text'] for row in table(out / 'data' / 'answers.csv')
                if row['question'] == 'why'}
     assert answers == {conducted.answers['why']}
@@ -112,9 +120,17 @@ def test_the_tables_tell_of_tasks_in_drives_that_count(conducted: StudySession) 
     trials = table(folder / 'trials.csv')
     assert [float(row['detection_hit_rate']) for row in trials] == pytest.approx(
         [len(hits) / rated if (rated := len(hits) + outcomes.count('missed')) else math.nan,
-         math.nan], nan_ok=True)
+         *[math.nan] * 3], nan_ok=True)
     assert float(trials[0]['detection_response_mean_s']) == pytest.approx(
         sum(hits) / len(hits) if hits else math.nan, nan_ok=True)
+
+
+def test_who_rides_in_an_av_takes_it_over_when_asked(conducted: StudySession) -> None:
+    trials = table(conducted.folder.parents[1] / 'data' / 'trials.csv')[2:]
+    for row in trials:
+        # A drive begins with the planner at the wheel, also after one that ended without it.
+        assert (row['take_over_requests'], row['take_over_requests_taken']) == ('1', '1')
+        assert 0.0 < float(row['take_over_first_input_mean_s']) < 4.0
 
 
 def test_who_is_done_is_not_asked_again(conducted: StudySession) -> None:

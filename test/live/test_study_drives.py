@@ -98,12 +98,17 @@ class Participant:
         self._page.hold_keys('hv0', [1, 0, 0, 0])
         self.loop.call_soon_threadsafe(self.drives.ready, item)
 
+    @property
+    def page(self) -> PageClient:
+        """Give the page that has the seat."""
+        assert self._page is not None
+        return self._page
+
     def stands(self) -> None:
         """Assert that a trial does not begin by itself under who is in its seat."""
-        assert self._page is not None
         time.sleep(1.0)
-        assert self._page.documents['status']['run'] == 'paused'
-        assert self._page.documents['status']['n'] == 0
+        assert self.page.documents['status']['run'] == 'paused'
+        assert self.page.documents['status']['n'] == 0
 
     def call(self, function: Any, *arguments: Any) -> None:
         self.loop.call_soon_threadsafe(function, *arguments)
@@ -111,7 +116,7 @@ class Participant:
 
 @pytest.fixture(scope='module')
 def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str, Any]]]:
-    """Drive four trials: one is killed, one aborted and one skipped on the way."""
+    """Drive four trials: one is killed, one aborted, one skipped, one stopped and reset."""
     folder = tmp_path_factory.mktemp('study') / 'participants' / 'P01'
     with Participant(folder) as person:
         person.begin('main/1')
@@ -130,6 +135,11 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str,
         person.wait_for(DrivePhase.DRIVING, 'main/3')
         person.call(person.session.skip, 'no time left')
         person.call(person.drives.wake)
+        for action in ('stop', 'reset'):
+            person.begin('main/4')
+            person.wait_for(DrivePhase.DRIVING, 'main/4')
+            assert person.page.request('control', action=action)['ok']
+            person.wait_for(DrivePhase.READY, 'main/4')
         person.begin('main/4')
         wait_until(lambda: person.session.next_item is None, 'the end')
         wait_until(lambda: person.drives.state.phase is DrivePhase.NONE, 'the graph to end')
@@ -149,15 +159,18 @@ def test_each_trial_is_finished_once_or_skipped(journal: list[dict[str, Any]]) -
         ('started', 'main/2'), ('aborted', 'main/2'), ('started', 'main/2'),
         ('finished', 'main/2'),
         ('started', 'main/3'), ('skipped', 'main/3'), ('aborted', 'main/3'),
-        ('started', 'main/4'), ('finished', 'main/4')]
+        ('started', 'main/4'), ('aborted', 'main/4'), ('started', 'main/4'),
+        ('aborted', 'main/4'), ('started', 'main/4'), ('finished', 'main/4')]
     reasons = [entry['reason'] for entry in journal if entry['entry'] == 'aborted']
     assert 'killed' in reasons[0]
     assert reasons[1] == 'a telephone rang'
+    # Whoever else can reach the graph has made no half a trial.
+    assert reasons[3:] == ['somebody stopped the run', 'somebody began the run anew']
 
 
 def test_what_is_finished_was_driven_to_its_end(journal: list[dict[str, Any]]) -> None:
     finished = [entry for entry in journal if entry['entry'] == 'finished']
-    assert [entry['attempt'] for entry in finished] == [2, 2, 1]
+    assert [entry['attempt'] for entry in finished] == [2, 2, 3]
     for entry in finished:
         assert entry['outcome'] == 'time'
         assert entry['end_time_s'] == pytest.approx(DURATION_S)

@@ -156,6 +156,29 @@ def test_practice_ends_when_it_is_good(session: ParticipantSession) -> None:
     assert session.practised(True) and session.next_item.id == 'main/1'
 
 
+def test_practice_that_is_repeated_is_counted_anew(session: ParticipantSession) -> None:
+    do_next(session), do_next(session)
+    for _ in range(3):
+        session.practised(False)
+    assert session.journal.entries[-1]['criterion_met'] is False
+    session.repeat('main/practice', 'was not ready')
+    assert not session.practised(False) and not session.practised(False)
+    assert session.practised(True)
+    assert session.journal.entries[-1]['criterion_met'] is True
+    assert session.journal.entries[-1]['drives'] == 3
+
+
+def test_with_a_trial_come_its_questions_again(session: ParticipantSession) -> None:
+    while do_next(session) != 'main/2/after/1':
+        pass
+    session.repeat('main/1', 'the telephone rang')
+    assert [do_next(session) for _ in range(3)] == ['main/1', 'main/1/after/1', 'main/2/break']
+    # One that was not asked yet is asked once.
+    do_next(session)
+    session.repeat('main/3', 'again')
+    assert [do_next(session) for _ in range(3)] == ['main/3', 'main/3/after/1', 'main/4']
+
+
 def test_answers_that_cannot_be_taken_change_nothing(session: ParticipantSession) -> None:
     before = len(session.journal.entries)
     with pytest.raises(InputError, match='give a whole number from 18 to 99'):

@@ -83,7 +83,7 @@ def test_settings_cascade(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('changed', 'message'), [
     ({'settings': {'duration': 2}}, 'names no game'),
     ({'settings': {'game': 'nowhere.yaml'}}, 'nowhere.yaml'),
-    ({'settings': {'game': CUT_IN, 'seat': 'hv7'}}, 'has no human "hv7"'),
+    ({'settings': {'game': CUT_IN, 'seat': 'hv7'}}, 'has no human or AV "hv7"'),
     ({'settings': {'game': CUT_IN, 'duration': 2, 'planner': 'idm', 'options': {'x': 1}},
       'factors': [{'name': 'f', 'levels': [{'name': 'a'}, {'name': 'b'}]}]}, '"x" is unknown'),
     ({'before': [{'page': 'absent.md'}]}, 'there is no such page'),

@@ -99,7 +99,7 @@ class SimControl:
         declare_number(self._node, 'duration', 0.0,
                        "simulated seconds until the run ends; 0 takes the game's", (0.0, 1e7))
         declare('start_paused', False, ParameterDescriptor(
-            description='wait for /sim/start', read_only=True))
+            description='wait for /sim/start, with each game anew', read_only=True))
         declare_number(self._node, 'countdown', COUNTDOWN_S, 'seconds from when all drivers at '
                        'pages are ready to the start of the run', (0.0, 60.0))
         declare('realtime_priority', False, ParameterDescriptor(

@@ -18,23 +18,37 @@ from typing import Any
 
 from crgame_ros.cockpit.run_status import RunStatus
 
-# What ended a run, in the words of trials' tables.
-_OUTCOMES = {'duration': 'time', 'stop': 'stopped', 'reset': 'stopped', 'signal': 'stopped'}
+# How runs end that were driven to their end: at their time, or by their own drivability.
+TIME, DRIVABILITY = 'duration', 'drivability of '
+RESET = 'reset'
+_CUT_SHORT = {'stop': 'somebody stopped the run', RESET: 'somebody began the run anew',
+              'signal': 'the programs were asked to end', 'silence': 'the simulation fell silent'}
+
+
+def cut_short(reason: str) -> str:
+    """
+    Say why a run is no whole drive; empty if it is one.
+
+    :param reason: with which it ended, as sim_node gives it.
+    """
+    if reason == TIME or reason.startswith(DRIVABILITY):
+        return ''
+    return _CUT_SHORT.get(reason, f'the run ended: {reason or "nobody knows why"}')
 
 
 def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:
     """
     Tell what became of a drive.
 
-    :param status: at its end.
+    :param status: at its end, which was not cut short.
     :param seat: vehicle of the participant.
     :param end_time_s: the run's clock then [s].
-    :return: `outcome`: time, collision, off_road, or stopped; `end_time_s`; and how often the
-        vehicle touched something, and left the road.
+    :return: `outcome`: time, collision or off_road; `end_time_s`; and how often the vehicle
+        touched something, and left the road.
     """
     contacts, departures = _times(status, seat)
-    outcome = _OUTCOMES.get(status.reason, '')
-    if not outcome:
+    outcome = 'time'
+    if status.reason != TIME:
         # Its own drivability ended it: whichever came last.
         outcome = 'collision' if contacts and contacts[-1] >= max(departures, default=0.0) \
             else 'off_road'

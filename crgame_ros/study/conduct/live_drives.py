@@ -26,7 +26,7 @@ from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, run_folder
 from crgame_ros.study.conduct.director import Director
 from crgame_ros.study.conduct.disturbance import Disturbance
-from crgame_ros.study.conduct.drive_outcome import clean_s, outcome_of
+from crgame_ros.study.conduct.drive_outcome import clean_s, cut_short, outcome_of, RESET
 from crgame_ros.study.conduct.study_drive import settings_of, StudyDrive, write_drive
 from crgame_ros.study.conduct.study_graph import StudyGraph
 from crgame_ros.study.drive_state import DrivePhase, DriveState
@@ -202,7 +202,8 @@ class LiveDrives:
         """Drive once, from the start to a closed recording."""
         item, director, session = drive.item, self._directs(), self._session
         assert self._graph is not None
-        folder = run_folder(self._graph.folder, director.epoch)
+        epoch = director.epoch
+        folder = run_folder(self._graph.folder, epoch)
         run = str(folder.relative_to(self._folder))
         self._loaded, self._abort = None, None
         asked_at_s = time.time()
@@ -217,10 +218,15 @@ class LiveDrives:
                 self._tell(DrivePhase.DRIVING, item.id, attempt=attempt, drive=drive)
             if began_at_s and self._abort is None:
                 self._abort = disturbance.look(director.status.seats_lost.get(drive.seat, False))
+            if self._abort is None and director.epoch != epoch:
+                self._abort = cut_short(RESET)
             if self._abort is not None or not self._is_due(item):
                 await self._break_off(item, self._abort)
                 return
             await self._look()
+        if reason := cut_short(director.status.reason):
+            await self._break_off(item, reason)
+            return
         self._tell(DrivePhase.ENDED, item.id, attempt=attempt, drive=drive)
         told = {'run': run, 'attempt': attempt, 'asked_at': asked_at_s, 'start_at': began_at_s,
                 **outcome_of(director.status, drive.seat, director.time_s)}
@@ -238,7 +244,8 @@ class LiveDrives:
         director = self._directs()
         self._session.abort(reason or 'the session went on with something else', item.id)
         self._tell(DrivePhase.PREPARING, item.id, 'the drive was ended')
-        await director.stop()
+        if director.status.run != 'ended':
+            await director.stop()
         await self._until(lambda: director.status.run == 'ended', CLOSES_S,
                           'the run does not end')
 

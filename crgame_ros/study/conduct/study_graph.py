@@ -52,7 +52,7 @@ class StudyGraph:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', 'crgame_ros.study.conduct.watched_launcher',
                  str(os.getpid()), str(game), '--out', str(folder), '--port', str(port),
-                 '--no-report', *more],
+                 '--no-report', '--start-paused', *more],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
                 env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain_id)},
                 # Ctrl-C is for the study, which ends the graph when it has ended its drive.

@@ -99,6 +99,8 @@ def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
     reason = trial.row['problem']
     if trial.run is not None and not trial.run.summary['humans']:
         reason = 'nobody drove in it'
+    elif trial.run is not None and trial.row['vehicle'] not in trial.run.summary['humans']:
+        reason = 'the participant sat in an AV'
     elif trial.run is not None and not trial.run.summary['planners']:
         reason = 'no AV takes part'
     elif trial.attempt.folder is not None and not reason:

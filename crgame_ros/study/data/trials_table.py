@@ -184,7 +184,7 @@ class TrialsTable:
         summary = run.summary
         humans = list(summary['humans'])
         seat = attempt.trial.condition.settings.seat
-        vehicle = seat if seat in humans else humans[0] if humans else None
+        vehicle = seat or (humans[0] if humans else None)
         told = run.row('runs')
         measures = run.row('vehicles', id=vehicle)
         return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],

@@ -73,6 +73,11 @@ class Desk:
         return self.drives.state.phase in UNDER_WAY
 
     @property
+    def can_abort(self) -> bool:
+        """Tell whether a drive is under way that has not ended by itself."""
+        return self.is_driving and self.drives.state.phase != DrivePhase.ENDED
+
+    @property
     def waits(self) -> bool:
         """Tell whether the experimenter holds the session before its present item."""
         held_at, item = self.session.held_at, self.session.next_item
@@ -167,6 +172,8 @@ class Desk:
         """End the drive that is under way; it comes again."""
         if not self.is_driving or self.drives.state.item != item:
             raise InputError('is not driven now', item[:60], 'look at what is')
+        if not self.can_abort:
+            raise InputError('has ended', item[:60], 'repeat it once it is recorded')
         self.drives.abort(reason)
         self._tell()
 

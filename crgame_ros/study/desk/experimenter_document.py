@@ -43,7 +43,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, Any]) -> dict[str, Any]
         'language': session.language, 'page': dict(page), 'markers': list(session.study.markers),
         'item': '' if item is None else item.id, 'held': session.held_at is not None,
         'waits': desk.waits, 'ending': desk.ending,
-        'over': how_over(desk) if item is None else '', 'can_abort': desk.is_driving,
+        'over': how_over(desk) if item is None else '', 'can_abort': desk.can_abort,
         'drive': {'phase': state.phase.value, 'item': state.item, 'attempt': state.attempt,
                   'time_s': state.time_s, 'text': state.text},
         'items': _items(desk), 'log': _log(desk)}

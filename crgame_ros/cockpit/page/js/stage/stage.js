@@ -29,6 +29,7 @@ export class Stage {
   #line = element('div', { class: 'stage-line', role: 'alert', hidden: true });
   #role = '';
   #claimed_ms = -Infinity;
+  #left_ms = -Infinity;
   #refusal = '';
   #failed = '';
   #missing3d = false;
@@ -121,6 +122,7 @@ export class Stage {
   /** Take the seat while it is free, say what is wrong, and tell the page around. */
   #look() {
     const seat = this.#store.seats[this.address.seat];
+    this.#leave();
     if (this.#rides && window.crgame.world.followed !== this.address.seat) {
       window.crgame.world.follow(this.address.seat, true);
     }
@@ -138,6 +140,24 @@ export class Stage {
     document.documentElement.dataset.stage = state.view;
     document.documentElement.toggleAttribute('data-missing3d', state.missing3d);
     this.#link.tell(state);
+  }
+
+  /**
+   * Leave another vehicle, in which a stage before this one has left the same person, and an AV
+   * that was taken over in the run before: its planner begins the next one.
+   */
+  #leave() {
+    const { seats, me, connected } = this.#store;
+    const left = Object.keys(seats).find((id) => me.id !== '' && seats[id].holder === me.id
+      && (id !== this.address.seat || this.#staysBehind));
+    if (connected && left !== undefined && performance.now() - this.#left_ms > CLAIM_EVERY_MS) {
+      this.#left_ms = performance.now();
+      if (left === this.address.seat) {
+        window.crgame.driving?.release();
+      } else {
+        this.#connection.request({ type: 'release', seat: left });
+      }
+    }
   }
 
   async #claim() {
@@ -165,13 +185,25 @@ export class Stage {
 
   /** Whether it is in an AV that nobody here has taken over: then its planner drives. */
   get #rides() {
-    const { scene } = this.#store;
-    return !this.#seated && scene?.vehicles.find(
-      ({ id }) => id === this.address.seat)?.role === 'autonomous';
+    return !this.#has && this.#isAutonomous;
   }
 
   get #seated() {
+    return this.#has && !this.#staysBehind;
+  }
+
+  get #has() {
     return window.crgame.driving?.seat === this.address.seat;
+  }
+
+  get #isAutonomous() {
+    return this.#store.scene?.vehicles.find(
+      ({ id }) => id === this.address.seat)?.role === 'autonomous';
+  }
+
+  /** Whether it still has the AV that it took over in the run before this one. */
+  get #staysBehind() {
+    return this.#has && this.#isAutonomous && this.#store.status?.n === 0;
   }
 
   /** @returns {StageTrouble|null} what keeps the driver from driving */
@@ -216,7 +248,7 @@ export class Stage {
     const time_s = this.#time_s;
     const more = this.#failed || this.#refusal;
     return {
-      seat, seated: this.#seated, connected, run: status?.run ?? null,
+      seat, seated: this.#seated, rides: this.#rides, connected, run: status?.run ?? null,
       reason: status?.run === 'ended' ? status.reason ?? '' : '', epoch, time_s,
       ready: this.#seated && Boolean(seats[seat]?.ready),
       countdown_s: connected ? status?.countdown_s ?? 0 : 0,

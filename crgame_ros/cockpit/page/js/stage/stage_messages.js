@@ -18,6 +18,7 @@ export {};
  * @typedef {object} StageState
  * @property {string} seat that the address names
  * @property {boolean} seated whether this page has it
+ * @property {boolean} rides whether it is that of an AV which its planner drives
  * @property {boolean} connected to the simulation
  * @property {RunState|null} run null before the first word of it
  * @property {string} reason why the run ended; empty before

@@ -82,7 +82,8 @@ export class DriveFrame {
   #showGate() {
     const ready = this.#phase === 'ready';
     // Without a stage there is nothing to wait for.
-    const loaded = this.#link === '' || Boolean(this.#state.seated && this.#state.connected);
+    const { seated, rides, connected } = this.#state;
+    const loaded = this.#link === '' || Boolean((seated || rides) && connected);
     const was = this.#button.disabled;
     this.#gate.hidden = !ready;
     setText(this.#button, this.#words.of('ready'));
