@@ -139,6 +139,10 @@ export class View3d {
     for (const [name, on] of Object.entries(seen)) {
       classList.toggle(name, Boolean(on));
     }
+    // One switch for the picture and the small map in it: there nobody sees the map's buttons.
+    const { world } = window.crgame;
+    world.insight = !this.#on || this.settings?.switches.plans === true;
+    world.redraw();
     this.#buttons?.update(this.#on, this.#viewpoint);
   }
 
