@@ -190,8 +190,9 @@ export class View3d {
   /** @param {KeyboardEvent} event */
   #awaitAnswer(event) {
     const newest = this.#store.latest;
-    if (!event.repeat && newest !== undefined && window.crgame.driving?.seat) {
-      this.#answer.pressed(newest.t);
+    if (!event.repeat && newest !== undefined && window.crgame.driving?.seat
+        && !isTyping(event.target)) {
+      this.#answer.pressed(newest.t, this.#store.clock.rate);
     }
   }
 
@@ -211,9 +212,9 @@ export class View3d {
     this.#tellLoss(this.picture);
     this.#clock.follow(now_ms);
     const shown = this.#store.displayed(now_ms);
+    const early = now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS;
     if (shown === null || (shown.t === this.#shown_t && this.#due === 0)
-        || (now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS
-          && !this.#answer.isDue(shown.t))) {
+        || (early && !this.#answer.isDue(shown.t))) {
       return;
     }
     const { vehicle } = this;
@@ -223,6 +224,9 @@ export class View3d {
       this.#due = shown.t === this.#shown_t ? this.#due - 1 : PICTURES_AFTER_CHANGE;
       this.#shown_t = shown.t;
       this.#drawn_ms = now_ms;
+      if (early) {
+        this.#answer.drawn();
+      }
     }
   }
 
