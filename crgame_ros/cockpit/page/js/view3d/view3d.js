@@ -37,7 +37,7 @@ export class View3d {
   #store;
   #clock;
   #canvas = element('canvas', { id: 'view3d', role: 'img', 'aria-label': '3D view',
-    hidden: true });
+    'aria-describedby': 'around', tabindex: 0, hidden: true });
   #buttons;
   #on = false;
   #frame = 0;
@@ -128,6 +128,20 @@ export class View3d {
   /** Look from the next viewpoint. */
   next() {
     this.viewpoint = VIEWPOINTS[(VIEWPOINTS.indexOf(this.#viewpoint) + 1) % VIEWPOINTS.length];
+  }
+
+  /**
+   * Draw once more, and give that as PNG: after a frame the browser forgets what was drawn.
+   *
+   * @returns {Promise<Blob|null>} null while nothing can be seen
+   */
+  async snapshot() {
+    const now_ms = performance.now();
+    const shown = this.#on ? this.#store.displayed(now_ms) : null;
+    if (shown === null || !this.picture?.draw(shown, now_ms, this.#looks(this.vehicle))) {
+      return null;
+    }
+    return new Promise((resolve) => { this.#canvas.toBlob(resolve); });
   }
 
   /** Draw again though nothing has moved. */
