@@ -265,7 +265,8 @@ def test_plots_map_and_tables_are_saved(
     page.wait('crgame.history.charts.length > 2', 'plots')
     for form in ('csv', 'svg', 'png'):
         page.run_async('await crgame.saving.savePlots("history", arguments[0]);', form)
-    page.run('document.querySelector("[data-action=save-map]").click()')
+    assert page.run('return document.querySelector("[data-action=save-view]").checkVisibility()')
+    page.run('document.querySelector("[data-action=save-view]").click()')
     page.run('document.querySelector("#panel-timing [data-action=save-tables]").click()')
     end = time.monotonic() + 20.0
     while len(found := {path.name.split('_T-1_')[-1].split('_')[0] + path.suffix: path

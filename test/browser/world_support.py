@@ -65,6 +65,33 @@ class RecordedRun:
             (result.object_poses, result.object_velocities), axis=2)
 
 
+def large_scene(run: RecordedRun) -> dict[str, object]:
+    """Lay out 100 curved roads of four lanes, 60 cars on them."""
+    lanelets = []
+    for index in range(400):
+        road, lane = divmod(index, 4)
+        x0, y0 = 60.0 * (road % 10), 60.0 * (road // 10) + 3.5 * lane
+        s = np.linspace(0.0, 55.0, 30)
+
+        def flat(offset: float, x0: float = x0, y0: float = y0,
+                 s: np.ndarray = s) -> list[float]:
+            return np.column_stack((x0 + s, y0 + offset + 3.0 * np.sin(s / 10.0))).ravel().tolist()
+
+        lanelets.append({
+            'id': index, 'left': flat(3.5), 'right': flat(0.0), 'center': flat(1.75),
+            'types': ['urban'], 'left_line': 'solid' if lane == 3 else 'dashed',
+            'right_line': 'solid' if lane == 0 else 'dashed', 'one_way': True,
+            'speed_limit': None, 'intersection': False,
+            'adj_left': index + 1 if lane < 3 else None, 'adj_left_same': lane < 3,
+            'adj_right': index - 1 if lane else None, 'adj_right_same': lane > 0,
+            'successors': []})
+    cars = [{'id': f'o{i}', 'type': 'car', 'role': 'recorded',
+             'shape': {'kind': 'rectangle', 'length': 4.5, 'width': 1.8, 'vertices': []}}
+            for i in range(60)]
+    return run.scene | {'id': 'large', 'lanelets': lanelets, 'objects': cars, 'goals': [],
+                        'stop_lines': [], 'bounds': [0.0, -5.0, 600.0, 560.0]}
+
+
 class RunBackend:
     """
     Sends the run's frames, as a live backend does, and obeys pause, start, step and reset.

@@ -14,6 +14,7 @@ const { KeyAnswer } = await import(`${VIEW}/key_answer.js`);
 const { localOrigin } = await import(`${VIEW}/local_origin.js`);
 const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirror_optics.js`);
 const { DETAILS, isSoftware, Quality } = await import(`${VIEW}/quality.js`);
+const { steeringOf } = await import(`${VIEW}/steering.js`);
 const { isWithin } = await import(`${VIEW}/seen_instances.js`);
 const { readViewWindow } = await import(`${VIEW}/view_window.js`);
 const { MeshBuilder } = await import(`${VIEW}/bodies/mesh_builder.js`);
@@ -49,12 +50,52 @@ test('a chosen field of view is across the picture, within what can be drawn', (
 test('pictures come out of turn just when a vehicle may answer a key', () => {
   const answer = new KeyAnswer();
   assert.ok(!answer.isDue(3));
-  answer.pressed(3);
+  answer.pressed(3, 1);
   // Shown is what was simulated some time before the newest state, which is no answer yet.
   const due = [2.98, 3, 3.005, 3.02, 3.03, 3.045, 3.06, 9].filter((t) => answer.isDue(t));
   assert.deepEqual(due, [3.02, 3.03, 3.045]);
-  answer.pressed(8.99);
+  answer.pressed(8.99, 1);
   assert.ok(!answer.isDue(3.02) && answer.isDue(9.01));
+});
+
+test('slow or fast, a key brings three pictures out of turn at most', () => {
+  for (const rate of [0.1, 1, 5]) {
+    const answer = new KeyAnswer();
+    answer.pressed(3, rate);
+    // Frames of a screen of 144 Hz, all out of turn, for as long as a key takes in any case.
+    const drawn = [];
+    for (let wall_s = 0; wall_s < 2; wall_s += 1 / 144) {
+      if (answer.isDue(3 + rate * wall_s)) {
+        answer.drawn();
+        drawn.push(wall_s);
+      }
+    }
+    assert.equal(drawn.length, 3, `rate ${rate}`);
+    // The next cycle obeys the key, whatever a simulated second takes; then the way back.
+    near(drawn[0], 0.008 / rate, 1 / 144);
+    answer.pressed(20, rate);
+    assert.ok(answer.isDue(20.009) && !answer.isDue(20.0081 + 0.042 * rate));
+  }
+});
+
+test('wheels are turned as those of a single-track model that moves so', () => {
+  const [wheelbase, angle] = [2.7, 0.21];
+  for (const speed of [1, 5, -3, 30]) {
+    near(steeringOf(wheelbase, speed, speed * Math.tan(angle) / wheelbase), angle, 1e-12);
+    near(steeringOf(wheelbase, speed, -speed * Math.tan(angle) / wheelbase), -angle, 1e-12);
+  }
+  near(steeringOf(2.7, 10, 0), 0, 0);
+  // A recording may turn on the spot, which no wheels can.
+  near(steeringOf(2.7, 1, 9), 0.65, 1e-12);
+  near(steeringOf(2.7, -1, 9), -0.65, 1e-12);
+  assert.equal(steeringOf(2.7, 0, 0.5), 0);
+  // Around standstill there is no jump.
+  let before = steeringOf(2.7, -2, 0.5);
+  for (let speed = -2; speed <= 2; speed += 0.001) {
+    const now = steeringOf(2.7, speed, 0.5);
+    assert.ok(Math.abs(now - before) < 0.003, `${speed}: ${before} ${now}`);
+    before = now;
+  }
 });
 
 test('what is no screen is not taken for one', () => {

@@ -5,6 +5,7 @@
 import { Connection } from './connection.js';
 import { readStage } from './stage/stage_address.js';
 import { Store } from './store.js';
+import { driverSight } from './world/driver_sight.js';
 import { createWorld } from './world/world.js';
 
 // [module, its create function, selector of its root, name in window.crgame]. They are loaded one
@@ -51,7 +52,8 @@ const store = new Store();
 const connection = new Connection(store);
 const world = createWorld(
   /** @type {HTMLCanvasElement} */ (document.querySelector('#world')), store,
-  { connection, covered: document.querySelector('#hud'), keys: !bare, toolbar: !bare });
+  { connection, covered: document.querySelector('#hud'), keys: !bare, toolbar: !bare,
+    sight: () => driverSight(store) });
 window.crgame = { store, connection, world };
 
 for (const [path, create, root, name] of parts) {

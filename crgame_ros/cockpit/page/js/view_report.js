@@ -70,7 +70,7 @@ class ViewReport {
     const seat = view3d.settings.seat;
     return {
       type: 'view', shown: view3d.viewpoint, inset: Number(inset),
-      plans: Number(plans || (inset && world.showsPlans)),
+      plans: Number(plans),
       mirrors: Number(mirrors && view3d.viewpoint === 'driver'),
       across_deg: Math.round(across * DEGREES * 10) / 10,
       screen_width_m: seat?.screen_width_m ?? null, eye_distance_m: seat?.eye_distance_m ?? null,

@@ -1,6 +1,6 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Buttons that save what the page shows: the plots, the map and the tables. */
+/** Buttons that save what the page shows: the plots, the map or the 3D view, and the tables. */
 
 import { element, part } from '../dom.js';
 import { toolButton } from '../world/toolbar.js';
@@ -16,7 +16,7 @@ const PLOTS = ['history', 'criticality'];
 const DOWN = 'M12 4v11M7 10l5 5 5-5M4 17v3h16v-3';
 
 /**
- * Put the buttons into the panels and beside the map.
+ * Put the buttons into the panels and on the map.
  *
  * @param {HTMLElement} root #panels
  * @param {Store} store
@@ -54,7 +54,7 @@ export function createSaving(root, store) {
     panel.append(element('button', { type: 'button', 'data-action': 'save-tables',
       text: 'Save the tables as CSV', on: { click: () => saveTables(panel, name) } }));
   }
-  addViewButton();
+  addViewButton(store);
   return { savePlots };
 }
 
@@ -84,16 +84,28 @@ function saveTables(panel, name) {
   save(fileName(name, 'csv'), new Blob([csvOf(rows)], { type: 'text/csv' }));
 }
 
-function addViewButton() {
-  /** @type {HTMLElement|null} */
-  const group = document.querySelector('.world-group:last-child');
-  /** @type {HTMLCanvasElement|null} */
-  const canvas = document.querySelector('#world');
-  if (group !== null && canvas !== null) {
-    toolButton(group, DOWN, 'Save the map as PNG', () => canvas.toBlob((blob) => {
-      if (blob !== null) {
-        save(fileName('map', 'png'), blob);
-      }
-    })).dataset.action = 'save-map';
-  }
+/**
+ * In a group of its own: others are hidden where there is nothing for them to do.
+ *
+ * @param {Store} store
+ */
+function addViewButton(store) {
+  const group = element('div', { class: 'world-group view-save' });
+  document.querySelector('.world-toolbar')?.append(group);
+  toolButton(group, DOWN, 'Save the map or the 3D view as PNG', async () => {
+    const is3d = window.crgame.view3d?.on === true;
+    const picture = await (is3d ? window.crgame.view3d?.snapshot() : pictureOfMap());
+    if (picture) {
+      save(fileName(is3d ? '3d' : 'map', 'png'), picture);
+    } else {
+      store.receive({ type: 'notice', level: 'error', text: 'There is no picture to be saved.' });
+    }
+  }).dataset.action = 'save-view';
+}
+
+/** @returns {Promise<Blob|null>} */
+function pictureOfMap() {
+  return new Promise((resolve) => {
+    /** @type {HTMLCanvasElement|null} */ (document.querySelector('#world'))?.toBlob(resolve);
+  });
 }

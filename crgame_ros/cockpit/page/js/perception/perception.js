@@ -14,7 +14,7 @@ import { countText, Unseen } from './unseen.js';
 
 /** @import { Connection } from '../connection.js' */
 /** @import { Store } from '../store.js' */
-/** @import { LiveView } from '../world/painter.js' */
+/** @import { DrawLayer, LiveView, Place } from '../world/painter.js' */
 /** @import { World } from '../world/world.js' */
 
 /** @typedef {'unseen'|'rays'|'estimate'|'occupancy'} LayerName */
@@ -96,17 +96,17 @@ class Perception {
 
   /** How many fans of rays are drawn. */
   get fans() {
-    return this.#on.rays ? this.#rays.drawn : 0;
+    return this.#shows('rays') ? this.#rays.drawn : 0;
   }
 
   /** The estimate as drawn last, null for none. */
   get estimate() {
-    return this.#on.estimate ? this.#estimate.drawn : null;
+    return this.#shows('estimate') ? this.#estimate.drawn : null;
   }
 
   /** How many occupied cells are on the map as drawn last. */
   get occupied() {
-    return this.#on.occupancy ? this.#occupancy.drawn : 0;
+    return this.#shows('occupancy') ? this.#occupancy.drawn : 0;
   }
 
   /**
@@ -146,10 +146,25 @@ class Perception {
   /** @param {World} world */
   #addLayers(world) {
     world.drawHollow((view) => this.#choose(view));
-    world.addLayer(PREFIX + 'occupancy', (context, view) => this.#occupancy.draw(context, view));
-    world.addLayer(PREFIX + 'rays', (context, view) => this.#rays.draw(context, view, this.#av()));
-    world.addLayer(PREFIX + 'estimate', (context, view) => this.#estimate.draw(
+    /** @type {(name: LayerName, draw: DrawLayer, where: Place) => void} */
+    const add = (name, draw, where) => world.addLayer(PREFIX + name, (context, view) => {
+      if (view.insight) {
+        draw(context, view);
+      }
+    }, where);
+    add('occupancy', (context, view) => this.#occupancy.draw(context, view), 'below');
+    add('rays', (context, view) => this.#rays.draw(context, view, this.#av()), 'below');
+    add('estimate', (context, view) => this.#estimate.draw(
       context, view, world.vehicle(this.#av()), this.#av()), 'above');
+  }
+
+  /**
+   * Whether a layer is drawn: in the 3D view not even those that are on, unless asked for there.
+   *
+   * @param {LayerName} name
+   */
+  #shows(name) {
+    return Boolean(this.#on[name]) && this.#world.insight;
   }
 
   #addButtons() {
@@ -175,9 +190,10 @@ class Perception {
     this.#tell();
   }
 
-  /** Index of the followed vehicle if it is an AV with perception, else -1. */
+  /** Index of the followed vehicle if it is an AV with perception that one sees, else -1. */
   #av() {
-    return this.#unseen?.perceiving(this.#world.followed) ?? -1;
+    const av = this.#unseen?.perceiving(this.#world.followed) ?? -1;
+    return Number.isNaN(this.#world.shown?.vehicles[av * VEHICLE_WIDTH]) ? -1 : av;
   }
 
   /** Tell the server what is wanted, if that has changed. */
@@ -211,7 +227,7 @@ class Perception {
    */
   #choose({ store, shown }) {
     this.#tell();
-    const av = this.#on.unseen ? this.#av() : -1;
+    const av = this.#shows('unseen') ? this.#av() : -1;
     const columns = av < 0 ? null : store.perceived.seenBy(av, shown.t);
     this.#flags = columns === null ? null : this.#unseen?.flags(av, columns) ?? null;
     this.#showLegend();
@@ -226,7 +242,7 @@ class Perception {
   #showCount(stage) {
     const line = stage.querySelector('.hud-seen');
     if (line !== null) {
-      const { count } = this;
+      const count = this.#world.insight ? this.count : null;
       setText(line, count === null ? '' : countText(count));
       setAttribute(line, 'hidden', count === null);
     }

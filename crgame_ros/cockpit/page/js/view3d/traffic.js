@@ -10,6 +10,7 @@ import { plainBody } from './bodies/plain_bodies.js';
 import { FittedParts } from './fitted_parts.js';
 import { Headlights } from './headlights.js';
 import { Instances } from './instances.js';
+import { steeringOf } from './steering.js';
 
 /** @import { Group } from 'three' */
 /** @import { Scene } from '../messages.js' */
@@ -29,6 +30,7 @@ import { Instances } from './instances.js';
  * @property {[x: number, y: number, z: number]} scale of the body
  * @property {number} role its colour on the map
  * @property {number} rolled how far its wheels have rolled [m]
+ * @property {number} wheelbase of the body as it is scaled; 0 without wheels [m]
  * @property {boolean} parked whether nobody is in it
  */
 
@@ -135,10 +137,11 @@ export class Traffic {
     this.#headlights.clear();
     for (let i = 0; i < this.#objects.length; i += 1) {
       const row = i * OBJECT_WIDTH;
-      const [x, y, yaw, vx, vy] = shown.objects.subarray(row, row + 5);
-      this.#place(this.#objects[i], { x, y, yaw, dt, heightAt, eye, own: false, steering: 0,
-        speed: vx * Math.cos(yaw) + vy * Math.sin(yaw), brakes: this.#brakeLights.ofObject(i),
-        lights: 0 });
+      const [x, y, yaw, vx, vy, yaw_rate] = shown.objects.subarray(row, row + OBJECT_WIDTH);
+      const speed = vx * Math.cos(yaw) + vy * Math.sin(yaw);
+      this.#place(this.#objects[i], { x, y, yaw, dt, heightAt, eye, own: false, speed,
+        steering: steeringOf(this.#objects[i].wheelbase, speed, yaw_rate),
+        brakes: this.#brakeLights.ofObject(i), lights: 0 });
     }
     for (let i = 0; i < this.#vehicles.length; i += 1) {
       const row = i * VEHICLE_WIDTH;
@@ -194,11 +197,13 @@ export class Traffic {
    * @returns {Thing}
    */
   #thing(look, body, id, role) {
+    const along = (look.length ?? body.length) / body.length;
     return {
       id, look, body, role, rolled: 0, parked: false,
       instances: /** @type {Instances} */ (this.#instances.get(look.key)),
-      scale: [(look.length ?? body.length) / body.length, (look.width ?? body.width) / body.width,
+      scale: [along, (look.width ?? body.width) / body.width,
         (look.height ?? body.height) / body.height],
+      wheelbase: body.wheels === null ? 0 : along * (body.wheels.front - body.wheels.rear),
     };
   }
 

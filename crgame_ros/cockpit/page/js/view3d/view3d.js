@@ -37,7 +37,7 @@ export class View3d {
   #store;
   #clock;
   #canvas = element('canvas', { id: 'view3d', role: 'img', 'aria-label': '3D view',
-    hidden: true });
+    'aria-describedby': 'around', tabindex: 0, hidden: true });
   #buttons;
   #on = false;
   #frame = 0;
@@ -130,6 +130,20 @@ export class View3d {
     this.viewpoint = VIEWPOINTS[(VIEWPOINTS.indexOf(this.#viewpoint) + 1) % VIEWPOINTS.length];
   }
 
+  /**
+   * Draw once more, and give that as PNG: after a frame the browser forgets what was drawn.
+   *
+   * @returns {Promise<Blob|null>} null while nothing can be seen
+   */
+  async snapshot() {
+    const now_ms = performance.now();
+    const shown = this.#on ? this.#store.displayed(now_ms) : null;
+    if (shown === null || !this.picture?.draw(shown, now_ms, this.#looks(this.vehicle))) {
+      return null;
+    }
+    return new Promise((resolve) => { this.#canvas.toBlob(resolve); });
+  }
+
   /** Draw again though nothing has moved. */
   redraw() {
     this.#due = PICTURES_AFTER_CHANGE;
@@ -139,6 +153,10 @@ export class View3d {
     for (const [name, on] of Object.entries(seen)) {
       classList.toggle(name, Boolean(on));
     }
+    // One switch for the picture and the small map in it: there nobody sees the map's buttons.
+    const { world } = window.crgame;
+    world.insight = !this.#on || this.settings?.switches.plans === true;
+    world.redraw();
     this.#buttons?.update(this.#on, this.#viewpoint);
   }
 
@@ -186,8 +204,9 @@ export class View3d {
   /** @param {KeyboardEvent} event */
   #awaitAnswer(event) {
     const newest = this.#store.latest;
-    if (!event.repeat && newest !== undefined && window.crgame.driving?.seat) {
-      this.#answer.pressed(newest.t);
+    if (!event.repeat && newest !== undefined && window.crgame.driving?.seat
+        && !isTyping(event.target)) {
+      this.#answer.pressed(newest.t, this.#store.clock.rate);
     }
   }
 
@@ -207,9 +226,9 @@ export class View3d {
     this.#tellLoss(this.picture);
     this.#clock.follow(now_ms);
     const shown = this.#store.displayed(now_ms);
+    const early = now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS;
     if (shown === null || (shown.t === this.#shown_t && this.#due === 0)
-        || (now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS
-          && !this.#answer.isDue(shown.t))) {
+        || (early && !this.#answer.isDue(shown.t))) {
       return;
     }
     const { vehicle } = this;
@@ -219,6 +238,9 @@ export class View3d {
       this.#due = shown.t === this.#shown_t ? this.#due - 1 : PICTURES_AFTER_CHANGE;
       this.#shown_t = shown.t;
       this.#drawn_ms = now_ms;
+      if (early) {
+        this.#answer.drawn();
+      }
     }
   }
 

@@ -14,8 +14,8 @@ import { FIELD_OF_VIEW, readSeat } from './field_of_view.js';
 const SWITCHES = [
   { name: 'mirrors', text: 'Mirrors', on: true },
   { name: 'inset', text: 'Small map', on: true },
-  // What an AV plans is nothing that a driver could see.
-  { name: 'plans', text: 'Plans of the AVs', on: false },
+  // What an AV plans or perceives is nothing that a driver could see.
+  { name: 'plans', text: 'What AVs plan and perceive', on: false },
   { name: 'sharp', text: 'Full resolution, however slow', on: false },
 ];
 

@@ -6,10 +6,12 @@ import { element, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { icon } from '../panels/icons.js';
 import { recall, remember } from '../panels/memory.js';
+import { driverSight } from './driver_sight.js';
 
 /** @import { Shown, Store } from '../store.js' */
 
 const EVERY_MS = 1000;
+// Who is farther away is not told of [m].
 const REACH = 100;
 const MOST_TOLD = 5;
 const KMH = 3.6;
@@ -24,17 +26,19 @@ const STANDING = 0.3;
  * @param {Body} own
  * @param {Body[]} others
  * @param {boolean} driven whether this page drives it
+ * @param {number} [range] how far one sees [m]
  * @returns {string}
  */
-export function describeAround(own, others, driven) {
+export function describeAround(own, others, driven, range = Infinity) {
+  const reach = Math.min(REACH, range);
   const near = others.map((other) => ({
     other, distance: Math.hypot(other.x - own.x, other.y - own.y) }))
-    .filter(({ distance }) => distance <= REACH).sort((a, b) => a.distance - b.distance);
+    .filter(({ distance }) => distance <= reach).sort((a, b) => a.distance - b.distance);
   const told = near.slice(0, MOST_TOLD).map(({ other, distance }) => (
     `${other.id} ${Math.round(distance)} m ${directionOf(own, other)}, ${pace(other.speed)}`));
   const more = near.length - told.length;
   return [`${driven ? 'You drive' : 'Watching'} ${own.id}, ${pace(own.speed)}.`,
-    told.length === 0 ? `Nobody within ${REACH} m.`
+    told.length === 0 ? `Nobody within ${Math.round(reach)} m.`
       : `Around: ${told.join('; ')}${more > 0 ? `; and ${more} more` : ''}.`].join(' ');
 }
 
@@ -72,7 +76,8 @@ export function createAround(root, store) {
     const bodies = shown === null ? [] : bodiesOf(store, shown);
     const own = bodies.find((body) => body.id === id);
     return own === undefined ? `The whole map, with ${bodies.length} vehicles and objects.`
-      : describeAround(own, bodies.filter((body) => body !== own), seat !== null);
+      : describeAround(own, bodies.filter((body) => body !== own), seat !== null,
+        driverSight(store)?.range);
   };
   const button = element('button', { type: 'button', class: 'icon-button', id: 'announce',
     'aria-label': 'Read out what is around', title: 'Read out what is around', on: {

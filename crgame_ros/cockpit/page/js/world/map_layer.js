@@ -68,7 +68,7 @@ export class MapLayer {
       }
     }
     this.#drawSurfaces(context, view);
-    if (this.goals) {
+    if (this.goals && view.insight) {
       this.#drawGoals(context, view);
     }
     this.#drawMarks(context, view);

@@ -26,6 +26,7 @@ import { VehicleLayer } from './vehicle_layer.js';
  * @property {Scene|null} scene
  * @property {Shown|null} shown
  * @property {number} now_ms
+ * @property {boolean} insight whether what AVs plan, perceive and want may be drawn
  */
 
 /**
@@ -120,8 +121,10 @@ export class Painter {
    */
   #paintMoving(context, view) {
     paintExtra(this.#extra.below, context, view);
-    this.plans.draw(context, view, this.vehicles.vehicles);
-    this.predictions.draw(context, view, this.vehicles);
+    if (view.insight) {
+      this.plans.draw(context, view, this.vehicles.vehicles);
+      this.predictions.draw(context, view, this.vehicles);
+    }
     this.vehicles.draw(context, view);
     paintExtra(this.#extra.above, context, view);
   }

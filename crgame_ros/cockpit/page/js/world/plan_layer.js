@@ -66,7 +66,8 @@ export class PlanLayer {
     }
     for (const plan of view.store.plans.values()) {
       const vehicle = vehicles[plan.index];
-      if (vehicle !== undefined && this.shows(vehicle.id)) {
+      if (vehicle !== undefined && this.shows(vehicle.id)
+          && Number.isFinite(view.shown.vehicles[plan.index * VEHICLE_WIDTH])) {
         this.#drawPlan(context, view, plan, vehicle);
       }
     }

@@ -32,7 +32,7 @@ export class PredictionLayer {
         for (const { column, points } of prediction.entries) {
           const thing = column < layer.vehicles.length ? layer.vehicles[column]
             : layer.objects[column - layer.vehicles.length];
-          if (thing !== undefined) {
+          if (thing !== undefined && layer.poseOf(thing.id, view.shown) !== null) {
             drawEntry(context, view, thing, points, passed * STRIDE);
           }
         }

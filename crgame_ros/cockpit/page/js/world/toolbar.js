@@ -51,6 +51,7 @@ export function createToolbar(root, actions) {
     return node;
   };
   const view = group();
+  view.classList.add('world-zoom');
   toolButton(view, ICONS.plus, 'Zoom in (+)', () => actions.zoomBy(1.4));
   toolButton(view, ICONS.minus, 'Zoom out (-)', () => actions.zoomBy(1 / 1.4));
   toolButton(view, ICONS.fit, 'Show the whole map (0)', actions.fit);

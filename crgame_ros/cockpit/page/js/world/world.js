@@ -3,6 +3,7 @@
 /** The world: map, vehicles and plans, drawn on a canvas in each animation frame. */
 
 import { Camera } from './camera.js';
+import { hideBeyond } from './driver_sight.js';
 import { attachGestures } from './gestures.js';
 import { attachKeys } from './keys.js';
 import { Navigation } from './navigation.js';
@@ -14,6 +15,7 @@ import { createToolbar } from './toolbar.js';
 /** @import { Connection } from '../connection.js' */
 /** @import { Pose, Scene } from '../messages.js' */
 /** @import { Shown, Store } from '../store.js' */
+/** @import { Sight } from './driver_sight.js' */
 /** @import { DrawLayer, LiveView, Place, View } from './painter.js' */
 /** @import { WorldActions } from './toolbar.js' */
 /** @import { ChooseHollow, DrawnVehicle } from './vehicle_layer.js' */
@@ -31,6 +33,8 @@ const REDRAWN_ON = /** @type {const} */ (['state', 'objects', 'plan', 'predictio
  * @property {boolean} [toolbar] whether it has one
  * @property {boolean} [follow] begin with the first vehicle instead of the whole map
  * @property {HTMLElement|null} [covered] an element that lies over the lower edge
+ * @property {() => Sight|null} [sight] asked in each frame from which seat one looks; none sees
+ *   all
  */
 
 /** One canvas that shows what a store holds. */
@@ -38,7 +42,7 @@ export class World {
   /** Script time of the last frames [ms], a ring: frame i is at i % its length. */
   stats = { frames: 0, frame_ms: new Float32Array(FRAMES_KEPT) };
   /**
-   * Exactly as drawn last; null before.
+   * Exactly as drawn last, without whom one does not see; null before.
    *
    * @type {Shown|null}
    */
@@ -55,6 +59,7 @@ export class World {
   /** @type {ReturnType<typeof createToolbar>|null} */
   #toolbar = null;
   #follow;
+  #sight;
   #dirty = true;
   // While something else is shown in its place nothing is drawn.
   #away = false;
@@ -76,9 +81,10 @@ export class World {
     this.#store = store;
     this.#connection = options.connection ?? null;
     this.#follow = options.follow ?? true;
+    this.#sight = options.sight ?? (() => null);
     this.#view = {
       camera: this.camera, palette: this.#palette, ratio: 1, store, scene: null, shown: null,
-      now_ms: 0,
+      now_ms: 0, insight: true,
     };
     this.#attachHands(options);
     this.#attachSizes(options.covered ?? null);
@@ -93,7 +99,19 @@ export class World {
 
   /** Whether what AVs plan is drawn. */
   get showsPlans() {
-    return this.#painter.plans.on;
+    return this.#painter.plans.on && this.insight;
+  }
+
+  /** Whether what AVs plan, perceive and want may be drawn; which layers are on stays as it is. */
+  get insight() {
+    return this.#view.insight;
+  }
+
+  set insight(insight) {
+    if (insight !== this.#view.insight) {
+      this.#view.insight = insight;
+      this.redraw();
+    }
   }
 
   /**
@@ -312,6 +330,13 @@ export class World {
     this.#draw(now_ms);
   }
 
+  #hideUnseen() {
+    const sight = this.#sight();
+    if (this.shown !== null && sight !== null) {
+      hideBeyond(this.shown, this.#store.vehicleIndex(sight.id), sight.range);
+    }
+  }
+
   /** @param {number} now_ms */
   #draw(now_ms) {
     if (this.#away) {
@@ -326,6 +351,7 @@ export class World {
     }
     this.#dirty = false;
     this.shown = this.#view.shown = keepShown(this.shown, shown);
+    this.#hideUnseen();
     this.#navigation.steer(this.#poseOf(this.followed), this.stats.frames > 1);
     this.camera.update(now_ms);
     this.#view.now_ms = now_ms;

@@ -1,0 +1,25 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** How far the front wheels of somebody are turned whose recording says only how it moves. */
+
+// As far as those of cars go [rad].
+const MOST = 0.65;
+// Slower, what is divided by says little: the wheels straighten up to a standstill [m/s].
+const SLOW = 1;
+
+/**
+ * Give the angle at which a single-track model would move so: tan(angle) = wheelbase * yaw rate
+ * / speed.
+ *
+ * @param {number} wheelbase [m]
+ * @param {number} speed along its heading, below 0 backwards [m/s]
+ * @param {number} yaw_rate [rad/s]
+ * @returns {number} [rad], positive to the left; 0 at standstill
+ */
+export function steeringOf(wheelbase, speed, yaw_rate) {
+  if (Math.abs(speed) < Number.EPSILON) {
+    return 0;
+  }
+  const angle = Math.atan(wheelbase * yaw_rate / speed);
+  return Math.min(Math.max(angle, -MOST), MOST) * Math.min(Math.abs(speed) / SLOW, 1) ** 2;
+}
