@@ -18,6 +18,7 @@ from collections.abc import Iterator
 import json
 import math
 from pathlib import Path
+import re
 from typing import Any
 
 from crgame_ros.analysis.tables.data_package import PACKAGE_FILE
@@ -26,6 +27,7 @@ from crgame_ros.recording.run_folder import bags_of, run_folders
 from crgame_ros.yaml_text import read_text
 
 STUDY_FILE = Path('study', 'study.yaml')
+_FILES, _WORDS = 'files', re.compile(r'words\..*\.yaml')
 # A line for each thing that happened; answers are long at times [bytes].
 _LONGEST_JOURNAL = 200_000_000
 
@@ -41,7 +43,11 @@ def study_parts(path: Path) -> list[Path]:
 
 
 def _parts(path: Path) -> Iterator[Path]:
-    yield from sorted((path / STUDY_FILE).parent.rglob('*.yaml'))
+    study = (path / STUDY_FILE).parent
+    # What games name may be anything; of that, scenarios can be checked by themselves.
+    yield from sorted(file for file in study.rglob('*.yaml') if not _WORDS.fullmatch(file.name)
+                      and study / _FILES not in file.parents)
+    yield from sorted((study / _FILES).rglob('*.xml'))
     for person in sorted((path / 'participants').glob('*/')):
         yield from sorted(person.glob('*.jsonl'))
         yield from sorted((person / 'games').glob('*.yaml'))

@@ -129,13 +129,27 @@ def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name
            human: str = '', inputs: str = '') -> CellScene:
     parts, _ = cast_avs(game, loaded)
     game = replace(game, avs=tuple(spec for spec, _ in parts))
+    digests = tuple(planner_digest(spec.planner) for spec in game.avs or ())
+    return CellScene(loaded.benchmark_id, game_name, human, values_of_game(game, store, loaded),
+                     inputs, digests)
+
+
+def values_of_game(game: Game, store: ContentStore,
+                   loaded: LoadedScenario | None = None) -> dict[str, Any]:
+    """
+    Put the files of a game into a store.
+
+    :param loaded: its scenario, where it has been read.
+    :return: what a file of the game would have, with references instead of names of files.
+    :raises InputError: if a file cannot be read.
+    """
     values = write(game, game.base)
+    loaded = load_scenario(game.scenario) if loaded is None else loaded
     scenario = Content('scenario.xml', {'scenario.xml': guard.encode(loaded.xml_text)})
     store.put(scenario)
     values['scenario'] = scenario.reference
-    digests = tuple(planner_digest(spec.planner) for spec in game.avs or ())
-    return CellScene(loaded.benchmark_id, game_name, human, with_contents(values, store), inputs,
-                     digests)
+    found: dict[str, Any] = with_contents(values, store)
+    return found
 
 
 def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:

@@ -35,6 +35,7 @@ from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import schema_errors, used_ids, write_roads
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.scenario.recorded_humans import human_note, SOURCE_MARK, without_human_notes
+from crgame_ros.whole_file import write_whole
 from lxml import etree
 
 _HEAD_BYTES = 4096
@@ -173,15 +174,11 @@ def write_text(text: str, path: Path) -> None:
 
 def write_bytes(content: bytes, path: Path) -> None:
     """Write a file as `write_text` does."""
-    temporary = path.with_name(f'.{path.name}.{os.getpid()}.part')
     try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
+        write_whole(content, path)
     except OSError as error:
         raise InputError(f'cannot be written ({error.strerror})', str(path),
                          'choose a folder that can be written') from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _header(log: RunLog, loaded: LoadedScenario, problems: int,

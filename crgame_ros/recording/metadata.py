@@ -17,11 +17,11 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import functools
-import os
 from pathlib import Path
 from typing import Any
 
 from crgame_ros.errors import InputError
+from crgame_ros.whole_file import write_whole
 from crgame_ros.yaml_text import parse_yaml, read_text
 import yaml
 
@@ -144,16 +144,7 @@ def write_metadata(folder: Path, metadata: BagMetadata) -> Path:
     :raises OSError: if the file system refuses; an existing file is then unchanged.
     """
     path = folder / METADATA_FILE
-    temporary = folder / f'.{METADATA_FILE}.part'
-    try:
-        with temporary.open('w', encoding='utf-8') as stream:
-            yaml.safe_dump({_ROOT: _to_dict(metadata)}, stream, sort_keys=False)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise
+    write_whole(yaml.safe_dump({_ROOT: _to_dict(metadata)}, sort_keys=False).encode(), path)
     return path
 
 

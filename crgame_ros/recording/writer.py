@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any, cast, IO, Self
@@ -60,6 +61,9 @@ class _UnbufferedFile:
 
     def flush(self) -> None:
         """Do nothing: nothing is held back."""
+
+    def sync(self) -> None:
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         self._file.close()
@@ -203,6 +207,8 @@ class BagWriter:
             return
         try:
             self._mcap.finish()
+            # Who finds the metadata takes the recording for whole, after a power cut, too.
+            self._stream.sync()
             self._stream.close()
             write_metadata(self.folder, self._metadata())
         except OSError as error:

@@ -24,6 +24,7 @@ from types import TracebackType
 from typing import Any, IO, Self
 
 from crgame_ros.errors import InputError
+from crgame_ros.whole_file import sync_folder
 
 JOURNAL = 'journal.jsonl'
 
@@ -45,6 +46,8 @@ class SessionJournal:
             folder.mkdir(parents=True, exist_ok=True)
             self._file: IO[bytes] = self.path.open('a+b')
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            sync_folder(folder)
+            sync_folder(folder.parent)
         except BlockingIOError as error:
             self._file.close()
             raise InputError('this participant takes part already, in another process',

@@ -18,8 +18,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from crgame_ros.study.study_file import Block, Break, Practice, Step, StepEntry, StudyFile
-from crgame_ros.study.trial_plan import plan_trials, PlannedTrial
-from crgame_ros.study.trial_settings import laid, TrialSettings
+from crgame_ros.study.trial_plan import conditions_of, plan_trials, PlannedTrial
+from crgame_ros.study.trial_settings import drawn, laid, TrialSettings
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,21 @@ def session_of(study: StudyFile, place: int) -> tuple[SessionItem, ...]:
     items += _steps('before', study.before)
     trials = plan_trials(study, place)
     for block in study.blocks:
-        items += _block(study, block, [trial for trial in trials if trial.block == block.name])
+        items += _block(study, block, place,
+                        [trial for trial in trials if trial.block == block.name])
     items += _steps('after', study.after)
     return tuple(items)
+
+
+def drives_of(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:
+    """Name all that is driven in a study, each practice and condition once."""
+    for block in study.blocks:
+        if block.practice is not None:
+            first = conditions_of(study, block)[0].settings
+            settings = laid(study.settings, block.settings, block.practice.settings)
+            yield f'{block.name}: practice', placed(settings, first)
+        for condition in conditions_of(study, block):
+            yield f'{block.name}: {condition.name}', condition.settings
 
 
 def placed(settings: TrialSettings, trial: TrialSettings) -> TrialSettings:
@@ -78,10 +90,12 @@ def placed(settings: TrialSettings, trial: TrialSettings) -> TrialSettings:
     return replace(settings, game=trial.game, scenario=trial.scenario)
 
 
-def _block(study: StudyFile, block: Block, trials: list[PlannedTrial]) -> Iterator[SessionItem]:
+def _block(study: StudyFile, block: Block, place: int,
+           trials: list[PlannedTrial]) -> Iterator[SessionItem]:
     yield from _steps(f'{block.name}/before', block.before)
     if block.practice is not None:
-        settings = laid(study.settings, block.settings, block.practice.settings)
+        settings = drawn(laid(study.settings, block.settings, block.practice.settings),
+                         f'{study.seed} {place} practice {block.name}')
         if trials:
             settings = placed(settings, trials[0].condition.settings)
         yield SessionItem(f'{block.name}/practice', PracticeDrives(block.practice, settings))

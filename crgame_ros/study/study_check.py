@@ -25,13 +25,19 @@ from crgame_ros.game.game_file import dump_game, parse_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.questionnaire import load_questionnaire
-from crgame_ros.study.session_script import Fields, placed, PracticeDrives, session_of, SessionItem
+from crgame_ros.study.session_script import (
+    drives_of,
+    Fields,
+    PracticeDrives,
+    session_of,
+    SessionItem,
+)
 from crgame_ros.study.study_file import Block, Break, Page, Questions, StudyFile
 from crgame_ros.study.study_pages import page_file, questionnaire_name
 from crgame_ros.study.trial_game import trial_game
 from crgame_ros.study.trial_order import rows_of
 from crgame_ros.study.trial_plan import conditions_of, plan_trials, PlannedTrial
-from crgame_ros.study.trial_settings import laid, TrialSettings
+from crgame_ros.study.trial_settings import TrialSettings
 import yaml
 
 # Of a trial that is looked at, simulated [s].
@@ -74,7 +80,7 @@ def check_study(study: StudyFile,
     :param progress: is told how much is done, 0 to 1.
     """
     found = [*_steps(study), *_balance(study)]
-    drives = list(_drives(study))
+    drives = list(drives_of(study))
     for number, (name, settings) in enumerate(drives):
         try:
             _try(settings)
@@ -119,16 +125,6 @@ def _reading_s(study: StudyFile, item: SessionItem) -> float:
 def _duration_s(settings: TrialSettings) -> float:
     duration_s = trial_game(settings, 'idle').duration
     return duration_s if duration_s < float('inf') else 0.0
-
-
-def _drives(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:
-    for block in study.blocks:
-        if block.practice is not None:
-            first = conditions_of(study, block)[0].settings
-            settings = laid(study.settings, block.settings, block.practice.settings)
-            yield f'{block.name}: practice', placed(settings, first)
-        for condition in conditions_of(study, block):
-            yield f'{block.name}: {condition.name}', condition.settings
 
 
 def _try(settings: TrialSettings) -> None:

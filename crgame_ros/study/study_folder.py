@@ -14,12 +14,16 @@
 # limitations under the License.
 """Where a study's data lies: one folder for it, and one in it for each participant."""
 
+from collections.abc import Iterable
 from pathlib import Path
 import re
 
 from crgame_ros.errors import InputError
+from crgame_ros.study.kept_drives import keep_drives
 from crgame_ros.study.session_journal import read_journal
 from crgame_ros.study.study_file import Page, Questions, StudyFile
+from crgame_ros.study.study_pages import steps_of
+from crgame_ros.whole_file import write_whole
 
 _ID = re.compile(r'[A-Za-z0-9][A-Za-z0-9_-]{0,31}')
 
@@ -67,41 +71,39 @@ class StudyFolder:
                  for place in _places(self.participant(other))}
         return next(place for place in range(len(taken) + 1) if place not in taken)
 
-    def keep_study(self, study: StudyFile, file: Path) -> None:
+    def keep_study(self, study: StudyFile, file: Path, pictures: Iterable[str] = ()) -> None:
         """
         Keep the study's files as they are, or make sure that they still are what was kept.
 
         :param file: of the study.
+        :param pictures: of its pages, relative to its folder.
         :raises InputError: if one has changed since, or cannot be written.
         """
         folder = self.root / 'study'
-        files = {'study.yaml': file, **{name: study.base / name for name in _beside(study)}}
+        files = {'study.yaml': file,
+                 **{name: study.base / name for name in (*_beside(study), *pictures)}}
         try:
             for name, path in files.items():
                 kept = folder / name
                 content = path.read_bytes()
                 if not kept.exists():
                     kept.parent.mkdir(parents=True, exist_ok=True)
-                    part = kept.with_name(f'{kept.name}.part')
-                    part.write_bytes(content)
-                    part.replace(kept)
+                    write_whole(content, kept)
                 elif kept.read_bytes() != content:
                     raise InputError('has changed since the first participant', str(path),
                                      f'put it back as {kept} has it, or begin a new study with '
                                      'another --out')
+            keep_drives(study, folder)
         except OSError as error:
             raise InputError(f'cannot be kept ({error.strerror})', str(folder),
                              'choose another folder with --out') from error
 
 
 def _beside(study: StudyFile) -> list[str]:
-    """Name the pages and questionnaires beside a study file, in every language."""
-    entries = [*study.before, *study.after]
-    for block in study.blocks:
-        entries += [*block.before, *block.after_trial, *block.after]
-    names: dict[str, None] = {}
-    for entry in entries:
-        step = entry.step
+    """Name pages, questionnaires and words beside a study file, in every language."""
+    names: dict[str, None] = dict.fromkeys(
+        path.name for path in sorted(study.base.glob('words.*.yaml')))
+    for step in steps_of(study):
         if isinstance(step, Page):
             page = Path(step.file)
             for name in (step.file, *(str(page.with_suffix(f'.{language}.md'))

@@ -16,7 +16,15 @@
 
 from pathlib import Path
 
-from crgame_ros.study.study_file import Page, Questions, StudyFile
+from crgame_ros.study.study_file import Page, Questions, Step, StudyFile
+
+
+def steps_of(study: StudyFile) -> tuple[Step, ...]:
+    """List all that participants do between drives, each as often as the file has it."""
+    entries = [*study.before, *study.after]
+    for block in study.blocks:
+        entries += [*block.before, *block.after_trial, *block.after]
+    return tuple(entry.step for entry in entries)
 
 
 def page_file(study: StudyFile, page: Page, language: str) -> Path | None:

@@ -67,8 +67,9 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
         sound='on' if settings.sound else 'none')
     if settings.duration is not None:
         game = replace(game, duration=settings.duration)
+    seed = settings.seed if isinstance(settings.seed, int) else 0
     return _seated(settings, driver, adapt_game(
-        game, load_scenario(game.scenario), seed=settings.seed or 0,
+        game, load_scenario(game.scenario), seed=seed,
         planner=settings.planner or OWN, options=settings.options,
         perception=_spec(PerceptionSpec, settings.perception, PERFECT, 'perception'),
         traffic=_spec(TrafficSpec, settings.traffic, NONE, 'traffic')))

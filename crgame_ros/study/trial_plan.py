@@ -14,13 +14,13 @@
 # limitations under the License.
 """Which trials a participant drives, in their order: conditions crossed, settings laid over."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.study_file import Block, StudyFile
 from crgame_ros.study.trial_order import order_of
-from crgame_ros.study.trial_settings import laid, Level, TrialSettings
+from crgame_ros.study.trial_settings import drawn, laid, Level, TrialSettings
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,10 @@ def plan_trials(study: StudyFile, place: int) -> tuple[PlannedTrial, ...]:
             for index in order_of(block.order, len(conditions), study.seed, place, repetition,
                                   sequences):
                 in_block += 1
-                trials.append(PlannedTrial(len(trials) + 1, block.name, in_block, repetition + 1,
-                                           conditions[index]))
+                number, condition = len(trials) + 1, conditions[index]
+                settings = drawn(condition.settings, f'{study.seed} {place} trial {number}')
+                trials.append(PlannedTrial(number, block.name, in_block, repetition + 1,
+                                           replace(condition, settings=settings)))
     return tuple(trials)
 
 

@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+import random
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.game.events import EventList
@@ -41,7 +42,7 @@ class TrialSettings:
     :param options: of that planner.
     :param perception: file with the `perception` of all AVs, `perfect`, or `own` for the game's.
     :param traffic: file with the `traffic`, `none`, or `own` for the game's.
-    :param seed: of everything random.
+    :param seed: of everything random; `each` draws another one for each drive of each participant.
     :param duration: longest simulated time [s]
     :param view: what the participant sees at the start.
     :param map: whether the map is there, beside the view.
@@ -62,7 +63,7 @@ class TrialSettings:
     options: dict[str, Any] | None = None
     perception: Annotated[str, Named()] | None = None
     traffic: Annotated[str, Named()] | None = None
-    seed: Annotated[int, Within(0, 2**63 - 1)] | None = None
+    seed: Annotated[int, Within(0, 2**63 - 1)] | Literal['each'] | None = None
     duration: Annotated[float, Within(0.0, 86_400.0, above=True)] | None = None
     view: Literal['map', 'driver', 'chase'] | None = None
     map: bool | None = None  # noqa: A003
@@ -90,6 +91,7 @@ def tasks_over(outer: tuple[TaskSpec, ...], inner: tuple[TaskSpec, ...]) -> tupl
 
 
 NOTHING = TrialSettings()
+EACH = 'each'
 # What holds where nobody says otherwise.
 STANDARD = TrialSettings(perception='own', traffic='own', seed=0, view='driver', map=False,
                          plans=False, names=False, sound=True)
@@ -123,6 +125,17 @@ class Factor:
 
     name: ColumnName
     levels: Annotated[tuple[Level, ...], Listed(2, 50, 'level', 'name')]
+
+
+def drawn(settings: TrialSettings, drive: str) -> TrialSettings:
+    """
+    Draw the seed of a drive that is to have one of its own.
+
+    :param drive: names it among all of the study; the same name gives the same seed everywhere.
+    """
+    if settings.seed != EACH:
+        return settings
+    return replace(settings, seed=random.Random(drive).getrandbits(31))
 
 
 def laid(*settings: TrialSettings) -> TrialSettings:

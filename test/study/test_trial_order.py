@@ -19,7 +19,11 @@ from itertools import pairwise
 import subprocess
 import sys
 
+from crgame_ros.schema.reading import read
+from crgame_ros.study.session_script import PracticeDrives, session_of
+from crgame_ros.study.study_file import StudyFile
 from crgame_ros.study.trial_order import order_of, ORDERS, rows_of, williams_rows
+from crgame_ros.study.trial_plan import plan_trials
 import pytest
 
 
@@ -72,3 +76,23 @@ def test_another_process_orders_alike() -> None:
 
 def test_the_square_of_four_is_the_textbooks() -> None:
     assert williams_rows(4) == [[0, 1, 3, 2], [1, 2, 0, 3], [2, 3, 1, 0], [3, 0, 2, 1]]
+
+
+def test_each_drive_may_have_a_seed_of_its_own() -> None:
+    study = read(StudyFile, {
+        'name': 'seeds', 'settings': {'seed': 'each'}, 'factors': [
+            {'name': 'a', 'levels': [{'name': 'x'}, {'name': 'y', 'seed': 5}]}],
+        'blocks': [{'name': 'main', 'repetitions': 3, 'practice': {}}]}, 'study')
+    seeds = [[trial.condition.settings.seed for trial in plan_trials(study, place)
+              if trial.condition.name == 'x'] for place in range(4)]
+    assert len({seed for row in seeds for seed in row}) == 12
+    # As another machine has drawn them for its first six drives.
+    drawn = [1240283022, 212378984, 1781601113, 391212979, 1356494655, 1019340412]
+    assert seeds[0] == [drawn[trial.number - 1] for trial in plan_trials(study, 0)
+                        if trial.condition.name == 'x']
+    assert all(trial.condition.settings.seed == 5 for trial in plan_trials(study, 0)
+               if trial.condition.name == 'y')
+    assert plan_trials(study, 3) == plan_trials(study, 3)
+    practice = session_of(study, 0)[0].what
+    assert isinstance(practice, PracticeDrives)
+    assert isinstance(practice.settings.seed, int) and practice.settings.seed not in seeds[0]

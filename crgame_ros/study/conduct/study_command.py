@@ -120,6 +120,7 @@ def run_command(values: argparse.Namespace) -> int:
     :raises CrgameError: if the study cannot be run, or the participant takes part already.
     """
     from crgame_ros.ros.environment import prepare_environment, require_ros
+    from crgame_ros.study.desk.page_markdown import pictures_of
     from crgame_ros.study.study_file import load_study
     from crgame_ros.study.study_folder import check_participant, StudyFolder
     require_ros()
@@ -133,7 +134,7 @@ def run_command(values: argparse.Namespace) -> int:
     if values.place is not None and not 1 <= values.place <= 10_000:
         raise InputError(f'is {values.place}', '--place', 'give 1 to 10000')
     folder = StudyFolder(values.out or Path('studies') / study.name)
-    folder.keep_study(study, values.file)
+    folder.keep_study(study, values.file, pictures_of(study))
     place = folder.place_of(participant) if values.place is None else values.place - 1
     say(f'{participant}, place {place + 1} of {study.name}; data go to {folder.root}')
     over = conduct(SessionRequest(study, folder.participant(participant).resolve(), participant,

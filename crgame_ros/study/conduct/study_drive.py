@@ -24,6 +24,7 @@ from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_game import seat_of, trial_game
 from crgame_ros.study.trial_plan import PlannedTrial
 from crgame_ros.study.trial_settings import TrialSettings
+from crgame_ros.whole_file import write_whole
 
 
 def settings_of(item: SessionItem) -> TrialSettings | None:
@@ -78,7 +79,5 @@ def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:
     path = games / f'{item.id.replace("/", "_")}.yaml'
     text = dump_game(game)
     games.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix('.part')
-    part.write_text(text, encoding='utf-8')
-    part.replace(path)
+    write_whole(text.encode(), path)
     return StudyDrive(item, settings, seat_of(settings, game), path)

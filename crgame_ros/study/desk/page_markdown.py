@@ -23,7 +23,7 @@ from urllib.parse import unquote, urlsplit
 from crgame_ros.cockpit.page_files import PageFile
 from crgame_ros.errors import InputError
 from crgame_ros.study.study_file import Page, StudyFile
-from crgame_ros.study.study_pages import page_file
+from crgame_ros.study.study_pages import page_file, steps_of
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from markdown_it.tree import SyntaxTreeNode
@@ -58,6 +58,26 @@ def read_tree(study: StudyFile, page: Page, language: str) -> tuple[Node, ...]:
         raise InputError(f'is longer than {MOST_BYTES} bytes', str(file), 'make it shorter')
     tree = SyntaxTreeNode(_parser().parse(text))
     return tuple(_nodes(tree.children))
+
+
+def pictures_of(study: StudyFile) -> tuple[str, ...]:
+    """
+    Name the pictures of all pages that are there, relative to the study's folder.
+
+    :raises InputError: if a page cannot be read.
+    """
+    left: list[Node] = [
+        node for step in steps_of(study) if isinstance(step, Page)
+        for language in study.all_languages for node in read_tree(study, step, language)]
+    names: dict[str, None] = {}
+    while left:
+        node = left.pop()
+        if isinstance(node, dict):
+            left += node.get('children', ())
+            name = node.get('src', '')
+            if name and picture(study, name) is not None:
+                names[name] = None
+    return tuple(names)
 
 
 def picture(study: StudyFile, name: str) -> PageFile | None:

@@ -1,0 +1,80 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A file has its name only once the disk has what is in it."""
+
+import os
+from pathlib import Path
+import time
+
+from crgame_ros.recording.writer import BagWriter
+from crgame_ros.study.session_journal import JOURNAL, SessionJournal
+from crgame_ros.whole_file import write_whole
+import pytest
+
+
+@pytest.fixture
+def synced(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, frozenset[str]]]:
+    """Note what is given to the disk, and which names were in its folder at that moment."""
+    calls: list[tuple[str, frozenset[str]]] = []
+    fsync = os.fsync
+
+    def noted(handle: int) -> None:
+        path = Path(os.readlink(f'/proc/self/fd/{handle}'))
+        folder = path if path.is_dir() else path.parent
+        calls.append((path.name, frozenset(item.name for item in folder.iterdir())))
+        fsync(handle)
+
+    monkeypatch.setattr(os, 'fsync', noted)
+    return calls
+
+
+def test_content_then_name_then_folder(
+        synced: list[tuple[str, frozenset[str]]], tmp_path: Path) -> None:
+    path = tmp_path / 'folder' / 'a.txt'
+    path.parent.mkdir()
+    for content in (b'old', b'new'):
+        write_whole(content, path)
+        assert path.read_bytes() == content
+    (first, before), (second, after), *_ = synced
+    assert first.endswith('.part') and 'a.txt' not in before
+    assert second == 'folder' and after == {'a.txt'}
+    assert len(synced) == 4
+
+
+def test_what_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
+    path = tmp_path / 'a.txt'
+    write_whole(b'old', path)
+    tmp_path.joinpath(f'.a.txt.{os.getpid()}.part').mkdir()
+    with pytest.raises(OSError):
+        write_whole(b'new', path)
+    assert path.read_bytes() == b'old'
+
+
+def test_a_recording_is_on_the_disk_before_its_metadata(
+        synced: list[tuple[str, frozenset[str]]], tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag', now_ns=time.monotonic_ns):
+        pass
+    assert synced[0][0] == 'bag_0.mcap' and 'metadata.yaml' not in synced[0][1]
+    assert synced[-1] == ('bag', frozenset({'bag_0.mcap', 'metadata.yaml'}))
+
+
+def test_a_journal_is_found_again(
+        synced: list[tuple[str, frozenset[str]]], tmp_path: Path) -> None:
+    with SessionJournal(tmp_path / 'P01') as journal:
+        assert ('P01', frozenset({JOURNAL})) in synced
+        assert any(name == tmp_path.name and 'P01' in names for name, names in synced)
+        synced.clear()
+        journal.add({'entry': 'begun'})
+        assert [name for name, _ in synced] == [JOURNAL]
