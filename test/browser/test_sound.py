@@ -197,12 +197,17 @@ def test_an_indicator_clicks_three_times_a_second(page: Browser) -> None:
 def test_a_collision_and_a_kerb_are_heard_once(page: Browser) -> None:
     # So slow that the ground beside the road is not heard.
     own = own_vehicle(**SILENT_MOTOR, speed=0.5)
-    for trouble in ({'collision': True}, {'offRoad': True}):
+    peaks: list[float] = []
+    for trouble, then in (({'collision': True},) * 2, ({'offRoad': True},) * 2,
+                          # While the wheels are on the road all the time.
+                          ({'kerb': 1.0}, {}), ({'kerb': 0.35}, {})):
         samples = render(page, [update(0.0, own), update(0.5, own, **trouble),
-                                update(1.5, own, **trouble)], 2.5)[0]
+                                update(0.53, own, **then), update(1.5, own, **then)], 2.5)[0]
         before, at, after = (np.abs(samples[int(begin * RATE_Hz):int(end * RATE_Hz)]).max()
                              for begin, end in ((0.3, 0.5), (0.5, 0.6), (1.6, 2.5)))
         assert at > 3.0 * max(before, after)
+        peaks.append(at)
+    assert peaks[1] == pytest.approx(peaks[2], rel=0.05) and peaks[3] < 0.5 * peaks[2]
 
 
 def test_shut_it_is_silence_to_the_last_bit(page: Browser) -> None:
