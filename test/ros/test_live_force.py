@@ -33,7 +33,7 @@ from sensor_msgs.msg import JointState
 from worker_roles import own_domain_id
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'driver'))
-from pushed_wheel import Motor, PushedWheel  # noqa: E402, I100, I202
+from pushed_wheel import Motor, PushedWheel, wheel_at  # noqa: E402, I100, I202
 
 STEP_NS = 10_000_000
 CAR = load_vehicle_parameters()
@@ -63,10 +63,13 @@ def test_the_wheel_follows_the_vehicle_and_rests_with_it() -> None:
     told: list[str] = []
     motor = Motor()
     force = LiveForce(Endpoints(node), 'hv0', lambda: True, told.append)
-    expected = SteeringTorque(CAR).aligning(20.0, 0.25)
+    wheel = PushedWheel(motor)
+    wheel.turn(wheel_at(20.0, 0.25))
+    angle = wheel.layout.steering.deflection(wheel.raw) * CAR.max_steering_wheel_angle
+    expected = SteeringTorque(CAR).aligning(20.0, 0.25, angle)
     with Peer(domain, ('/<hv>/steering_torque', 'hv0')) as peer:
         heard: list[JointState] = peer.messages['/<hv>/steering_torque']
-        force.begin(PushedWheel(motor), CAR)
+        force.begin(wheel, CAR)
         bend = Bend(peer.publisher('/<v>/odom', 'hv0'))
 
         def pushes() -> bool:
@@ -74,7 +77,7 @@ def test_the_wheel_follows_the_vehicle_and_rests_with_it() -> None:
             return bool(heard) and heard[-1].effort[0] == pytest.approx(expected, abs=1e-6)
 
         peer.wait_until(pushes, 'the torque of the bend')
-        assert heard[-1].name == ['hv0/steering_wheel'] and list(heard[-1].position) == [0.0]
+        assert heard[-1].name == ['hv0/steering_wheel'] and list(heard[-1].position) == [angle]
         assert motor.levels[-1] == round(FULL_LEVEL * expected / 2.1)
         peer.wait_until(lambda: heard[-1].effort[0] == 0.0, 'rest, for nothing is published')
         assert motor.levels[-1] == 0
