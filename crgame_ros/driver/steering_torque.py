@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import math
 
 from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.steering import Steering
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class TorqueParameters:
     What of the steering no vehicle file has: a typical car with power steering.
 
     :param contact_half_length: a, of a front tyre's contact patch [m]
+    :param slip_stiffness: cornering stiffness by friction and load, C_S of CommonRoad's vehicle
+        models, p_ky1 / p_dy1 [1/rad]
     :param caster_trail: by which the kingpin leads the middle of the patch [m]
     :param steering_ratio: of the wheel's angle to the front wheels', mechanically [-]
     :param unassisted: share of the torque that power steering leaves to the driver [-]
@@ -45,6 +48,7 @@ class TorqueParameters:
     """
 
     contact_half_length: float = 0.08
+    slip_stiffness: float = 20.898
     caster_trail: float = 0.02
     steering_ratio: float = 16.0
     unassisted: float = 0.2
@@ -90,13 +94,17 @@ class SteeringTorque:
     """
     Self-aligning torque, damping, friction, end stops, rumble off the road and after a collision.
 
-    The kinematic models have no tyre forces, so the front axle's share of the lateral force is
-    that of a steady turn, F = m a l_r / L with a = v dpsi/dt. The aligning moment is that of the
-    brush model with parabolic pressure (Pacejka, Tire and Vehicle Dynamics, section 3.2.1): with
-    lambda = 1 - |theta tan(alpha)| it has F = mu F_z (1 - lambda^3) and
-    M_z = mu F_z a lambda^3 (1 - lambda), and so lambda^3 = 1 - |F| / (mu F_z). The pneumatic
-    trail of a / 3 falls off as the slip grows: M_z is largest at 58 % of the grip and gone where
-    the tyre slides; the caster trail's part is left. Backwards nothing aligns.
+    The tyres' force and moment are those of the brush model with parabolic pressure (Pacejka,
+    Tire and Vehicle Dynamics, section 3.2.1): with a slip s = theta alpha of the front tyres,
+    theta = C_S / 3, and lambda = 1 - |s| they are F = mu F_z (1 - lambda^3) and
+    M_z = mu F_z a lambda^3 (1 - lambda). The pneumatic trail of a / 3 falls off as the slip grows:
+    M_z is largest at 58 % of the grip and gone where the tyre slides; the caster trail's part is
+    left. Backwards nothing aligns.
+
+    The motion models have no slip of their own. In the linear single-track model
+    alpha_f = alpha_r + delta - L (dpsi/dt) / v, of which alpha_r is that of a steady turn: it
+    bears F = m a l_r / L with a = v dpsi/dt, the brush model turned around. The rest is by how
+    much the wheel in the driver's hands is ahead of the way that the vehicle goes.
 
     :param vehicle: whose torque it is.
     """
@@ -105,22 +113,30 @@ class SteeringTorque:
                  parameters: TorqueParameters | None = None) -> None:
         self.parameters = p = parameters or TorqueParameters()
         front = vehicle.rear_to_center / vehicle.wheelbase
+        self._wheelbase, self._full_turn = vehicle.wheelbase, vehicle.max_steering_wheel_angle
+        self._steering = Steering(vehicle)
         self._mass = vehicle.mass * front
         self._grip = vehicle.friction * self._mass * vehicle.gravity
         self._share = p.unassisted / p.steering_ratio
         self._end = p.end_stop_from * vehicle.max_steering_wheel_angle
 
-    def aligning(self, speed: float, yaw_rate: float) -> float:
+    def slip(self, speed: float, yaw_rate: float, wheel_angle: float) -> float:
+        """Give theta alpha of the front tyres, forwards; from 1 on they slide [-]."""
+        share = self._mass * speed * yaw_rate / self._grip
+        steady = 1.0 - math.cbrt(1.0 - min(abs(share), 1.0))
+        angle = self._steering.target_angle(wheel_angle / self._full_turn, speed)
+        ahead = angle - math.atan2(self._wheelbase * yaw_rate, speed)
+        return math.copysign(steady, share) + self.parameters.slip_stiffness / 3.0 * ahead
+
+    def aligning(self, speed: float, yaw_rate: float, wheel_angle: float) -> float:
         """Give the torque by which the tyres turn the wheel back [N m]."""
+        if speed <= 0.0 or self._grip == 0.0:
+            return 0.0
         p = self.parameters
-        force = self._mass * speed * yaw_rate
-        sliding = abs(force) >= self._grip
-        force = math.copysign(min(abs(force), self._grip), force)
-        left = 0.0 if sliding else math.cbrt(1.0 - abs(force) / self._grip)
-        moment = math.copysign(
-            self._grip * p.contact_half_length * left ** 3 * (1.0 - left), force)
-        forwards = max(0.0, math.tanh(speed))
-        return -(moment + force * p.caster_trail) * self._share * forwards
+        slip = self.slip(speed, yaw_rate, wheel_angle)
+        left = max(0.0, 1.0 - abs(slip)) ** 3
+        moment = p.contact_half_length * left * min(abs(slip), 1.0) + p.caster_trail * (1.0 - left)
+        return -math.copysign(self._grip * moment, slip) * self._share * math.tanh(speed)
 
     def resistance(self, speed: float, wheel_rate: float) -> float:
         """Give damping and friction, the more the slower the vehicle is [N m]."""
@@ -148,6 +164,6 @@ class SteeringTorque:
 
     def torque(self, motion: WheelMotion) -> float:
         """Give the sum [N m]."""
-        return (self.aligning(motion.speed, motion.yaw_rate)
+        return (self.aligning(motion.speed, motion.yaw_rate, motion.wheel_angle)
                 + self.resistance(motion.speed, motion.wheel_rate)
                 + self.end_stop(motion.wheel_angle) + self.shaking(motion))

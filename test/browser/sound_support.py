@@ -63,7 +63,7 @@ for (let i = 0; i < bytes.length; i += 32768) {
 return [buffer.numberOfChannels, btoa(text)];
 """
 
-NO_TROUBLE = {'collision': False, 'offRoad': False}
+NO_TROUBLE = {'collision': False, 'offRoad': False, 'kerb': 0}
 
 
 def own_vehicle(**values: Any) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def other_vehicle(**values: Any) -> dict[str, Any]:
 
 
 def update(at: float = 0.0, own: dict[str, Any] | None = None,
-           others: Sequence[dict[str, Any]] = (), **trouble: bool) -> dict[str, Any]:
+           others: Sequence[dict[str, Any]] = (), **trouble: float) -> dict[str, Any]:
     """Give what is heard from a time on [s]."""
     return {'at': at, 'own': own or own_vehicle(), 'others': list(others),
             'trouble': NO_TROUBLE | trouble}

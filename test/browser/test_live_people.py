@@ -15,7 +15,9 @@
 """Two people drive one game in two browsers, over TLS, while others watch and attack."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 import http.client
+from pathlib import Path
 import re
 import signal
 import socket
@@ -38,17 +40,18 @@ import yaml
 
 TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state', '/seats/drivers')
 HOSTILE = 20
+LONG_S, SHORT_S = 3600.0, 6.0
 
 
-@pytest.fixture(scope='module')
-def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
-    """Keep one graph of the example for two people, open by links."""
-    folder = tmp_path_factory.mktemp('people')
+@pytest.fixture
+def graph(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Graph]:
+    """Keep one graph of the example for two people, open by links, of a duration [s]."""
     game = yaml.safe_load((ROOT / 'examples' / 'two_humans.yaml').read_text())
-    game |= {'scenario': str(ROOT / 'scenarios' / 'ZAM_Merge-1_1_T-1.xml'), 'duration': 3600}
-    (folder / 'game.yaml').write_text(yaml.safe_dump(game))
-    with Launcher([folder / 'game.yaml', '--open-cockpit', '--listen', '127.0.0.1'],
-                  folder / 'run', headless=False) as launcher, \
+    game |= {'scenario': str(ROOT / 'scenarios' / 'ZAM_Merge-1_1_T-1.xml'),
+             'duration': request.param}
+    (tmp_path / 'game.yaml').write_text(yaml.safe_dump(game))
+    with Launcher([tmp_path / 'game.yaml', '--open-cockpit', '--listen', '127.0.0.1'],
+                  tmp_path / 'run', headless=False) as launcher, \
             Peer(launcher.domain, *TOPICS) as peer:
         launcher.wait_for('its certificate')
         peer.wait_until(lambda: peer.games, 'the game')
@@ -84,8 +87,8 @@ def throttle(graph: Graph, seat: str) -> float:
         if graph.peer.messages['/timing/cycle'] else np.nan
 
 
-def attack(address: str, number: int) -> None:
-    """Do what a client without a link may try."""
+def attack(address: str, number: int) -> bool:
+    """Do what a client without a link may try; tell whether it was refused in words."""
     host, port = urlsplit(address).hostname or '', urlsplit(address).port or 0
     context = ssl._create_unverified_context()
     try:
@@ -93,28 +96,31 @@ def attack(address: str, number: int) -> None:
             if number % 4 == 0:
                 plain.sendall(b'GET / HTTP/1.1\r\n' + b'\x00\xff' * 100)
                 plain.recv(100)
-                return
+                return False
             with context.wrap_socket(plain) as peer:
                 if number % 4 == 1:
                     peer.sendall(b'NONSENSE \x01\r\nHost: :\r\n\r\n')
                     peer.recv(100)
-                elif number % 4 == 2:
+                    return False
+                if number % 4 == 2:
                     peer.sendall(f'GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: '
                                  'Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13'
                                  '\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n'
                                  .encode())
-                    assert b' 403 ' in peer.recv(100)
                 else:
                     peer.sendall(f'POST /api/load HTTP/1.1\r\nHost: {host}:{port}\r\nX-Crgame: '
                                  '1\r\nContent-Length: 2\r\n\r\n{}'.encode())
-                    assert b' 403 ' in peer.recv(100)
+                answer = peer.recv(100)
     except OSError:
         # Thrown out: that is what the test is for.
-        return
+        return False
+    assert answer.startswith(b'HTTP/1.1 403 '), answer
+    return True
 
 
+@pytest.mark.parametrize('graph', [LONG_S], indirect=True)
 def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> None:
-    """A whole game: seats, readiness, countdown, a lost page, a spectator, hostile clients."""
+    """Seats, readiness, countdown, a lost page, a spectator, hostile clients."""
     peer, launcher = graph.peer, graph.launcher
     anna = Person(graph, new_browser(1000, 640, trusting=True), 'drive hv0', 'Anna')
     bert = Person(graph, new_browser(1000, 640, trusting=True), 'drive hv1', 'Bert')
@@ -186,12 +192,11 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
 
     # Strangers change nothing.
     n = peer.n
-    threads = [threading.Thread(target=attack, args=(link(graph, 'watch'), number))
-               for number in range(HOSTILE)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(HOSTILE) as strangers:
+        attacks = [strangers.submit(attack, link(graph, 'watch'), number)
+                   for number in range(HOSTILE)]
+    refused = [each.result() for each in attacks]
+    assert any(refused)
     graph.wait_for_command('hv1', 1, 1.0, 1.0)
     assert peer.n > n and throttle(graph, 'hv0') == 1.0
     assert watcher.run('return [crgame.store.seats.hv0.holder_name, '
@@ -200,6 +205,47 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
 
     assert bert.browser.console_errors() == watcher.browser.console_errors() == []
     check_recording(graph)
+
+
+@pytest.mark.parametrize('graph', [SHORT_S], indirect=True)
+def test_a_game_ends_for_everybody(graph: Graph, new_browser: OpenBrowser) -> None:
+    """A director's deeds are told to the others by name; at its end each sees how it went."""
+    dora = Person(graph, new_browser(1000, 640, trusting=True), 'direct', 'Dora')
+    drivers = {seat: Person(graph, new_browser(1000, 640, trusting=True), f'drive {seat}', name)
+               for seat, name in (('hv0', 'Anna'), ('hv1', 'Bert'))}
+    dora.wait('crgame.store.me.name === "Dora"', 'her name')
+    for seat, person in drivers.items():
+        person.claim(seat)
+    for person in drivers.values():
+        person.click('.lobby .primary')
+    dora.wait('crgame.store.status.run === "running" && crgame.store.status.n > 0', 'the run')
+    for deed, told in (('pause', 'paused'), ('start', 'started'), ('reset', 'reset')):
+        dora.order(deed)
+        for person in drivers.values():
+            person.wait_for_text('#notices', f'Dora {told} the run')
+            person.wait_for_run('paused' if deed == 'pause' else 'running')
+    assert 'Dora' not in dora.text('#notices'), 'she knows'
+    # After the reset they drive on without another word, up to the end.
+    for seat, person in drivers.items():
+        person.wait_for_run('ended')
+        person.wait('document.querySelector(".score[data-state=told]")', 'the score')
+        text = person.text('#outcome')
+        assert f'Its duration of {SHORT_S:.1f} s is over' in text
+        assert person.run("""return [...document.querySelectorAll('.score-vehicle')].map(
+            (node) => node.dataset.vehicle);""")[0] == seat, 'their own score first'
+        assert 'Only a director can choose what is run; you are a driver.' in text
+        assert person.run("""return ['again', 'next', 'another', 'look'].map((action) => document
+            .querySelector(`#outcome [data-action=${action}]`).disabled);""") == [
+            True, True, True, False]
+        assert person.run('return crgame.store.status.t') == SHORT_S
+    dora.click('#outcome [data-action=again]')
+    for person in drivers.values():
+        person.wait('document.querySelector("#outcome").hidden'
+                    ' && crgame.store.status.run === "running"', 'the next run')
+    assert [each.browser.console_errors() for each in (dora, *drivers.values())] == [[], [], []]
+    assert 'Traceback' not in graph.launcher.text + '\n'.join(graph.launcher.errors)
+    graph.launcher.signal(signal.SIGINT)
+    wait_until(lambda: not any(is_node(pid) for _, pid in graph.launcher.started), 'the end')
 
 
 def crash(person: Person) -> None:

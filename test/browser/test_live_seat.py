@@ -139,6 +139,70 @@ def test_again_from_the_card_needs_no_second_start(page: LivePage) -> None:
     assert page.browser.console_errors() == []
 
 
+def test_how_it_went_after_a_contact(page: LivePage) -> None:
+    """Held by a button: what happened, and the ways on; the score and files are for the end."""
+    page.reset()
+    drive_into_it(page)
+    # A pause that the simulation refuses holds nothing, and shows nothing at a later one.
+    page.run("""const ask = crgame.connection.request;
+        crgame.connection.request = async () => {
+          crgame.connection.request = ask;
+          return { ok: false, text: 'not now' };
+        };""")
+    page.click('#outcome [data-action=look]')
+    page.wait_for_text('#notices', 'not now')
+    page.order('pause')
+    page.wait_for_run('paused')
+    assert page.run('return crgame.lastSeconds.isOpen') is False
+    page.order('start')
+    page.wait_for_run('running')
+    page.click('#outcome [data-action=hold]')
+    page.wait('document.querySelector("#outcome").dataset.phase === "held"', 'the card')
+    text = page.text('#outcome')
+    assert text.startswith('Collision') and 'You touched hv1 at' in text
+    assert 'hv0 with hv1 at' in text and 'No score: it is made when the run is over' in text
+    page.click('#outcome [data-action=look]')
+    page.wait('crgame.lastSeconds.isOpen'
+              ' && !document.querySelector("#outcome").checkVisibility()', 'the last 10 s')
+    page.click('#last-seconds [data-action=end]')
+    page.click('#outcome [data-action=start]')
+    page.wait('crgame.store.status.run === "running"'
+              ' && document.querySelector("#outcome").hidden', 'the run to go on')
+    assert page.browser.console_errors() == []
+
+
+def test_who_only_drives_is_told_why_not(page: LivePage) -> None:
+    """Buttons and the key that the server would refuse say so, and ask nothing of it."""
+    page.reset()
+    drive_into_it(page)
+    page.run_async("await crgame.connection.request({type: 'role', role: 'drive'});")
+    page.wait('document.querySelector("#outcome [data-action=hold]").disabled', 'no holding')
+    assert page.run("""return [...document.querySelectorAll('#outcome button:disabled')].map(
+        (node) => [node.dataset.action, node.title]);""") == [
+        [action, f'Only a director can {deed} the run; you are a driver.'] for action, deed in (
+            ('hold', 'pause'), ('look', 'pause'), ('again', 'reset'))]
+    epoch = page.run('return crgame.store.status.epoch')
+    page.hold('r')
+    page.wait('!document.querySelector(".restart-hint").hidden', 'the hint')
+    assert page.text('.restart-hint') == 'Only a director can reset the run; you are a driver.'
+    # Longer than the key is held to begin anew.
+    page.graph.peer.listen_for(1.5)
+    page.release('r')
+    assert page.run('return crgame.store.status.epoch') == epoch
+    page.run_async("await crgame.connection.request({type: 'role', role: 'all'});")
+    page.click('#outcome [data-action=hold]')
+    page.click('#outcome [data-action=stop]')
+    page.click('dialog.confirm[open] .danger')
+    page.wait('document.querySelector(".score[data-state=told]")', 'the score')
+    assert 'Somebody stopped it' in page.text('#outcome')
+    page.run_async("await crgame.connection.request({type: 'role', role: 'drive'});")
+    page.wait_for_text('.outcome-gone', 'Only a director can choose what is run')
+    assert page.run("""return [...document.querySelectorAll('#outcome button:disabled')].map(
+        (node) => node.dataset.action);""") == ['again', 'next', 'another']
+    page.run_async("await crgame.connection.request({type: 'role', role: 'all'});")
+    assert page.browser.console_errors() == []
+
+
 def test_the_screen_is_filled_and_left_again(page: LivePage) -> None:
     for pressed in ('true', 'false'):
         page.click('#fullscreen')

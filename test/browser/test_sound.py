@@ -105,8 +105,27 @@ def test_a_motor_sings_eight_times_a_turn(page: Browser) -> None:
         8 * 9.0 * 20.0 / WHEEL_RADIUS_M / math.tau, rel=5e-3)
 
 
+@pytest.mark.parametrize(('powertrain', 'gear', 'gained_dB'), [
+    # No pedal. 0.07 + 0.16 s from 20 to 44 % of the turns above idling; 1 + s from 51 to 89 %.
+    ('combustion', 5, 2.84), ('electric', 0, 1.92)])
+def test_the_engine_is_louder_the_faster_one_drives(
+        page: Browser, powertrain: str, gear: int, gained_dB: float) -> None:
+    """What the FFT has at the engine's tones, at speeds of one gear."""
+    heard = [heard_at(page, speed, powertrain, 0.0) for speed in (26.0, 32.0, 38.0, 45.0)]
+    assert {own['gear'] for own in heard} == {gear}
+    tones_Hz = [own['rpm'] / 60.0 * (FIRINGS_A_TURN if gear else 8) for own in heard]
+    levels = []
+    for own, tone_Hz in zip(heard, tones_Hz, strict=True):
+        samples = render(page, [update(own=own | {'speed': 0.0})])[0][SETTLED:]
+        assert strongest_Hz(samples) == pytest.approx(tone_Hz, rel=5e-3)
+        levels.append(20.0 * math.log10(band_rms(samples, 0.9 * tone_Hz, 1.1 * tone_Hz)))
+    assert levels == sorted(levels)
+    assert levels[-1] - levels[0] == pytest.approx(gained_dB, abs=0.5)
+
+
 def test_the_engine_is_louder_under_load_and_when_it_turns_faster(page: Browser) -> None:
-    levels = [rms(render(page, [update(own=own_vehicle(rpm=rpm, load=load))])[0][SETTLED:])
+    levels = [band_rms(render(page, [update(own=own_vehicle(rpm=rpm, load=load))])[0][SETTLED:],
+                       20.0, 8000.0)
               for rpm, load in ((800, 0.0), (2500, 0.1), (2500, 0.9), (5500, 0.9))]
     assert levels == sorted(levels)
     assert levels[-1] > 3.0 * levels[0]
@@ -197,12 +216,17 @@ def test_an_indicator_clicks_three_times_a_second(page: Browser) -> None:
 def test_a_collision_and_a_kerb_are_heard_once(page: Browser) -> None:
     # So slow that the ground beside the road is not heard.
     own = own_vehicle(**SILENT_MOTOR, speed=0.5)
-    for trouble in ({'collision': True}, {'offRoad': True}):
+    peaks: list[float] = []
+    for trouble, then in (({'collision': True},) * 2, ({'offRoad': True},) * 2,
+                          # While the wheels are on the road all the time.
+                          ({'kerb': 1.0}, {}), ({'kerb': 0.35}, {})):
         samples = render(page, [update(0.0, own), update(0.5, own, **trouble),
-                                update(1.5, own, **trouble)], 2.5)[0]
+                                update(0.53, own, **then), update(1.5, own, **then)], 2.5)[0]
         before, at, after = (np.abs(samples[int(begin * RATE_Hz):int(end * RATE_Hz)]).max()
                              for begin, end in ((0.3, 0.5), (0.5, 0.6), (1.6, 2.5)))
         assert at > 3.0 * max(before, after)
+        peaks.append(at)
+    assert peaks[1] == pytest.approx(peaks[2], rel=0.05) and peaks[3] < 0.5 * peaks[2]
 
 
 def test_shut_it_is_silence_to_the_last_bit(page: Browser) -> None:

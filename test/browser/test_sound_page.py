@@ -195,6 +195,20 @@ def off_road(page: Served, browser: Browser) -> None:
     browser.wait('crgame.store.status.drivability.hv0?.off_road', 'off the road')
 
 
+def test_a_kerb_between_two_lanes_is_felt(page: Served, browser: Browser,
+                                          run: RecordedRun) -> None:
+    """The human cuts in over it, and has never left the road."""
+    page.publish('scene', run.scene | {'lanelets': [
+        lanelet | {'right_line': 'curb'} if lanelet['left_line'] == 'solid' else lanelet
+        for lanelet in run.scene['lanelets']]})
+    page.control('start')
+    take_seat(page, browser)
+    browser.run('moveStick(0.6)')
+    browser.wait('effects.some(({ strongMagnitude }) => strongMagnitude > 0.2)', 'the kerb')
+    assert browser.run(
+        'return crgame.store.status.drivability.hv0?.off_road ?? false') is False
+
+
 def test_a_gamepad_rumbles_beside_the_road_and_stands_when_the_seat_is_lost(
         page: Served, browser: Browser) -> None:
     page.control('start')

@@ -15,6 +15,7 @@
 """A wheel with a motor whose file is a socket: whatever is written to it can be read elsewhere."""
 
 import ctypes
+import math
 from pathlib import Path
 import socket
 import struct
@@ -28,12 +29,27 @@ from crgame_ros.driver.evdev_device import EvdevDevice, EventDecoder
 from crgame_ros.driver.force_feedback import ForceFeedback
 from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
+from crgame_ros.vehicle.steering import Steering
 from evdev import ecodes, ff
+from scipy.optimize import brentq
 
 # What is written: a mark, then the bytes of the ioctl or of the event.
 UPLOAD, EVENT, ERASE = b'U', b'E', b'X'
 EVENT_FORMAT = 'HHi'
 EFFECT_SIZE = ctypes.sizeof(ff.Effect)
+
+
+def wheel_at(speed: float, yaw_rate: float) -> float:
+    """Give the angle of the usual vehicle's wheel that holds a turn [rad]."""
+    car = load_vehicle_parameters()
+    steering, full = Steering(car), car.max_steering_wheel_angle
+    angle = math.atan(car.wheelbase * yaw_rate / speed)
+    return full * brentq(lambda share: steering.target_angle(share, speed) - angle, -1.0, 1.0)
+
+
+def raw_of(angle: float) -> int:
+    """Give what a G29 reports at an angle [rad]: 0 is 7.85 rad to the left."""
+    return round(32767.5 * (1.0 - angle / 7.85))
 
 
 class Motor:
@@ -93,6 +109,10 @@ class PushedWheel(EvdevDevice):
         self.motor = motor
         self.limits = limits or device_map.force
 
+    def turn(self, angle: float) -> None:
+        """Turn it to an angle [rad]."""
+        self.decoder.axes[ecodes.ABS_X] = raw_of(angle)
+
     @property
     def force_device(self) -> Any:
         """Give the double."""
@@ -107,6 +127,7 @@ class PushedWheel(EvdevDevice):
 def main() -> None:
     """Push hard to the right for ever, in the file that was handed on."""
     wheel = PushedWheel(Motor(socket.socket(fileno=int(sys.argv[1]))))
+    wheel.turn(wheel_at(20.0, 0.3))
     force = ForceFeedback(wheel, load_vehicle_parameters())
     n = 0
     while True:

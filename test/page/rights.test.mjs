@@ -6,7 +6,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { describeSeat } from '../../crgame_ros/cockpit/page/js/driving/seat_text.js';
-import { reasonAgainst } from '../../crgame_ros/cockpit/page/js/rights.js';
+import {
+  reasonAgainst, reasonAgainstOrder, reasonAgainstSeat,
+} from '../../crgame_ros/cockpit/page/js/rights.js';
 
 const DRIVER = { role: 'driver', directs: false, drives: true, seat: '' };
 
@@ -18,6 +20,29 @@ test('a role is told why it cannot, and told nothing of what it can', () => {
   assert.equal(reasonAgainst({ ...store, mode: 'replay' }, 'direct', 'reset the run'), '');
   // Before the server has said who somebody is.
   assert.equal(reasonAgainst({ ...store, rights: { ...DRIVER, role: '' } }, 'direct', 'x'), '');
+});
+
+test('a driver in the seat starts, before the first step, and orders nothing else', () => {
+  const store = { mode: 'live', rights: DRIVER, me: { id: 'c1' }, status: { n: 0 },
+    seats: { hv0: { holder: 'c1' }, hv1: { holder: null } } };
+  const refused = (action) => `Only a director can ${action} the run; you are a driver.`;
+  assert.equal(reasonAgainstOrder(store, 'start'), '');
+  assert.equal(reasonAgainstOrder(store, 'reset'), refused('reset'));
+  assert.equal(reasonAgainstOrder({ ...store, status: { n: 1 } }, 'start'), refused('start'));
+  assert.equal(reasonAgainstOrder({ ...store, me: { id: 'c2' } }, 'start'), refused('start'));
+  assert.equal(reasonAgainstOrder(
+    { ...store, rights: { ...DRIVER, directs: true } }, 'reset'), '');
+});
+
+test('a link for one seat leads to no other, unless it is offered', () => {
+  const store = { mode: 'live', rights: { ...DRIVER, seat: 'hv0' }, me: { id: 'c1' },
+    seats: { hv0: { holder: null }, hv1: { holder: null },
+      hv2: { holder: 'c2', offer: { client: 'c1' } } } };
+  assert.equal(reasonAgainstSeat(store, 'hv0'), '');
+  assert.match(reasonAgainstSeat(store, 'hv1'), /^Your link is for hv0; the driver of hv1/);
+  assert.equal(reasonAgainstSeat(store, 'hv2'), '');
+  assert.match(reasonAgainstSeat({ ...store, rights: { ...DRIVER, drives: false } }, 'hv0'),
+    /^Only a driver can take a seat/);
 });
 
 test('a kept seat says for whom and for how long', () => {

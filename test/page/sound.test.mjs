@@ -14,13 +14,14 @@ import {
 import {
   cornering, engineLevel, hardBraking, tyreLevel, volumeGain, windLevel,
 } from '../../crgame_ros/cockpit/page/js/sound/levels.js';
+import { Kerbs } from '../../crgame_ros/cockpit/page/js/sound/kerbs.js';
 import {
   Listener, MOST_OTHERS,
 } from '../../crgame_ros/cockpit/page/js/sound/listener.js';
 import { Feeling, Rumble } from '../../crgame_ros/cockpit/page/js/sound/rumble.js';
-import { close } from './support.mjs';
+import { close, laneletOf } from './support.mjs';
 
-const QUIET = { collision: false, offRoad: false };
+const QUIET = { collision: false, offRoad: false, kerb: 0 };
 
 test('an engine turns as its wheels and gears have it', () => {
   // 30 m/s: 96.77 rad/s at wheels of 0.31 m, in the sixth gear 0.691 * 3.46 times as fast.
@@ -170,6 +171,48 @@ test('of many only the nearest are heard', () => {
     Array.from({ length: MOST_OTHERS }, (_, i) => `av${i + 1}`));
 });
 
+// A car along x goes from one y to another, looked at every 30 ms; tells at which y it is felt.
+const feltAcross = (lanelets, from, to, { speed = 10, dy = 0.05 } = {}) => {
+  const kerbs = new Kerbs({ lanelets });
+  const felt = [];
+  const count = Math.round(Math.abs(to - from) / dy);
+  for (let i = 0; i <= count; i += 1) {
+    const y = from + i * dy * Math.sign(to - from);
+    const shown = shownOf([row(20 + 0.03 * speed * i, y, 0, speed)], [], 0.03 * i);
+    const strength = kerbs.over(vehicle('hv0'), shown, 0);
+    if (strength > 0) {
+      felt.push([Number(y.toFixed(2)), strength]);
+    }
+  }
+  return felt;
+};
+
+test('wheels are felt where they go over a kerb, and nowhere else', () => {
+  const kerb = laneletOf({ left_line: 'curb', right_line: 'lowered_curb' });
+  // The kerbs lie at y = 2 and -2, the wheels 0.8 m from the middle: left ones, then right ones.
+  assert.deepEqual(feltAcross([kerb], 0, 4), [[1.25, 1], [2.85, 1]]);
+  assert.deepEqual(feltAcross([kerb], 4, 0), [[2.8, 1], [1.2, 1]]);
+  assert.deepEqual(feltAcross([kerb], 0, -1.5), [[-1.2, 0.35]]);
+  assert.deepEqual(feltAcross([kerb], 0, 1), [], 'along it');
+  assert.deepEqual(feltAcross([laneletOf()], 0, 4), [], 'paint is flat');
+  // Put elsewhere, nobody has driven over it; a page that is late has.
+  assert.deepEqual(feltAcross([kerb], 0, 4, { speed: 0.1, dy: 4 }), []);
+  assert.deepEqual(feltAcross([kerb], 0, 1.5, { speed: 40, dy: 1.5 }), [[1.5, 1]]);
+  // Another lane leads across, as in junctions: there it is not built.
+  const across = laneletOf({ id: 2, y: 2, width: 3 });
+  assert.deepEqual(feltAcross([kerb, across], 0, 3), []);
+  assert.deepEqual(feltAcross([{ ...kerb, adj_left: 2 }, across], 0, 2), [[1.25, 1]]);
+});
+
+test('what was before is no way to a kerb', () => {
+  const kerbs = new Kerbs({ lanelets: [laneletOf({ left_line: 'curb' })] });
+  const at = (y, t) => kerbs.over(vehicle('hv0'), shownOf([row(20, y, 0, 10)], [], t), 0);
+  assert.equal(at(1.1, 0), 0);
+  kerbs.reset();
+  assert.equal(at(1.3, 0.03), 0);
+  assert.equal(at(1.1, 0.06), 1);
+});
+
 test('a gamepad feels ground, kerbs, collisions and hard braking, and nothing else', () => {
   const feeling = new Feeling();
   const calm = { speed: 20, deceleration: 0 };
@@ -186,6 +229,11 @@ test('a gamepad feels ground, kerbs, collisions and hard braking, and nothing el
   const hard = { speed: 20, deceleration: 9 };
   const beats = [2100, 2200].map((now) => feeling.of(hard, QUIET, now).weak);
   assert.ok(Math.min(...beats) > 0 && Math.max(...beats) > 2 * Math.min(...beats), 'it beats');
+  const over = (share, now) => feeling.of(calm, { ...QUIET, kerb: share }, now).strong;
+  close(over(1, 2210), kerb.strong);
+  assert.ok(over(0, 2300) > 0 && over(0, 2400) === 0);
+  assert.ok(over(0.35, 2500) < 0.5 * kerb.strong);
+  feeling.of(calm, QUIET, 2800);
   // What was before a pause is not felt after it.
   feeling.reset();
   assert.deepEqual(feeling.of(calm, { ...QUIET, collision: true }, 2300), still);
@@ -211,6 +259,9 @@ test('motors get the strength that is set, and stand when they are to', () => {
   assert.equal(calls.length, 1, 'not in every frame');
   rumble.feel(actuator, own, { ...QUIET, offRoad: true }, 0, 100);
   assert.deepEqual(calls.at(-1), ['reset']);
+  rumble.feel(actuator, own, { ...QUIET, offRoad: true, kerb: 1 }, 1, 110);
+  rumble.feel(actuator, own, { ...QUIET, offRoad: true }, 1, 180);
+  close(calls.at(-1).slice(1), [0.7, 0.7]);
   rumble.feel(actuator, own, QUIET, 1, 200);
   rumble.stop();
   assert.equal(calls.at(-1)[0], 'reset');

@@ -16,14 +16,19 @@
 
 from pathlib import Path
 import sys
+import threading
 
 from crgame_ros.driver.force_effect import FULL_LEVEL
 from crgame_ros.driver.steering_torque import SteeringTorque
+from crgame_ros.nodes.driver_node import DriverNode
+from crgame_ros.ros import live_driver
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_force import LiveForce
-from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.ros.node_main import StopFlag
+from crgame_ros.ros.ros_messages import from_time, to_time
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from live_peer import Peer
+from live_support import Launcher, SCENARIOS
 from nav_msgs.msg import Odometry
 import pytest
 import rclpy
@@ -33,9 +38,17 @@ from sensor_msgs.msg import JointState
 from worker_roles import own_domain_id
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'driver'))
-from pushed_wheel import Motor, PushedWheel  # noqa: E402, I100, I202
+from pushed_wheel import Motor, PushedWheel, wheel_at  # noqa: E402, I100, I202
 
 STEP_NS = 10_000_000
+GAME = f"""
+scenario: {SCENARIOS / 'ZAM_CutIn-1_1_T-1.xml'}
+duration: 3600
+humans:
+  - {{id: hv0, driver: idle, spawn: {{x: -90.0, y: 0.0, yaw: 0.0, speed: 20.0}}}}
+avs: []
+"""
+CYCLES = 300
 CAR = load_vehicle_parameters()
 
 
@@ -63,10 +76,13 @@ def test_the_wheel_follows_the_vehicle_and_rests_with_it() -> None:
     told: list[str] = []
     motor = Motor()
     force = LiveForce(Endpoints(node), 'hv0', lambda: True, told.append)
-    expected = SteeringTorque(CAR).aligning(20.0, 0.25)
+    wheel = PushedWheel(motor)
+    wheel.turn(wheel_at(20.0, 0.25))
+    angle = wheel.layout.steering.deflection(wheel.raw) * CAR.max_steering_wheel_angle
+    expected = SteeringTorque(CAR).aligning(20.0, 0.25, angle)
     with Peer(domain, ('/<hv>/steering_torque', 'hv0')) as peer:
         heard: list[JointState] = peer.messages['/<hv>/steering_torque']
-        force.begin(PushedWheel(motor), CAR)
+        force.begin(wheel, CAR)
         bend = Bend(peer.publisher('/<v>/odom', 'hv0'))
 
         def pushes() -> bool:
@@ -74,7 +90,7 @@ def test_the_wheel_follows_the_vehicle_and_rests_with_it() -> None:
             return bool(heard) and heard[-1].effort[0] == pytest.approx(expected, abs=1e-6)
 
         peer.wait_until(pushes, 'the torque of the bend')
-        assert heard[-1].name == ['hv0/steering_wheel'] and list(heard[-1].position) == [0.0]
+        assert heard[-1].name == ['hv0/steering_wheel'] and list(heard[-1].position) == [angle]
         assert motor.levels[-1] == round(FULL_LEVEL * expected / 2.1)
         peer.wait_until(lambda: heard[-1].effort[0] == 0.0, 'rest, for nothing is published')
         assert motor.levels[-1] == 0
@@ -84,3 +100,32 @@ def test_the_wheel_follows_the_vehicle_and_rests_with_it() -> None:
         assert told == []
     node.destroy_node()
     rclpy.try_shutdown(context=context)
+
+
+def test_a_run_refreshes_the_motor_in_each_of_its_cycles(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A driver_node with a wheel in a running game: at least 100 times a second of its clock."""
+    motor = Motor()
+    monkeypatch.setattr(live_driver, 'open_evdev', lambda _name: PushedWheel(motor))
+    (tmp_path / 'game.yaml').write_text(GAME)
+    with Launcher([tmp_path / 'game.yaml'], tmp_path / 'run') as launcher, \
+            Peer(launcher.domain, ('/<hv>/steering_torque', 'hv0')) as peer:
+        heard: list[JointState] = peer.messages['/<hv>/steering_torque']
+        rclpy.init(args=['--ros-args', '-p', 'source:=evdev'], domain_id=launcher.domain)
+        node, stop = DriverNode(), StopFlag()
+        thread = threading.Thread(target=node.run, args=(stop,))
+        thread.start()
+        try:
+            def stamp() -> int:
+                return from_time(heard[-1].header.stamp) if heard else 0
+
+            peer.wait_until(stamp, 'the first torque of the run')
+            first, pushed = stamp(), len(motor.levels)
+            peer.wait_until(lambda: stamp() >= first + CYCLES * STEP_NS, 'its cycles')
+            assert len(motor.levels) - pushed >= (stamp() - first) // STEP_NS
+        finally:
+            stop.requested = True
+            thread.join()
+            node.destroy_node()
+            rclpy.try_shutdown()
+    assert not motor.effects, 'it let go'

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What this page's person may do, in words for the controls that they may not use. */
 
+/** @import { RunAction } from './messages.js' */
 /** @import { Store } from './store.js' */
 
 /**
@@ -18,4 +19,35 @@ export function reasonAgainst(store, right, deed) {
     return '';
   }
   return `Only a ${right === 'direct' ? 'director' : 'driver'} can ${deed}; you are a ${role}.`;
+}
+
+/**
+ * Say why an order cannot be given; a driver in the seat says by start that they are ready.
+ *
+ * @param {Store} store
+ * @param {RunAction} action
+ * @returns {string} empty if it can
+ */
+export function reasonAgainstOrder(store, action) {
+  const { seats, me, status, rights } = store;
+  const seated = Object.values(seats).some(({ holder }) => holder === me.id && me.id !== '');
+  if (action === 'start' && seated && status?.n === 0 && rights.drives) {
+    return '';
+  }
+  return reasonAgainst(store, 'direct', `${action} the run`);
+}
+
+/**
+ * Say why this person cannot do anything about a seat.
+ *
+ * @param {Store} store
+ * @param {string} id of a seat that there is
+ * @returns {string} empty if they can
+ */
+export function reasonAgainstSeat(store, id) {
+  const { rights, me, seats: { [id]: seat } } = store;
+  const mine = seat.holder === me.id || seat.offer?.client === me.id;
+  return reasonAgainst(store, 'drive', 'take a seat')
+    || (rights.seat === '' || rights.seat === id || mine ? ''
+      : `Your link is for ${rights.seat}; the driver of ${id} can offer it to you.`);
 }

@@ -6,7 +6,7 @@ import { element, part, setAttribute, setText } from './dom.js';
 import { isTyping } from './driving/focus.js';
 import { icon } from './driving/icons.js';
 import { confirm } from './panels/confirm.js';
-import { reasonAgainst } from './rights.js';
+import { reasonAgainst, reasonAgainstOrder } from './rights.js';
 
 /** @import { Connection } from './connection.js' */
 /** @import { Recording, RequestMessage, RunAction, Status } from './messages.js' */
@@ -89,7 +89,7 @@ class RunControl {
     setAttribute(this.#root, 'hidden', mode === 'replay');
     setAttribute(this.#lamp.node, 'hidden', mode === 'replay' || status === null);
     for (const action of ACTIONS) {
-      const reason = this.#reason(action);
+      const reason = reasonAgainstOrder(this.#store, action);
       setAttribute(this.#buttons[action], 'disabled', !connected || !status
         || !ORDERS[action].in.includes(status.run) || reason !== '');
       setAttribute(this.#buttons[action], 'title', reason || ORDERS[action].title);
@@ -106,20 +106,6 @@ class RunControl {
         this.#offer(status.real_time_factor ?? 1);
       }
     }
-  }
-
-  /**
-   * Why this person cannot give an order; a driver in the seat says by start that they are ready.
-   *
-   * @param {RunAction} action
-   */
-  #reason(action) {
-    const { seats, me, status } = this.#store;
-    const seated = Object.values(seats).some(({ holder }) => holder === me.id && me.id !== '');
-    if (action === 'start' && seated && status?.n === 0 && this.#store.rights.drives) {
-      return '';
-    }
-    return reasonAgainst(this.#store, 'direct', `${action} the run`);
   }
 
   /**

@@ -5,7 +5,7 @@
 import { element, setAttribute, setText } from './dom.js';
 import { NameField } from './driving/name_field.js';
 import { describeSeat } from './driving/seat_text.js';
-import { reasonAgainst } from './rights.js';
+import { reasonAgainstSeat } from './rights.js';
 
 /** @import { Connection } from './connection.js' */
 /** @import { Driving } from './driving/driving.js' */
@@ -121,25 +121,11 @@ class Seats {
       asked: (seat.requests ?? []).some(({ client }) => client === me.id),
       offer: seat.offer ?? null,
       offered: connected && seat.offer?.client === me.id,
-      refused: this.#refusal(id, seat),
+      refused: reasonAgainstSeat(this.#store, id),
       text: connected ? describeSeat(seat, role, scene?.planners?.[id], me.id)
         : 'Unknown without a connection',
       lost: Boolean(seat.lost || status?.seats_lost?.[id]),
     };
-  }
-
-  /**
-   * Why this person cannot do anything about a seat.
-   *
-   * @param {string} id
-   * @param {Seat} seat
-   */
-  #refusal(id, seat) {
-    const { rights, me } = this.#store;
-    const mine = seat.holder === me.id || seat.offer?.client === me.id;
-    return reasonAgainst(this.#store, 'drive', 'take a seat')
-      || (rights.seat === '' || rights.seat === id || mine ? ''
-        : `Your link is for ${rights.seat}; the driver of ${id} can offer it to you.`);
   }
 
   /**

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** R held begins the run anew; R tapped is the reverse gear. */
 
-import { element, setAttribute } from '../dom.js';
+import { element, setAttribute, setText } from '../dom.js';
 import { isTyping } from '../driving/focus.js';
+import { reasonAgainstOrder } from '../rights.js';
 
 /** @import { Connection } from '../connection.js' */
 /** @import { Store } from '../store.js' */
@@ -13,6 +14,7 @@ export const HELD_MS = 800;
 // A tap shows nothing [ms].
 const SHOWN_AFTER_MS = 250;
 const KEY = 'KeyR';
+const HINT = 'Hold R to begin anew';
 
 /**
  * Listen to the key.
@@ -24,8 +26,7 @@ const KEY = 'KeyR';
  */
 export function createRestart(root, store, connection) {
   const state = { held: false };
-  const hint = element('div', { class: 'restart-hint', role: 'status', hidden: true,
-    text: 'Hold R to begin anew' });
+  const hint = element('div', { class: 'restart-hint', role: 'status', hidden: true });
   root.append(hint);
   /** @type {number[]} */
   let timers = [];
@@ -50,8 +51,13 @@ export function createRestart(root, store, connection) {
     }
     end();
     state.held = true;
-    timers = [setTimeout(() => setAttribute(hint, 'hidden', false), SHOWN_AFTER_MS),
-      setTimeout(restart, HELD_MS)];
+    const reason = reasonAgainstOrder(store, 'reset');
+    setText(hint, reason || HINT);
+    setAttribute(hint, 'data-refused', reason !== '');
+    timers = [setTimeout(() => setAttribute(hint, 'hidden', false), SHOWN_AFTER_MS)];
+    if (reason === '') {
+      timers.push(setTimeout(restart, HELD_MS));
+    }
   }, true);
   window.addEventListener('keyup', (event) => event.code === KEY && end(), true);
   window.addEventListener('blur', end);

@@ -1,38 +1,44 @@
 // Copyright 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What stands over the world while no run goes on: how the last went, or whom the next awaits. */
+/** What stands over the world: how a run went or goes, or whom the next awaits. */
 
-import { fetchScore } from '../after/run_api.js';
 import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
-import { errorText, oneLine } from './format.js';
+import { reasonAgainst, reasonAgainstOrder, reasonAgainstSeat } from '../rights.js';
+import { confirm } from './confirm.js';
+import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
 import { mishapsOf } from './mishaps.js';
-import { figures, fileList, part, table, why } from './outcome_card.js';
-import { TABLE_I, valueOf } from './timing.js';
+import { figures, fileList, table } from './outcome_card.js';
+import { RunResult } from './run_result.js';
 
 /** @import { Connection } from '../connection.js' */
-/** @import { Scored } from '../after/score.js' */
-/** @import { Files, Reply, RunAction, RunState, Scene, Status } from '../messages.js' */
+/** @import { Reply, RunAction, RunState } from '../messages.js' */
 /** @import { Result } from './outcome_card.js' */
 /** @import { Store } from '../store.js' */
 
 // So long a page tells its driver of a mishap while the run goes on [ms].
 const MISHAP_MS = 10000;
-// In which words a figure of table I is said of a run that is over.
-/** @type {Record<string, string>} */
-const FINAL_NAMES = { final_error_ms: 'Lag at the end' };
 
 /**
- * What is to be said, by phase: that the run is over, that this was closed, that a driver is
- * awaited, that everything is ready, that this page's driver has hit something or left the road.
+ * Why this person cannot do each of these; empty where they can.
  *
- * @typedef {{phase: 'over', connected: boolean} & Result} Over
+ * @typedef {Record<'start'|'pause'|'stop'|'reset'|'choose', string>} Against
+ */
+
+/**
+ * What is to be said, by phase: that the run is over or held for a look at it, that this was
+ * closed, that a driver is awaited, that everything is ready, that this page's driver has hit
+ * something or left the road.
+ *
+ * @typedef {{phase: 'over'|'held', connected: boolean, against: Against} & Result} Card
  * @typedef {{phase: 'driver', seat: string, run: RunState, holder: string|null,
- *   holderName: string, me: string}} Awaiting
- * @typedef {{phase: 'ready'|'none', run: RunState, mine: string|null}} Ready
- * @typedef {{phase: 'mishap', run: RunState, text: string, stopped: boolean}} Mishap
- * @typedef {{phase: 'none', run?: undefined}|{phase: 'closed'}|Over|Awaiting|Ready|Mishap} Facts
+ *   holderName: string, me: string, refused: string, against: Against}} Awaiting
+ * @typedef {{phase: 'ready'|'none', run: RunState, mine: string|null, against: Against}} Ready
+ * @typedef {{phase: 'mishap', run: RunState, text: string, stopped: boolean, against: Against
+ *   }} MishapFacts
+ * @typedef {{phase: 'none', run?: undefined}|{phase: 'closed'}|Card|Awaiting|Ready|MishapFacts
+ *   } Facts
  */
 
 /** The card; one per page. */
@@ -40,13 +46,11 @@ class Outcome {
   #root;
   #store;
   #connection;
-  /** @type {Files|null} */
-  #files = null;
+  #result;
   #shown = '';
   #closedEpoch = -1;
-  // Score by run, as far as it was asked for; mishaps of this run that have been told.
-  /** @type {Map<string, Scored>} */
-  #scores = new Map();
+  // Whether the run is held for a look at how it goes; mishaps of this run that have been told.
+  #held = false;
   #told = 0;
   #mishapTimer = 0;
 
@@ -59,16 +63,17 @@ class Outcome {
     this.#root = root;
     this.#store = store;
     this.#connection = connection;
-    store.on('files', (files) => {
-      this.#files = files;
-      this.#show();
-    });
+    this.#result = new RunResult(store, () => this.#show());
     for (const name of /** @type {const} */ (
-      ['hello', 'scene', 'seats', 'status', 'connection'])) {
+      ['hello', 'you', 'scene', 'seats', 'status', 'connection'])) {
       store.on(name, () => this.#show());
     }
     store.on('epoch', () => {
       this.#told = 0;
+      this.#held = false;
+    });
+    store.on('status', ({ run }) => {
+      this.#held &&= run !== 'running';
     });
     store.on('events', ({ fired }) => {
       // Back on the lane: the notice of the contact has served.
@@ -109,7 +114,7 @@ class Outcome {
   #content(facts) {
     switch (facts.phase) {
       case 'none': return [];
-      case 'over': return this.#card(facts);
+      case 'over': case 'held': return this.#card(facts);
       case 'closed': return [this.#reopen()];
       case 'mishap': return this.#mishap(facts);
       case 'driver': return this.#bar(driverText(facts), facts);
@@ -125,18 +130,25 @@ class Outcome {
     if (mode !== 'live' || status === null || scene === null) {
       return { phase: 'none' };
     }
+    const against = this.#against();
     if (status.run === 'ended' && status.reason !== 'reset') {
       if (this.#closedEpoch === status.epoch) {
         return { phase: 'closed' };
       }
-      return { phase: 'over', connected, ...this.#result(status, scene) };
+      return { phase: 'over', connected, against, ...this.#result.of(status, scene) };
     }
     const mine = Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null;
     const mishaps = mine === null || !connected ? [] : mishapsOf(this.#store, mine);
-    if (mishaps.length > this.#told) {
-      const { text, touched } = mishaps[mishaps.length - 1];
-      return { phase: 'mishap', run: status.run, text,
-        stopped: touched && scene.contact === 'stop' };
+    const last = mishaps.at(-1);
+    if (this.#held && status.run === 'paused' && last !== undefined) {
+      return { phase: 'held', connected, against, ...this.#result.of(status, scene),
+        why: { title: last.touched ? 'Collision' : 'Off the road',
+          text: `${last.text} The run stands at ${clockTime(status.t)}; its score, report and `
+            + 'recording are there when it is over.' } };
+    }
+    if (last !== undefined && mishaps.length > this.#told) {
+      return { phase: 'mishap', run: status.run, text: last.text, against,
+        stopped: last.touched && scene.contact === 'stop' };
     }
     if (!connected || status.n !== 0 || !['waiting', 'paused'].includes(status.run)) {
       return { phase: 'none' };
@@ -144,66 +156,30 @@ class Outcome {
     const [seat] = status.awaited ?? [];
     if (seat !== undefined) {
       return { phase: 'driver', seat, run: status.run, holder: seats[seat]?.holder ?? null,
-        holderName: seats[seat]?.holder_name ?? '', me: me.id };
+        holderName: seats[seat]?.holder_name ?? '', me: me.id, against,
+        refused: seat in seats ? reasonAgainstSeat(this.#store, seat) : '' };
     }
-    return { phase: status.run === 'paused' ? 'ready' : 'none', run: status.run, mine };
+    return { phase: status.run === 'paused' ? 'ready' : 'none', run: status.run, mine, against };
+  }
+
+  /** @returns {Against} */
+  #against() {
+    const { connected, status } = this.#store;
+    const gone = !connected ? 'There is no connection to the simulation.'
+      : status?.run === 'ended' && !status.stays ? 'The program ends with this run.' : '';
+    const [start, pause, stop, reset] = /** @type {const} */ (
+      ['start', 'pause', 'stop', 'reset']).map(
+      (action) => gone || reasonAgainstOrder(this.#store, action));
+    const choose = gone || reasonAgainst(this.#store, 'direct', 'choose what is run');
+    return { start, pause, stop, reset, choose };
   }
 
   /**
-   * @param {Status} status
-   * @param {Scene} scene
-   * @returns {Result}
-   */
-  #result(status, scene) {
-    const files = this.#files?.epoch === status.epoch ? this.#files : null;
-    const { timing } = status;
-    const { seats, me } = this.#store;
-    return {
-      scored: this.#score(status, files),
-      mine: Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null,
-      why: why(status), stays: Boolean(status.stays), t: status.t,
-      driven: scene.vehicles.length > 0,
-      contacts: (status.contacts ?? []).map((item) => ({ ...item, part: part(item, files) })),
-      departures: status.departures ?? [],
-      planners: scene.vehicles.filter(({ role }) => role === 'autonomous').map(({ id }) => ({
-        id, name: status.planners[id]?.planner || scene.planners?.[id] || '',
-        accepted: status.planners[id]?.accepted ?? 0, refused: status.planners[id]?.refused ?? 0,
-        fallbacks: status.planners[id]?.fallbacks ?? 0 })),
-      figures: timing ? TABLE_I.map(([key, name, explanation, format]) => [
-        FINAL_NAMES[key] ?? name, format(valueOf(timing, key)), explanation]) : [],
-      recording: status.recording, files,
-    };
-  }
-
-  /**
-   * Give the score of the run, once its recording is closed and the server has told it.
-   *
-   * @param {Status} status
-   * @param {Files|null} files
-   * @returns {Scored}
-   */
-  #score({ recording }, files) {
-    if (files === null || recording.state === 'recording') {
-      return recording.state === 'none' ? { state: 'none', why: 'nothing was recorded' }
-        : { state: 'waiting' };
-    }
-    const known = this.#scores.get(files.run);
-    if (known !== undefined) {
-      return known;
-    }
-    this.#scores.set(files.run, { state: 'waiting' });
-    fetchScore(files.run).then(
-      (score) => this.#scores.set(files.run, { state: 'told', score }),
-      (error) => this.#scores.set(files.run, { state: 'none', why: errorText(error) }),
-    ).then(() => this.#show());
-    return { state: 'waiting' };
-  }
-
-  /**
-   * @param {Mishap} facts
+   * @param {MishapFacts} facts
    * @returns {Node[]}
    */
-  #mishap({ run, text, stopped }) {
+  #mishap({ run, text, stopped, against }) {
+    const refused = run === 'running' ? against.pause : '';
     clearTimeout(this.#mishapTimer);
     if (run === 'running') {
       this.#mishapTimer = setTimeout(() => this.#dismiss(), MISHAP_MS);
@@ -212,10 +188,12 @@ class Outcome {
       ...(stopped && run === 'running' ? [this.#button('put_back', 'Put back on the lane',
         () => window.crgame.driving?.putBack(), 'At rest, where its lane is free (Backspace)',
         'drive-button primary')] : []),
+      this.#button('hold', 'How it went', () => this.#hold(),
+        'Hold the run, and tell how it goes', 'drive-button', refused),
       this.#button('look', run === 'running' ? 'Pause and look again' : 'Look again',
-        () => this.#lookAgain(run), 'The last 10 s once more', 'drive-button'),
+        () => this.#lookAgain(), 'The last 10 s once more', 'drive-button', refused),
       this.#button('again', 'Begin anew', () => this.#order('reset'),
-        'The same game from its first step (hold R)', 'drive-button'),
+        'The same game from its first step (hold R)', 'drive-button', against.reset),
       this.#button('close', '', () => this.#dismiss(), 'Close this and drive on', 'icon-button')];
   }
 
@@ -226,50 +204,70 @@ class Outcome {
     this.#show();
   }
 
-  /** @param {RunState} run */
-  async #lookAgain(run) {
-    if (run === 'running') {
-      await this.#order('pause');
+  async #lookAgain() {
+    if (await this.#still()) {
+      window.crgame.lastSeconds?.open();
+    }
+  }
+
+  async #hold() {
+    if (await this.#still()) {
+      this.#held = true;
+      this.#dismiss();
+    }
+  }
+
+  /** @returns {Promise<boolean>} whether this run stands now, paused if it went on */
+  async #still() {
+    const { epoch, status } = this.#store;
+    if (status?.run === 'running' && !await this.#order('pause')) {
+      return false;
+    }
+    while (this.#store.status?.run === 'running') {
       await new Promise((resolve) => {
-        const end = this.#store.on('status', (status) => {
-          if (status.run !== 'running') {
-            end();
-            resolve(undefined);
-          }
+        const end = this.#store.on('status', () => {
+          end();
+          resolve(undefined);
         });
       });
     }
-    window.crgame.lastSeconds?.open();
+    return this.#store.epoch === epoch;
   }
 
   /**
-   * @param {Over} facts
+   * @param {Card} facts
    * @returns {Node[]}
    */
   #card(facts) {
-    const { connected, stays } = facts;
-    const title = element('h2', { text: facts.why.title });
+    const { against, phase, why } = facts;
+    const title = element('h2', { text: why.title });
     return [
       element('header', {}, title, this.#button('close', '', () => this.#close(),
         'Close this and look at the scene', 'icon-button')),
-      element('p', { class: 'outcome-why', text: facts.why.text }),
+      element('p', { class: 'outcome-why', text: why.text }),
       scoreBlock(facts.scored, facts.mine),
       table(facts),
       fileList(facts),
       ...(facts.figures.length > 0 ? figures(facts.figures) : []),
-      connected && stays ? null : element('p', { class: 'outcome-gone', role: 'status',
-        text: connected ? 'The program ends with this run.'
+      against.choose === '' ? null : element('p', { class: 'outcome-gone', role: 'status',
+        text: facts.connected ? against.choose
           : 'The program at the other end is no longer there: this is how it was last seen. '
             + 'Start it again to drive again.' }),
       element('div', { class: 'outcome-buttons' },
+        ...(phase === 'held' ? [
+          this.#button('start', 'Go on', () => this.#order('start'),
+            'From where it stands (P)', 'drive-button primary', against.start),
+          this.#button('stop', 'End the run', () => this.#end(),
+            'And have its score, its report and its recording', 'drive-button', against.stop),
+        ] : []),
         this.#button('again', 'Again', () => this.#order('reset'),
           'The same game from its first step, with a recording of its own (hold R)',
-          'drive-button primary', !connected || !stays),
+          `drive-button ${phase === 'over' ? 'primary' : ''}`, against.reset),
         this.#button('next', 'Next game', () => window.crgame.scenario?.startNext(),
-          'The next one of the list', 'drive-button', !connected || !stays),
+          'The next one of the list', 'drive-button', against.choose),
         this.#button('another', 'Another game', () => this.#another(),
-          'Choose a game or a scenario', 'drive-button', !connected || !stays),
-        this.#button('look', 'Last 10 s', () => this.#lookAgain('ended'),
+          'Choose a game or a scenario', 'drive-button', against.choose),
+        this.#button('look', 'Last 10 s', () => this.#lookAgain(),
           'The last 10 s once more, at will slowed', 'drive-button')),
     ].filter((item) => item !== null);
   }
@@ -282,10 +280,10 @@ class Outcome {
   #bar(text, facts) {
     const drive = facts.phase === 'driver' && facts.holder === null
       ? this.#button('drive', `Drive ${facts.seat}`, () => this.#drive(facts.seat),
-        `Take the seat of ${facts.seat}`, 'drive-button primary') : null;
+        `Take the seat of ${facts.seat}`, 'drive-button primary', facts.refused) : null;
     const start = facts.run === 'paused' ? this.#button('start', 'Start',
       () => this.#order('start'), 'Begin (P)',
-      `drive-button ${facts.phase === 'ready' ? 'primary' : ''}`) : null;
+      `drive-button ${facts.phase === 'ready' ? 'primary' : ''}`, facts.against.start) : null;
     return [element('span', { role: 'status', text }), drive, start].filter(
       (item) => item !== null);
   }
@@ -303,10 +301,11 @@ class Outcome {
    * @param {() => void} act
    * @param {string} title
    * @param {string} kind
-   * @param {boolean} [disabled]
+   * @param {string} [refused] why it cannot be pressed
    */
-  #button(action, text, act, title, kind, disabled = false) {
-    return element('button', { type: 'button', class: kind, 'data-action': action, title, disabled,
+  #button(action, text, act, title, kind, refused = '') {
+    return element('button', { type: 'button', class: kind, 'data-action': action,
+      title: refused || title, disabled: refused !== '',
       'aria-label': text || title, on: { click: (event) => {
         // A button that kept the focus would be pressed by the space bar, which brakes.
         /** @type {HTMLElement} */ (event.currentTarget).blur();
@@ -315,8 +314,19 @@ class Outcome {
   }
 
   #close() {
-    this.#closedEpoch = this.#store.status?.epoch ?? -1;
+    if (this.#held) {
+      this.#held = false;
+    } else {
+      this.#closedEpoch = this.#store.status?.epoch ?? -1;
+    }
     this.#show();
+  }
+
+  async #end() {
+    if (await confirm('End the run?', 'It ends for everybody and its recording is closed. It '
+        + 'cannot go on afterwards.', 'End')) {
+      this.#order('stop');
+    }
   }
 
   #another() {
@@ -338,12 +348,16 @@ class Outcome {
     return this.#ask(this.#connection.request({ type: 'control', action }));
   }
 
-  /** @param {Promise<Reply>} reply */
+  /**
+   * @param {Promise<Reply>} reply
+   * @returns {Promise<boolean>} whether it was done
+   */
   async #ask(reply) {
     const { ok, text } = await reply;
     if (!ok) {
       this.#store.receive({ type: 'notice', level: 'warn', text });
     }
+    return ok;
   }
 }
 

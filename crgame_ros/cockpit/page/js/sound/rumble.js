@@ -43,8 +43,9 @@ export class Feeling {
     this.#trouble = trouble;
     if (trouble.collision && !before.collision) {
       this.#pulse = { magnitude: impact(speed), until_ms: now_ms + COLLISION_MS };
-    } else if (trouble.offRoad !== before.offRoad) {
-      this.#pulse = { magnitude: 0.7 * impact(speed), until_ms: now_ms + KERB_MS };
+    } else if (trouble.offRoad !== before.offRoad || trouble.kerb > 0) {
+      const edge = trouble.offRoad !== before.offRoad ? 1 : trouble.kerb;
+      this.#pulse = { magnitude: 0.7 * edge * impact(speed), until_ms: now_ms + KERB_MS };
     }
     const pulse = now_ms < this.#pulse.until_ms ? this.#pulse.magnitude : 0;
     const rough = trouble.offRoad ? roughness(speed) : 0;
@@ -64,6 +65,8 @@ export class Rumble {
   /** @type {GamepadHapticActuator|null} */
   #running = null;
   #next_ms = -Infinity;
+  // What wheels went over between two effects.
+  #kerb = 0;
 
   /**
    * Let a gamepad feel what happens.
@@ -78,11 +81,13 @@ export class Rumble {
     if (this.#running !== null && this.#running !== actuator) {
       this.stop();
     }
+    this.#kerb = Math.max(this.#kerb, trouble.kerb);
     if (now_ms < this.#next_ms) {
       return;
     }
     this.#next_ms = now_ms + EVERY_MS;
-    const { strong, weak } = this.#feeling.of(own, trouble, now_ms);
+    const { strong, weak } = this.#feeling.of(own, { ...trouble, kerb: this.#kerb }, now_ms);
+    this.#kerb = 0;
     if (strength * Math.max(strong, weak) < 0.01) {
       this.#still();
       return;
@@ -98,6 +103,7 @@ export class Rumble {
   /** Stand still, and forget what was. */
   stop() {
     this.#feeling.reset();
+    this.#kerb = 0;
     this.#next_ms = -Infinity;
     this.#still();
   }

@@ -5,6 +5,7 @@
 import { connectedPads } from '../driving/gamepad.js';
 import { isTyping } from '../driving/focus.js';
 import { recall, remember } from '../panels/memory.js';
+import { Kerbs } from './kerbs.js';
 import { Listener } from './listener.js';
 import { actuatorOf, Rumble } from './rumble.js';
 import { createSoundControl } from './sound_control.js';
@@ -13,7 +14,6 @@ import { Speaker } from './speaker.js';
 /** @import { Connection } from '../connection.js' */
 /** @import { Store } from '../store.js' */
 /** @import { Heard } from './listener.js' */
-/** @import { Trouble } from './sound_graph.js' */
 
 // Ears do not need every frame of the picture [ms].
 const EVERY_MS = 30;
@@ -43,6 +43,8 @@ export class Sound {
   #store;
   #connection;
   #listener = new Listener();
+  /** @type {Kerbs|null} */
+  #kerbs = null;
   #speaker = new Speaker(() => this.#tell());
   #motors = new Rumble();
   #control;
@@ -65,7 +67,10 @@ export class Sound {
     window.addEventListener('pointerdown', () => this.begin(), true);
     window.addEventListener('keydown', (event) => this.#key(event), true);
     document.addEventListener('visibilitychange', () => this.#look(performance.now()));
-    store.on('scene', () => this.#tell());
+    store.on('scene', () => {
+      this.#kerbs = null;
+      this.#tell();
+    });
     store.on('epoch', () => {
       this.#subject = '';
       this.#listener.reset();
@@ -170,8 +175,10 @@ export class Sound {
       this.#subject = '';
       return;
     }
-    const trouble = this.#troubleOf(heard.own.id);
-    if (this.#jumped(heard)) {
+    const jumped = this.#jumped(heard);
+    const kerb = this.#kerb(heard.own.id, now_ms, jumped);
+    const trouble = { ...this.#verdictOn(heard.own.id), kerb };
+    if (jumped) {
       // Another ear, or another time: a moment of silence between the two.
       this.#next_ms = now_ms + HUSH_MS;
       this.#speaker.hush();
@@ -222,9 +229,26 @@ export class Sound {
 
   /**
    * @param {string} id
-   * @returns {Trouble}
+   * @param {number} now_ms
+   * @param {boolean} jumped
+   * @returns {number} how hard a kerb was that the wheels went over since the last look, 0 to 1
    */
-  #troubleOf(id) {
+  #kerb(id, now_ms, jumped) {
+    const { scene } = this.#store;
+    const index = this.#store.vehicleIndex(id);
+    const shown = this.#store.displayed(now_ms);
+    if (scene === null || shown === null || index < 0) {
+      return 0;
+    }
+    this.#kerbs ??= new Kerbs(scene);
+    if (jumped) {
+      this.#kerbs.reset();
+    }
+    return this.#kerbs.over(scene.vehicles[index], shown, index);
+  }
+
+  /** @param {string} id */
+  #verdictOn(id) {
     const verdict = this.#store.status?.drivability?.[id];
     return { collision: verdict?.collision ?? false, offRoad: verdict?.off_road ?? false };
   }

@@ -27,7 +27,11 @@ const KNEE = 0.8;
 const CEILING = 0.98;
 const FADE_S = 0.04;
 
-/** @typedef {{collision: boolean, offRoad: boolean}} Trouble of one's own vehicle */
+/**
+ * Of one's own vehicle; kerb: how hard its wheels have just gone over one, 0 to 1.
+ *
+ * @typedef {{collision: boolean, offRoad: boolean, kerb: number}} Trouble
+ */
 
 /** The graph; silent until `open`. */
 export class SoundGraph {
@@ -123,8 +127,9 @@ export class SoundGraph {
    */
   #strike(trouble, speed, when) {
     const before = this.#trouble ?? trouble;
-    if (trouble.offRoad !== before.offRoad) {
-      this.#strikes.kerb(impact(speed), when);
+    const edge = trouble.offRoad !== before.offRoad ? 1 : trouble.kerb;
+    if (edge > 0) {
+      this.#strikes.kerb(edge * impact(speed), when);
     }
     if (trouble.collision && !before.collision) {
       this.#strikes.collision(impact(speed), when);

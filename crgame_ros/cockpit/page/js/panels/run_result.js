@@ -1,0 +1,95 @@
+// Copyright 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** How a run went, as far as is known: from its status, its files and its score. */
+
+import { fetchScore } from '../after/run_api.js';
+import { errorText } from './format.js';
+import { part, why } from './outcome_card.js';
+import { TABLE_I, valueOf } from './timing.js';
+
+/** @import { Scored } from '../after/score.js' */
+/** @import { Files, Scene, Status } from '../messages.js' */
+/** @import { Result } from './outcome_card.js' */
+/** @import { Store } from '../store.js' */
+
+// In which words a figure of table I is said of a run that is over.
+/** @type {Record<string, string>} */
+const FINAL_NAMES = { final_error_ms: 'Lag at the end' };
+
+/** The result; one per page. */
+export class RunResult {
+  #store;
+  #changed;
+  /** @type {Files|null} */
+  #files = null;
+  // As far as it was asked for, by run.
+  /** @type {Map<string, Scored>} */
+  #scores = new Map();
+
+  /**
+   * @param {Store} store
+   * @param {() => void} changed called when files or a score have come
+   */
+  constructor(store, changed) {
+    this.#store = store;
+    this.#changed = changed;
+    store.on('files', (files) => {
+      this.#files = files;
+      changed();
+    });
+  }
+
+  /**
+   * Give it.
+   *
+   * @param {Status} status
+   * @param {Scene} scene
+   * @returns {Result}
+   */
+  of(status, scene) {
+    const over = status.run === 'ended';
+    const files = over && this.#files?.epoch === status.epoch ? this.#files : null;
+    const { timing } = status;
+    const { seats, me } = this.#store;
+    return {
+      scored: over ? this.#score(status, files)
+        : { state: 'none', why: 'it is made when the run is over' },
+      mine: Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null,
+      why: why(status), stays: Boolean(status.stays), t: status.t,
+      driven: scene.vehicles.length > 0,
+      contacts: (status.contacts ?? []).map((item) => ({ ...item, part: part(item, files) })),
+      departures: status.departures ?? [],
+      planners: scene.vehicles.filter(({ role }) => role === 'autonomous').map(({ id }) => ({
+        id, name: status.planners[id]?.planner || scene.planners?.[id] || '',
+        accepted: status.planners[id]?.accepted ?? 0, refused: status.planners[id]?.refused ?? 0,
+        fallbacks: status.planners[id]?.fallbacks ?? 0 })),
+      figures: timing ? TABLE_I.map(([key, name, explanation, format]) => [
+        (over && FINAL_NAMES[key]) || name, format(valueOf(timing, key)), explanation]) : [],
+      recording: status.recording, files,
+    };
+  }
+
+  /**
+   * Give the score of the run, once its recording is closed and the server has told it.
+   *
+   * @param {Status} status
+   * @param {Files|null} files
+   * @returns {Scored}
+   */
+  #score({ recording }, files) {
+    if (files === null || recording.state === 'recording') {
+      return recording.state === 'none' ? { state: 'none', why: 'nothing was recorded' }
+        : { state: 'waiting' };
+    }
+    const known = this.#scores.get(files.run);
+    if (known !== undefined) {
+      return known;
+    }
+    this.#scores.set(files.run, { state: 'waiting' });
+    fetchScore(files.run).then(
+      (score) => this.#scores.set(files.run, { state: 'told', score }),
+      (error) => this.#scores.set(files.run, { state: 'none', why: errorText(error) }),
+    ).then(() => this.#changed());
+    return { state: 'waiting' };
+  }
+}

@@ -1,0 +1,148 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The torque at the steering wheel: its formula, written down a second time, and its bounds."""
+
+import math
+from pathlib import Path
+import random
+
+from crgame_ros.driver.steering_torque import SteeringTorque, TorqueParameters, WheelMotion
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
+import numpy as np
+from pushed_wheel import wheel_at
+import pytest
+from scipy.interpolate import interpn
+import yaml
+
+CAR = load_vehicle_parameters()
+MODEL = SteeringTorque(CAR)
+# Of a bend of 20 m/s at 5 m/s^2 [rad].
+WHEEL = wheel_at(20.0, 0.25)
+ROOT = Path(__file__).parents[2]
+
+
+def brush(steady: float, ahead: float, load: float, friction: float,
+          half_length: float) -> tuple[float, float]:
+    """
+    Give a tyre's lateral force [N] and aligning moment [N m] from the bristles themselves.
+
+    Each bristle at x of the contact leans by (a - x) alpha, until its stress is the friction that
+    the parabolic pressure allows. The slip angle alpha is the one that gives the steady force
+    [N], and one ahead of it [rad] more.
+    """
+    x = (np.arange(20_000) + 0.5) / 10_000 * half_length - half_length
+    dx = half_length / 10_000
+    most = friction * 0.75 * load / half_length * (1.0 - (x / half_length) ** 2)
+    stiffness = 21.92 * load / (2.0 * half_length ** 2)
+
+    def stress(slip: float) -> np.ndarray:
+        return np.copysign(np.minimum(stiffness * (half_length - x) * abs(slip), most), slip)
+
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stress(middle).sum() * dx < abs(steady) else (low, middle)
+    felt = stress(math.copysign(low, steady) + ahead)
+    return float(felt.sum() * dx), float(-(x * felt).sum() * dx)
+
+
+def front_angle(speed: float, wheel_angle: float) -> float:
+    """Look the front wheels' angle up in the table of the BMW 320i [rad]."""
+    table = yaml.safe_load((ROOT / 'config/vehicles/steering_ratio.yaml').read_text())
+    axes = table['speed'], table['steering_wheel_angle']
+    place = [min(value, axis[-1]) for value, axis in zip(
+        (speed, abs(wheel_angle)), axes, strict=True)]
+    angle = wheel_angle / float(interpn(axes, table['ratio'], place)[0])
+    return max(-0.91, min(0.91, angle))
+
+
+def expected_torque(motion: WheelMotion) -> float:
+    """Write the whole torque down a second time, for the BMW 320i of config/vehicles."""
+    load = 1093.2952334674046 * 9.81 * 1.4227170936 / 2.5789128
+    force = 1093.2952334674046 * motion.speed * motion.yaw_rate * 1.4227170936 / 2.5789128
+    force = max(-1.0489 * load, min(1.0489 * load, force))
+    torque = 0.0
+    if motion.speed > 0.0:
+        ahead = front_angle(motion.speed, motion.wheel_angle) \
+            - math.atan(2.5789128 * motion.yaw_rate / motion.speed)
+        force, moment = brush(force, ahead, load, 1.0489, 0.08)
+        torque = -(moment + 0.02 * force) * 0.2 / 16.0 * (
+            1.0 - 2.0 / (math.exp(2.0 * motion.speed) + 1.0))
+    torque -= 0.08 * motion.wheel_rate
+    torque -= (0.15 + 0.9 * math.exp(-abs(motion.speed))) * math.tanh(2.0 * motion.wheel_rate)
+    for side in (1.0, -1.0):
+        torque -= side * 20.0 * max(0.0, side * motion.wheel_angle - 0.97 * 7.85)
+    if motion.off_road:
+        torque += 0.7 * min(1.0, abs(motion.speed) / 5.0) * math.sin(
+            34.0 * math.pi * motion.time_s)
+    if motion.since_collision_s < 1.5:
+        torque += 2.5 * math.exp(-motion.since_collision_s / 0.15) * math.sin(
+            46.0 * math.pi * motion.since_collision_s)
+    return torque
+
+
+def states() -> list[WheelMotion]:
+    """Draw 20 states, from standstill to sliding, backwards too."""
+    draw = random.Random(3)
+    return [WheelMotion(
+        speed := draw.choice((0.0, -4.0, draw.uniform(0.0, 40.0))),
+        rate := draw.uniform(-12.0, 12.0) / max(abs(speed), 4.0),
+        # Near the turn's own, or wherever hands have pulled it.
+        draw.choice((60.0 * rate / max(speed, 4.0), draw.uniform(-7.85, 7.85))),
+        draw.uniform(-6.0, 6.0), draw.uniform(0.0, 30.0), draw.random() < 0.3,
+        draw.choice((math.inf, draw.uniform(0.0, 2.0)))) for _ in range(20)]
+
+
+@pytest.mark.parametrize('motion', states(), ids=range(20))
+def test_the_torque_is_the_formulas(motion: WheelMotion) -> None:
+    """The aligning part from a tyre cut into 20,000 bristles, the rest written anew."""
+    assert MODEL.torque(motion) == pytest.approx(expected_torque(motion), abs=2e-3)
+
+
+def test_the_wheel_grows_light_before_the_tyres_slide() -> None:
+    """The tyre's part is largest at 58 % of the grip; from there on it falls, never its sign."""
+    sideways = np.linspace(0.0, CAR.friction * CAR.gravity, 1001)
+    caster = 0.2 / 16.0 * 0.02 * CAR.mass * CAR.rear_to_center / CAR.wheelbase
+    steady = SteeringTorque(CAR, TorqueParameters(slip_stiffness=0.0))
+    tyre = np.array([-steady.aligning(20.0, each / 20.0, 0.0) for each in sideways]) \
+        - caster * sideways
+    assert sideways[tyre.argmax()] / sideways[-1] == pytest.approx(1.0 - 0.75 ** 3, abs=0.002)
+    assert tyre[-1] == pytest.approx(0.0, abs=1e-9) and (tyre >= -1e-9).all()
+    assert 1.0 < -MODEL.aligning(20.0, 0.25, WHEEL) < 3.0, 'what a hand holds easily'
+
+
+@pytest.mark.parametrize('speed', [0.01, 1.0, 8.0, 20.0, 40.0])
+def test_a_wheel_ahead_of_the_vehicle_is_held_back(speed: float) -> None:
+    """Straight on, by the more the farther it is turned, up to the grip; at rest by nothing."""
+    angles = np.linspace(-7.85, 7.85, 2001)
+    torques = np.array([MODEL.aligning(speed, 0.0, angle) for angle in angles])
+    assert (torques * angles <= 0.0).all() and torques == pytest.approx(-torques[::-1])
+    most = 0.2 / 16.0 * CAR.friction * CAR.mass * CAR.gravity * CAR.rear_to_center / CAR.wheelbase
+    assert np.abs(torques).max() <= 0.03 * most * math.tanh(speed)
+    assert np.abs(np.diff(torques)).max() < 0.1, 'nothing jumps'
+    assert MODEL.aligning(0.0, 0.0, 3.0) == MODEL.aligning(-3.0, 0.2, 3.0) == 0.0
+
+
+def test_a_wheel_let_go_comes_to_rest_in_the_middle() -> None:
+    """With the vehicle 30 ms behind the wheel: what pulls it back does not make it swing."""
+    dt_s, inertia, angle, rate = 0.001, 0.03, 2.0, 0.0
+    past, swing = [0.0] * 30, []
+    for _ in range(2000):
+        yaw_rate = 20.0 * math.tan(past[-30]) / CAR.wheelbase
+        rate += dt_s / inertia * MODEL.torque(WheelMotion(20.0, yaw_rate, angle, rate))
+        angle += dt_s * rate
+        past.append(front_angle(20.0, angle))
+        swing.append(angle)
+    assert min(swing) > -0.5 and max(map(abs, swing[-500:])) < 0.1
