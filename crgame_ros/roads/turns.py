@@ -14,6 +14,7 @@
 # limitations under the License.
 """Where lanelets turn off, and on which side of each other they lie."""
 
+from collections.abc import Iterable
 import math
 
 from crgame_ros.roads.road_network import RoadNetwork
@@ -69,6 +70,10 @@ class Turns:
             self._turns[lanelet, before] = self._find_turn(lanelet, before)
         return self._turns[lanelet, before]
 
+    def is_only_way(self, before: int, lanelet: int) -> bool:
+        """Tell whether one cannot but go from a lanelet, or from beside it, to the next one."""
+        return not self._others(lanelet, (before,))
+
     def turned_at(self, lanelet: int) -> tuple[float, float]:
         """Give the arc length [m] at which a turn ends on a lanelet, and the heading there."""
         line = self._roads.line(lanelet)
@@ -118,10 +123,7 @@ class Turns:
 
     def _find_turn(self, lanelet: int, before: int | None) -> Light | None:
         origins = self._roads.predecessors(lanelet) if before is None else (before,)
-        others = {other for each in origins for lane in self._roads.abreast(each)
-                  for other in self._roads.successors(lane) if self._roads.is_for_cars(other)}
-        # Lanes beside it that bend with it are the same road.
-        others -= self._roads.abreast(lanelet)
+        others = self._others(lanelet, origins)
         named = (before, lanelet) in self._named
         if not (others or named) or self._ring(lanelet):
             return None
@@ -133,6 +135,12 @@ class Turns:
                 abs(self._bend_at_fork(other)) > abs(bend) + TURN for other in others)):
             return None
         return Light.LEFT if bend > 0.0 else Light.RIGHT
+
+    def _others(self, lanelet: int, origins: Iterable[int]) -> set[int]:
+        """List where one could go instead; lanes beside it that bend with it are the same road."""
+        return {other for each in origins for lane in self._roads.abreast(each)
+                for other in self._roads.successors(lane)
+                if self._roads.is_for_cars(other)} - self._roads.abreast(lanelet)
 
     def _bend_at_fork(self, lanelet: int) -> float:
         return self.turned_at(lanelet)[1] - float(self._roads.line(lanelet).heading[0])

@@ -149,11 +149,14 @@ class PlanIndicator:
         if turn and abs(wrap_pi(heading - yaw)) > TURNED \
                 and self._roads.locate(here, x, y)[0] < end:
             return turn
+        # Shown before it, a turn behind another fork would be taken for one there.
+        next_fork = True
         for before, after in pairwise(lanelets):
             passed = self._turns.between(before, after)
             for origin, lanelet in pairwise((before, *passed)):
-                if turn := self._turns.turn_on(lanelet, origin):
+                if next_fork and (turn := self._turns.turn_on(lanelet, origin)):
                     return turn
+                next_fork = next_fork and self._turns.is_only_way(origin, lanelet)
             side = None if passed else self._turns.side_of(before, after)
             if side is not None:
                 if self._against(here, pose):
@@ -169,6 +172,8 @@ class PlanIndicator:
         while left >= 0.0 and (following := self._onward.get(here)) is not None:
             if turn := self._turns.turn_on(following, here):
                 return turn
+            if not self._turns.is_only_way(here, following):
+                return None
             here = following
             left -= self._roads.line(here).length
         return None

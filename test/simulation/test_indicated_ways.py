@@ -100,6 +100,23 @@ def test_who_stands_before_a_fork_indicates_within_30_m(x: float, expected: int)
     assert indicator.shown == expected
 
 
+def test_a_turn_behind_another_fork_is_not_shown_before_that() -> None:
+    """As in a roundabout, in which the exit before one's own is near."""
+    before = Piece((0.0, 0.0, 0.0), 100.0, after=(2, 5))
+    line = Piece(before.end, 10.0, after=(3, 4))
+    third = Piece(line.end, 20.0, 90.0)
+    indicator = indicator_on(made({
+        1: before, 2: line, 3: third, 4: Piece(line.end, 20.0),
+        5: Piece(before.end, 20.0, 90.0)}), 3)
+    way = np.concatenate([piece.poses()[:-1] for piece in (before, line, third)])
+    for x, expected in ((95, 0), (102, Light.LEFT)):
+        # Whether it stands there or drives on.
+        for poses in (np.tile(way[x], (11, 1)), way[x:x + 22:2]):
+            indicator.forget()
+            indicator.take(poses)
+            assert indicator.shown == expected
+
+
 def test_who_follows_the_one_way_there_is_turns_off_nowhere() -> None:
     """Into lanelet 3, which bends, others come from 2, from where one can go straight on."""
     first = Piece((0.0, 0.0, 0.0), 50.0, after=(3,))
