@@ -181,6 +181,8 @@ def replay_inputs(path: Path, epoch: int | None = None) -> ReplayInputs:
                          'a run can be repeated exactly only from a recording without gaps')
     suffix = f'/{COMMAND_COLUMNS[0]}'
     vehicles = [name.removesuffix(suffix) for name in table.columns if name.endswith(suffix)]
-    commands = {vehicle: table.commands(vehicle) for vehicle in vehicles}
-    return ReplayInputs({vehicle: rows for vehicle, rows in commands.items()
-                         if np.isfinite(rows).any()}, table.column('dt_eff_s').copy())
+    # What an AV indicates by itself is no input.
+    return ReplayInputs({
+        vehicle: np.where(drove[:, None], table.commands(vehicle), np.nan)
+        for vehicle in vehicles if (drove := table.drove(vehicle)).any()
+    }, table.column('dt_eff_s').copy())

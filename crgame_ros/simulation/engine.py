@@ -267,6 +267,7 @@ class Simulation:
     def conclude(self) -> StepResult:
         """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
+        self._indicators.look(self.n, self.avs)
         result = self._result()
         self._add_to_hash()
         own = () if self._stopped is None else self._stopped.events_at(self.n)
@@ -284,7 +285,6 @@ class Simulation:
         if self._tasks is not None:
             self._tasks.at_tick(self.n, k, self.states, objects, fired)
         objects = self._world.settle(self.states)
-        self._indicators.look(k, self.avs)
         asking = [av for av in self.avs if av.wants_request(self.n)]
         requests: dict[str, JointSeries] = {}
         if asking:

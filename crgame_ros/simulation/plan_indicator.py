@@ -15,11 +15,12 @@
 """Which indicator an AV shows: what its plan is about to do, seen on the map."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 import math
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.messages.plan import Plan
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.roads.driven_lanes import driven_lanes
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
@@ -30,17 +31,18 @@ from crgame_ros.vehicle.lights import Light
 import numpy as np
 from numpy.typing import NDArray
 
-# So much of a plan is looked at, at that many poses [s].
-LOOK_AHEAD_S = 5.0
-POSES = 11
-# Nobody sees whether an indicator begins a moment later: the AVs take turns, tick by tick.
-EVERY_TICKS = 5
+# So much of a plan is looked at, at poses that are so far apart [s].
+LOOK_AHEAD_S, APART_S = 5.0, 0.5
+# Nobody sees whether an indicator begins a moment later: the AVs take turns [s].
+LOOK_EVERY_S = 0.5
 # A vehicle that plans to stop before a fork shows from there on where its route goes [m].
 BEFORE_FORK = 30.0
 # A turn is over when so much of it is left [rad].
 TURNED = math.radians(15.0)
-# A lane change is over so near to the middle of the new lane [m].
+# A lane change is over so near to the middle of the new lane [m], or where a plan that goes on
+# so far comes no nearer to it than that [m].
 SETTLED = 0.4
+GOES_ON, NEARER = 1.0, 0.1
 
 
 class PlanIndicator:
@@ -65,66 +67,116 @@ class PlanIndicator:
                         for here, following in zip(leg, leg[1:], strict=False)}
         self._route = frozenset(lanelet for leg in route.legs for lanelet in leg)
         self._turns = turns
-        # The side of a lane change that has begun, and the lanelet that was left by it.
+        # The side of a lane change that has begun, and a lanelet of the new lane.
         self._changing: tuple[Light, int] | None = None
+        # Where it was last, and from where it came there, if that is known.
+        self._here: int | None = None
+        self._before: int | None = None
         self.shown = 0
 
-    def take(self, states: NDArray[np.float64], time_step_s: float) -> None:
+    def take(self, poses: NDArray[np.float64]) -> None:
         """
-        Look at an accepted plan.
+        Look at what is left of a plan.
 
-        :param states: (S, 8) planned states in the roads' coordinates; the first is now.
-        :param time_step_s: from state to state [s]
+        :param poses: (N, 3) x [m], y [m], yaw [rad] in the roads' coordinates, one or more; the
+            first is that of the vehicle now, the others are ahead.
         """
-        last = min(len(states) - 1, round(LOOK_AHEAD_S / time_step_s))
-        poses = states[np.unique(np.linspace(0, last, POSES).round().astype(int)), :3]
         lanelets = driven_lanes(self._roads, self._turns, poses, self._route)
         if not lanelets:
             self.forget()
             return
-        x, y, yaw = states[0, :3].tolist()
-        self.shown = int(self._unfinished(lanelets[0], x, y) or self._ahead(lanelets, yaw)
-                         or self._at_fork(lanelets, x, y) or 0)
+        self._come_to(lanelets[0])
+        self.shown = int(self._unfinished(lanelets, poses) or self._ahead(lanelets, poses[0])
+                         or self._at_fork(lanelets, poses[0]) or 0)
 
     def forget(self) -> None:
         """Show nothing, until there is another plan."""
-        self._changing, self.shown = None, 0
+        self._changing, self._here, self._before, self.shown = None, None, None, 0
 
-    def _unfinished(self, here: int, x: float, y: float) -> Light | None:
-        """Go on with a lane change up to the middle of the new lane."""
+    def _come_to(self, here: int) -> None:
+        """Remember from which lanelet the vehicle came to the one where it is."""
+        if here != self._here:
+            passed = () if self._here is None else self._turns.between(self._here, here)
+            self._before = (self._here, *passed)[-2] if passed else None
+            self._here = here
+
+    def _unfinished(self, lanelets: Sequence[int], poses: NDArray[np.float64]) -> Light | None:
+        """Go on with a lane change up to the middle of the new lane, if the plan leads there."""
         if self._changing is None:
             return None
-        side, left_behind = self._changing
-        aside = self._roads.locate(here, x, y)[1]
+        side, new = self._changing
+        here = lanelets[0]
         # Not yet over the line, it is up to the plan: the change may have been given up.
-        if here != left_behind and (aside < -SETTLED if side is Light.LEFT else aside > SETTLED):
-            return side
+        if here == new or self._turns.between(new, here) or self._turns.between(here, new):
+            to_go = -self._aside(lanelets, poses) * (1.0 if side is Light.LEFT else -1.0)
+            stays = len(to_go) == 1 or math.dist(poses[0, :2], poses[-1, :2]) < GOES_ON
+            if to_go[0] > SETTLED and (stays or to_go[1:].min() < to_go[0] - NEARER):
+                self._changing = side, here
+                return side
         self._changing = None
         return None
 
-    def _ahead(self, lanelets: Sequence[int], yaw: float) -> Light | None:
+    def _aside(self, lanelets: Sequence[int], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Give how far poses are to the left of their lane's middle, as the vehicle sees it [m].
+
+        :return: (M) M <= N, of the vehicle now, and of the poses up to where the plan leaves it.
+        """
+        way = list(lanelets[:1])
+        for before, after in pairwise(lanelets):
+            if not (passed := self._turns.between(before, after)):
+                break
+            way += passed
+        line = Curve.from_polyline(np.concatenate([self._roads.line(each).points for each in way]))
+        s, d = line.project(poses[:, :2])
+        here = (s >= 0.0) & (s <= line.length)
+        here[0] = True
+        return -d[here] if self._against(lanelets[0], poses[0]) else d[here]
+
+    def _against(self, lanelet: int, pose: NDArray[np.float64]) -> bool:
+        """Tell whether somebody drives against a lanelet's direction, as who overtakes does."""
+        x, y, yaw = pose.tolist()
+        line = self._roads.line(lanelet)
+        heading = line.heading_at(np.array(self._roads.locate(lanelet, x, y)[0]))
+        return math.cos(float(heading) - yaw) < 0.0
+
+    def _ahead(self, lanelets: Sequence[int], pose: NDArray[np.float64]) -> Light | None:
         """Give what the plan does first."""
-        turn = self._turns.turn_on(lanelets[0])
-        if turn and abs(wrap_pi(float(self._roads.line(lanelets[0]).heading[-1]) - yaw)) > TURNED:
+        here, before_here = lanelets[0], self._before
+        x, y, yaw = pose.tolist()
+        turn = self._turns.turn_on(here, before_here)
+        end, heading = self._turns.turned_at(here)
+        if turn and abs(wrap_pi(heading - yaw)) > TURNED \
+                and self._roads.locate(here, x, y)[0] < end:
             return turn
-        for before, after in zip(lanelets, lanelets[1:], strict=False):
+        # Shown before it, a turn behind another fork would be taken for one there.
+        next_fork = True
+        for before, after in pairwise(lanelets):
             passed = self._turns.between(before, after)
-            for lanelet in passed:
-                if turn := self._turns.turn_on(lanelet):
+            for origin, lanelet in pairwise((before, *passed)):
+                if next_fork and (turn := self._turns.turn_on(lanelet, origin)):
                     return turn
+                next_fork = next_fork and self._turns.is_only_way(origin, lanelet)
             side = None if passed else self._turns.side_of(before, after)
             if side is not None:
-                self._changing = side, before
+                if self._against(here, pose):
+                    side = Light.RIGHT if side is Light.LEFT else Light.LEFT
+                self._changing = side, after
                 return side
         return None
 
-    def _at_fork(self, lanelets: Sequence[int], x: float, y: float) -> Light | None:
+    def _at_fork(self, lanelets: Sequence[int], pose: NDArray[np.float64]) -> Light | None:
         """Give where the route turns after the plan's end, if that is near."""
-        following = self._onward.get(lanelets[-1])
-        if following is None or (turn := self._turns.turn_on(following)) is None:
-            return None
-        end = self._roads.line(lanelets[-1]).points[-1]
-        return turn if math.hypot(end[0] - x, end[1] - y) <= BEFORE_FORK else None
+        here = lanelets[-1]
+        left = BEFORE_FORK - math.dist(self._roads.line(here).points[-1], pose[:2])
+        while left >= 0.0 and (following := self._onward.get(here)) is not None:
+            if turn := self._turns.turn_on(following, here):
+                return turn
+            if not self._turns.is_only_way(here, following):
+                return None
+            here = following
+            left -= self._roads.line(here).length
+        return None
 
 
 class PlanIndicators:
@@ -136,21 +188,54 @@ class PlanIndicators:
     """
 
     def __init__(self, setup: Setup) -> None:
-        self._time_step_s = setup.scheduler.time_step_s
+        self._scheduler = setup.scheduler
         turns = Turns(setup.network)
         self._each = [PlanIndicator(setup.network, turns, av.planning_problem, av.declared[:3])
                       for av in setup.avs] if setup.network.lanelet_ids else []
-        self._seen: list[Plan | None] = [None] * len(setup.avs)
+        # The step at which somebody drove it last.
+        self._driven_n = [-1] * len(self._each)
+        self._apart = max(1, round(APART_S / self._scheduler.dt_s))
+        steps_s = self._scheduler.time_step_s / self._steps_in_tick
+        self._period = max(1, round(LOOK_EVERY_S / steps_s), len(self._each))
+        self._place_at = {place * self._period // len(self._each): place
+                          for place in range(len(self._each))}
         self.shown = [0] * len(setup.avs)
 
-    def look(self, k: int, avs: Sequence[AutonomousVehicle]) -> None:
-        """Look, at tick k, at the plans of those whose turn it is."""
+    @property
+    def _steps_in_tick(self) -> int:
+        """Count the steps of a tick in which plans are looked at: where requests are not made."""
+        return max(1, self._scheduler.steps_per_tick - 1)
+
+    def look(self, n: int, avs: Sequence[AutonomousVehicle]) -> None:
+        """Look, at step n, at the plan of the AV whose turn it is, and forget unused ones."""
+        turn = self._turn(n)
         for place, (indicator, av) in enumerate(zip(self._each, avs, strict=False)):
             if av.driven:
-                # What somebody does with it is no part of its plan.
+                self._driven_n[place] = n
+            age = av.plan_age_steps(n)
+            # What somebody does with it is no part of its plan, and a plan that was asked for
+            # before it was given back begins elsewhere.
+            if av.driven or av.uses_no_plan or age is None or n - age < self._driven_n[place]:
                 indicator.forget()
-            elif (k + place) % EVERY_TICKS == 0 and av.plan is not self._seen[place]:
-                self._seen[place] = av.plan
-                if av.plan is not None:
-                    indicator.take(av.plan.states, self._time_step_s)
+            elif place == turn:
+                indicator.take(self._coming(n, av))
             self.shown[place] = indicator.shown
+
+    def _turn(self, n: int) -> int | None:
+        """Give the place of the AV whose turn it is: one at most, so that no step takes long."""
+        ticks, rest = divmod(n, self._scheduler.steps_per_tick)
+        if self._scheduler.steps_per_tick > 1 and not rest:
+            return None
+        return self._place_at.get(
+            (ticks * self._steps_in_tick + max(0, rest - 1)) % self._period)
+
+    def _coming(self, n: int, av: AutonomousVehicle) -> NDArray[np.float64]:
+        """Give where an AV is, and where its plan leads from now on, in the roads' coordinates."""
+        poses = [av.state[:3]]
+        for step in range(n + self._apart, n + round(LOOK_AHEAD_S / self._scheduler.dt_s) + 1,
+                          self._apart):
+            if (state := av.planned_state(step)) is None:
+                break
+            poses.append(state[:3])
+        transform = av.setup.transform
+        return np.array(poses) if transform.is_identity else transform.to_scenario(np.array(poses))

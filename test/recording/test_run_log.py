@@ -250,6 +250,20 @@ def test_recorded_human_is_reproduced_to_the_last_bit(tmp_path: Path, recorder: 
     assert other.state_hash != result.state_hash
 
 
+def test_lights_that_an_av_shows_by_itself_are_no_input(tmp_path: Path, recorder: Any,
+                                                        drive: Drive) -> None:
+    """An AV has commands if somebody drove it, and while somebody did."""
+    result = drive(CUT_IN, duration_s=0.3, avs=(AvSpec('av0', 'constant-velocity'),))
+    result.av_commands[:, 0, 4] = 2.0
+    alone = replay_inputs(recorder.ours(tmp_path / 'alone', recorder.messages(result)))
+    assert [*alone.commands] == ['hv0']
+    result.av_commands[11:21, 0] = (0.5, 0.0, 0.1, 0.0, 1.0, 0.0)
+    driven = replay_inputs(recorder.ours(tmp_path / 'driven', recorder.messages(result)))
+    expected = np.full((30, 6), np.nan)
+    expected[10:20] = result.av_commands[11:21, 0]
+    np.testing.assert_array_equal(driven.commands['av0'], expected)
+
+
 def test_replay_needs_every_cycle(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     """A lost cycle, also the first, is named; the rest can still be read as a table."""
     messages = recorder.messages(drive(CUT_IN, duration_s=0.3))

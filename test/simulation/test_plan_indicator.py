@@ -27,12 +27,9 @@ from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.plan_indicator import PlanIndicator
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.lights import Light
-from crgame_ros.vehicle.state import STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-
-STEP_S = 0.1
 
 
 def read(path: Path) -> tuple[RoadNetwork, PlanIndicator]:
@@ -51,11 +48,9 @@ def own(name: str) -> tuple[RoadNetwork, PlanIndicator]:
 
 
 def planned(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Make a plan of the points that it passes."""
+    """Make poses of a plan of the points that it passes, 0.1 s apart."""
     step = np.gradient(points, axis=0)
-    states = np.zeros((len(points), STATE_WIDTH))
-    states[:, :2], states[:, 2] = points, np.arctan2(step[:, 1], step[:, 0])
-    return states
+    return np.column_stack((points, np.arctan2(step[:, 1], step[:, 0])))
 
 
 def along(roads: RoadNetwork, before: int, way: int) -> NDArray[np.float64]:
@@ -87,14 +82,14 @@ def test_lane_change_is_shown_up_to_the_middle_of_the_new_lane(side: Light) -> N
     way = planned(roads.line(lane).poses(s, offset)[:, :2])
     shown = []
     for start in range(0, 100, 5):
-        indicator.take(way[start:start + 51], STEP_S)
+        indicator.take(way[start:start + 51:5])
         # How far it has come to the new lane's middle.
         aside = abs(roads.locate(beside, *way[start, :2])[1])
         shown.append((aside, indicator.shown))
     assert {bits for aside, bits in shown if 0.5 < aside < abs(across) - 0.01} == {side}
     assert shown[-1][1] == 0 and shown[-1][0] < 0.1
     # To stay in a lane, though not in its middle, is no change.
-    indicator.take(planned(roads.line(lane).poses(s[:51], np.sin(s[:51] / 4.0))[:, :2]), STEP_S)
+    indicator.take(planned(roads.line(lane).poses(s[:51], np.sin(s[:51] / 4.0))[:, :2])[::5])
     assert indicator.shown == 0
 
 
@@ -110,7 +105,7 @@ def test_who_leaves_a_roundabout_indicates_and_who_goes_round_does_not() -> None
         onward, = (lanelet for lanelet in roads.successors(before) if lanelet in ring)
         for way, expected in ((out, Light.RIGHT), (onward, 0)):
             indicator.forget()
-            indicator.take(along(roads, before, way), STEP_S)
+            indicator.take(along(roads, before, way)[::5])
             assert indicator.shown == expected, (before, way)
 
 
@@ -145,7 +140,7 @@ def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> Non
                         # Some call straight on what bends by 90 degrees, or left what does not.
                         if bend > 45.0 if light else bend < 15.0:
                             indicator.forget()
-                            indicator.take(along(roads, before, way), STEP_S)
+                            indicator.take(along(roads, before, way)[::5])
                             count += 1
                             if indicator.shown != light:
                                 wrong.append((path.stem, before, way, light, indicator.shown))

@@ -1,0 +1,89 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where made roads turn off: forks of long lanelets, roundabouts, merged ways, the other lane."""
+
+from crgame_ros.roads.turns import Turns
+from crgame_ros.vehicle.lights import Light
+from made_roads import made, Piece, WIDTH
+import pytest
+
+BEFORE = Piece((0.0, 0.0, 0.0), 200.0, after=(2, 3))
+
+
+@pytest.mark.parametrize(('own', 'other', 'expected'), [
+    # A carriageway of 800 m radius beside a straight exit, and the exit.
+    ((559.0, 40.0), (200.0, 0.0), None), ((200.0, 0.0), (559.0, 40.0), None),
+    # A bent main road, from which one turns off still more, and one who leaves the straight road.
+    ((40.0, 35.0), (30.0, 100.0), None), ((30.0, 100.0), (40.0, 35.0), Light.LEFT),
+    ((40.0, 35.0), (40.0, 0.0), Light.LEFT), ((40.0, -35.0), (40.0, 0.0), Light.RIGHT),
+    # Where a road ends at another one aslant there is no way straight on.
+    ((30.0, 60.0), (30.0, -120.0), Light.LEFT)])
+def test_a_fork_is_where_its_ways_begin(own: tuple[float, float], other: tuple[float, float],
+                                        expected: Light | None) -> None:
+    """What a long lanelet does later is no turn, nor is the straightest way by far."""
+    turns = Turns(made({1: BEFORE, 2: Piece(BEFORE.end, *own), 3: Piece(BEFORE.end, *other)}))
+    assert turns.turn_on(2, 1) == turns.turn_on(2) == expected
+
+
+def roundabout(gap: float) -> dict[int, Piece]:
+    """Make quarters 1, 3, 5, 7 of a ring with straight gaps [m] behind them, and exit 9 from 1."""
+    pieces: dict[int, Piece] = {}
+    start = (0.0, 0.0, 0.0)
+    for number in range(1, 9):
+        following = number % 8 + 1
+        length, bend = (gap, 0.0) if number % 2 == 0 else (23.56, 90.0)
+        pieces[number] = Piece(start, length, bend, (following,))
+        start = pieces[number].end
+    pieces[9] = Piece(pieces[1].end, 30.0, 40.0)
+    pieces[1] = pieces[1]._replace(after=(2, 9))
+    return pieces
+
+
+def test_who_leaves_a_ring_by_a_straight_piece_of_it() -> None:
+    """Right-hand traffic leaves to the right, though the ring itself goes straight on there."""
+    turns = Turns(made(roundabout(5.0)))
+    assert turns.turn_on(9, 1) is Light.RIGHT
+    assert turns.turn_on(2, 1) is None
+
+
+def test_a_ring_has_a_shorter_way_round_that_is_none() -> None:
+    """To turn round at once, over one lanelet, hides nothing of the ring."""
+    pieces = roundabout(5.0)
+    pieces[1] = pieces[1]._replace(after=(2, 9, 10))
+    pieces[10] = Piece(pieces[1].end, 20.0, 170.0, (1,))
+    assert Turns(made(pieces)).turn_on(9, 1) is Light.RIGHT
+
+
+def test_whoever_has_no_choice_does_not_turn_off() -> None:
+    """From 1 one can but follow the bend; from 2 one can go straight on, too."""
+    end = (0.0, 0.0, 0.0)
+    turns = Turns(made({
+        1: Piece((-50.0, 0.0, 0.0), 50.0, after=(3,)),
+        2: Piece((-50.0, 0.0, 0.0), 50.0, after=(3, 4)),
+        3: Piece(end, 30.0, 60.0), 4: Piece(end, 30.0)}))
+    assert turns.turn_on(3, 1) is None
+    assert turns.turn_on(3, 2) is turns.turn_on(3) is Light.LEFT
+
+
+def test_the_lane_of_the_other_direction_lies_on_a_side() -> None:
+    """Its lanelets end elsewhere, too: one comes from beside the next or the last one."""
+    turns = Turns(made({
+        1: Piece((0.0, 0.0, 0.0), 50.0, after=(2,), opposite=4),
+        2: Piece((50.0, 0.0, 0.0), 50.0, opposite=3),
+        3: Piece((100.0, WIDTH, 180.0), 50.0, after=(4,), opposite=2),
+        4: Piece((50.0, WIDTH, 180.0), 50.0, opposite=1)}))
+    assert {turns.side_of(*pair) for pair in (
+        (1, 4), (1, 3), (2, 3), (2, 4), (3, 2), (3, 1), (4, 1), (4, 2))} == {Light.LEFT}
+    assert turns.side_of(1, 2) is turns.side_of(3, 4) is None
