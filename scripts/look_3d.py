@@ -1,0 +1,103 @@
+# Copyright 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Look at the 3D view on any roads: all viewpoints, lights and sizes, with what they cost.
+
+    scripts/look_3d.py pictures scenarios/*.xml --light day dusk fog --size 1280x720 390x844
+
+A line is printed for each picture. Nothing is judged: people look at the pictures.
+"""
+
+import argparse
+from itertools import product
+from pathlib import Path
+import sys
+import tempfile
+import time
+
+from cockpit_person import Person
+from make_screenshots import page, SETTLES_S
+import yaml
+
+VIEWPOINTS = ('driver', 'chase', 'bird')
+LIGHTS = {'day': {'light': 'day'}, 'dusk': {'light': 'dusk'},
+          'fog': {'light': 'day', 'visibility': 80.0}}
+# Until the others have come near [s].
+DRIVEN_S = 2.0
+COST = 'const { calls, triangles } = crgame.view3d.stats; return [calls, triangles];'
+
+
+def look(person: Person, where: Path, size: str) -> None:
+    """Take a picture from each viewpoint, and say what they took."""
+    width, height = map(int, size.split('x'))
+    browser = person.browser
+    browser.resize(width, height)
+    for viewpoint in VIEWPOINTS:
+        frames = browser.run('crgame.view3d.viewpoint = arguments[0];'
+                             'return crgame.view3d.stats.frames', viewpoint)
+        # Every mirror has had its turn.
+        browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures', 60.0,
+                     arguments=(frames,))
+        time.sleep(SETTLES_S)
+        path = where.with_name(f'{where.name}_{size}_{viewpoint}.png')
+        browser.screenshot(path)
+        calls, triangles = browser.run(COST)
+        print(f'{path}: {calls} draw calls, {triangles} triangles', flush=True)
+
+
+def visit(roads: Path, light: str, sizes: list[str], folder: Path) -> list[str]:
+    """Sit down in a scenario for a moment; give what the browser's console has said."""
+    with tempfile.TemporaryDirectory() as temporary:
+        game = Path(temporary) / 'game.yaml'
+        game.write_text(yaml.safe_dump({
+            'scenario': str(roads.resolve()), 'environment': LIGHTS[light],
+            'humans': [{'id': 'hv0', 'driver': 'cockpit'}]}))
+        with page(Path(temporary), 'light', str(game), '--duration', '100000') as person:
+            person.take_seat('hv0')
+            person.browser.run_async('return await crgame.view3d.show(true)')
+            person.browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view', 60.0)
+            person.click('[data-action="start"]')
+            time.sleep(DRIVEN_S)
+            person.click('[data-action="pause"]')
+            person.browser.run("crgame.view3d.settings.set('sharp', true)")
+            for size in sizes:
+                look(person, folder / f'{roads.stem}_{light}', size)
+            return list(person.browser.console_errors())
+
+
+def main() -> int:
+    """Look at all that the command line names."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('folder', type=Path, help='for the pictures')
+    parser.add_argument('roads', type=Path, nargs='+', metavar='FILE.xml')
+    parser.add_argument('--light', nargs='+', choices=LIGHTS, default=['day'])
+    parser.add_argument('--size', nargs='+', default=['1280x720'], metavar='WxH')
+    values = parser.parse_args()
+    values.folder.mkdir(parents=True, exist_ok=True)
+    wrong = 0
+    for roads, light in product(values.roads, values.light):
+        try:
+            errors = visit(roads, light, values.size, values.folder)
+        except (RuntimeError, SystemExit) as error:
+            errors = [f'{error}']
+        for error in errors:
+            print(f'{roads.stem}, {light}: {error}', file=sys.stderr, flush=True)
+        wrong += len(errors)
+    return int(wrong > 0)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
