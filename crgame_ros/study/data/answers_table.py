@@ -44,7 +44,7 @@ ANSWERS = TableDeclaration('answers', 'a question that was put', (
                empty='no page told it'),
         Column('after_s', NUMBER, 's', 'from when its page was shown to the last change of this '
                'answer', empty='it was left as it was, or no page told it'),
-        Column('recording', TEXT, '', "folder of the run after which it was asked, from the "
+        Column('recording', TEXT, '', 'folder of the run after which it was asked, from the '
                "participant's on", empty='it was after none'),
         Column('run_end_s', NUMBER, 's', "end of that run, on the run's clock",
                empty='it was after none, or nothing told it'),
