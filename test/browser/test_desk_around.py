@@ -19,6 +19,7 @@ from pathlib import Path
 from browser_support import Browser
 from crgame_ros.study.session_journal import read_journal
 from desk_page_support import finished, give_order, give_reason, Participant, running, stage
+import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
@@ -134,8 +135,47 @@ def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> 
             'begun', 'marker', 'note', 'held', 'finished', 'skipped', 'held', 'repeated', 'ended']
 
 
+def test_what_comes_again_is_asked_anew(browser: Browser, tmp_path: Path) -> None:
+    """A questionnaire repeated from the gate after it has no answers, and times of its own."""
+    person = Participant(browser)
+    before = [{'questions': 'van_der_laan'}]
+    with running(tmp_path, languages=[], fields=[], before=before) as desk:
+        browser.open(desk.experimenter)
+        own = browser.driver.current_window_handle
+        browser.driver.switch_to.new_window('tab')
+        browser.open(desk.participant)
+        there = browser.driver.current_window_handle
+        person.shows('questions')
+        person.answer_all()
+        person.go_on()
+        person.shows('drive')
+        assert not browser.run('return Object.keys(sessionStorage).filter((key) =>'
+                               ' key.startsWith("crgame.draft."))')
+        browser.driver.switch_to.window(own)
+        browser.wait('document.querySelector("#items tr button")')
+        browser.run('document.querySelector("#items tr button").click()')
+        give_reason(person, 'was disturbed')
+        browser.driver.switch_to.window(there)
+        person.shows('questions')
+        assert browser.run('return document.querySelectorAll("input:checked").length') == 0
+        # A reload in the middle of it keeps what is typed now.
+        person.question('useful')
+        person.press(Keys.ARROW_RIGHT)
+        browser.driver.refresh()
+        person.shows('questions')
+        assert browser.wait('document.querySelectorAll("input:checked").length') == 1
+        person.answer_all()
+        person.go_on()
+        person.shows('drive')
+    entries = read_journal(tmp_path / 'P07')
+    again = next(entry['at'] for entry in entries if entry['entry'] == 'repeated')
+    told = [entry for entry in entries if entry['entry'] == 'finished']
+    assert [entry['item'] for entry in told] == ['before/1'] * 2
+    assert told[0]['shown_at'] < again < told[1]['shown_at'] + 0.1
+
+
 def test_questions_are_answered_by_a_wheel(browser: Browser, tmp_path: Path) -> None:
-    """The paddles choose, the first button confirms; axes and pedals pass the device check."""
+    """The paddles choose, the first button confirms; what is moved passes the check."""
     person = Participant(browser)
     before = [{'questions': 'van_der_laan'}, {'device_check': {}}]
 
@@ -161,11 +201,34 @@ def test_questions_are_answered_by_a_wheel(browser: Browser, tmp_path: Path) -> 
         person.shows('device')
         assert [*finished(tmp_path)['before/1']['answers'].values()] == [2] * 8 + [1]
         browser.wait('document.querySelectorAll(".device-check input").length === 2')
-        person.tab_to('.device-check input')
-        person.press(Keys.ARROW_DOWN)
+        # Whose button has brought somebody here is chosen.
         for axes in ([-1, 0, 1, 1], [1, 0, 1, 1], [0, 0, -1, 1], [0, 0, 1, -1], [0, 0, 1, 1]):
             browser.run_async('wheel.axes = arguments[0]; await new Promise((done) =>'
                               ' requestAnimationFrame(() => requestAnimationFrame(done)));', axes)
+        assert browser.run('return document.querySelector(".device-check input:checked").value'
+                           ) == '0'
         person.go_on()
         person.shows('drive')
         assert finished(tmp_path)['before/2']['device'].startswith('Wheel')
+
+
+@pytest.mark.parametrize('moved', [
+    'wheel.buttons[9] = {pressed: arguments[0], value: +arguments[0]}',
+    'wheel.axes = [0.7 * arguments[0], 0, 1, 1]'])
+def test_a_wheel_that_is_touched_is_chosen_but_not_against_somebodys_word(
+        browser: Browser, tmp_path: Path, moved: str) -> None:
+    """Whoever chooses the keyboard keeps it, whatever is touched then."""
+    person = Participant(browser)
+    touch = (f'{moved}; await new Promise((done) => requestAnimationFrame(() =>'
+             ' requestAnimationFrame(done)));'
+             'return document.querySelector(".device-check input:checked").value;')
+    with running(tmp_path, languages=[], fields=[], before=[{'device_check': {}}]) as desk:
+        browser.open(desk.participant)
+        person.shows('device')
+        browser.run(WHEEL)
+        browser.wait('document.querySelectorAll(".device-check input").length === 2')
+        assert browser.run_async(touch, False) == 'keyboard'
+        assert browser.run_async(touch, True) == '0'
+        assert browser.run_async(touch, False) == '0'
+        browser.run('document.querySelector(".device-check input").click()')
+        assert browser.run_async(touch, True) == 'keyboard'

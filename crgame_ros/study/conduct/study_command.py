@@ -28,8 +28,10 @@ Plan an experiment with people: who drives which trials in which order, and what
 
   crgame study new my_study        # a commented study file, with its pages
   crgame study check my_study/study.yaml
+  crgame study run my_study/study.yaml --participant P01
   crgame study data studies/my_study      # tables of what it has found so far
   crgame study report studies/my_study    # the same for people, one HTML file
+  crgame study rerun studies/my_study --planner constant-velocity   # the same people again
 
 docs/studies.md leads through an example."""
 

@@ -68,12 +68,16 @@ class AnsweredItem:
     :param answers: by question.
     :param at: wall clock [s since 1970]
     :param attempt: at the trial before it that had finished last; None elsewhere.
+    :param told: what the entry of them says: when they were shown, after which time each was.
+    :param after: that attempt; None elsewhere.
     """
 
     item: SessionItem
     answers: Mapping[str, Any]
     at: float
     attempt: int | None
+    told: Mapping[str, Any]
+    after: TrialAttempt | None
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,7 @@ class ParticipantRecord:
         """Give what was answered, each item's last answers, in the order of the session."""
         found: dict[str, AnsweredItem] = {}
         driven: dict[int, int] = {}
+        ended: dict[int, TrialAttempt | None] = {}
         numbers = {each.item: each for each in self.attempts if each.ending == 'finished'}
         for entry in self.entries:
             item = self.items.get(entry.get('item', ''))
@@ -137,9 +142,13 @@ class ParticipantRecord:
                 continue
             if item.id in numbers and isinstance(item.what, PlannedTrial):
                 driven[item.what.number] = self._attempt_of(entry, item.id)
+                ended[item.what.number] = next(
+                    (each for each in self.attempts if each.told is entry), None)
             elif entry.get('answers'):
                 attempt = None if item.trial is None else driven.get(item.trial)
-                found[item.id] = AnsweredItem(item, entry['answers'], entry['at'], attempt)
+                after = None if item.trial is None else ended.get(item.trial)
+                found[item.id] = AnsweredItem(item, entry['answers'], entry['at'], attempt,
+                                              entry, after)
         return tuple(found[name] for name in self.items if name in found)
 
     @property

@@ -41,7 +41,8 @@ EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
         Column('attempt', INTEGER, '1', 'at the trial', empty='of none'),
         Column('name', TEXT, '', 'of a marker, a game event, a task or an outcome',
                empty='it has none'),
-        Column('text', TEXT, '', 'a reason, a note, outcome of a task, or what else was told',
+        Column('text', TEXT, '', 'a reason, a note, outcome of a task, or whether practice was '
+               'good',
                empty='nothing was'),
         Column('time_s', NUMBER, 's', "when, on the run's clock", empty='no run went on'),
         Column('duration_s', NUMBER, 's', 'how long what a task did lasted',
@@ -96,6 +97,8 @@ def _of_journal(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
         elif running is not None and kind in (SessionEvent.NOTE, SessionEvent.MARKER):
             row |= {'trial': running.trial.number, 'attempt': running.attempt,
                     'item': running.item}
+        if kind == SessionEvent.PRACTISED:
+            row['text'] = 'good' if entry.get('good') else 'not good'
         yield row
         if driven and kind in (SessionEvent.FINISHED, SessionEvent.ABORTED, SessionEvent.SKIPPED):
             running = None

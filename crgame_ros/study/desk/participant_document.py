@@ -49,6 +49,7 @@ def participant_document(desk: Desk) -> dict[str, Any]:
         'study': session.study.title.in_language(language) or session.study.name,
         'participant': session.participant, 'language': language,
         'languages': list(session.study.all_languages), 'item': '' if item is None else item.id,
+        'again': 0 if item is None else _repeats(desk, item),
         'progress': _progress(desk)}
     if item is None or desk.ending:
         return {**document, 'show': 'over', 'how': how_over(desk)}
@@ -74,6 +75,12 @@ def _progress(desk: Desk) -> dict[str, int]:
     trials = [item for item in session.items if isinstance(item.what, PlannedTrial)]
     return {'done': len(done), 'of': len(session.items),
             'drives_done': sum(item.id in done for item in trials), 'drives': len(trials)}
+
+
+def _repeats(desk: Desk, item: SessionItem) -> int:
+    """Count how often an item that was done came anew."""
+    return sum(entry['entry'] == SessionEvent.REPEATED and entry['item'] == item.id
+               for entry in desk.session.journal.entries)
 
 
 def _item(desk: Desk, item: SessionItem) -> dict[str, Any]:

@@ -22,7 +22,8 @@
  *
  * @typedef {{done: number, of: number, drives_done: number, drives: number}} Progress
  * @typedef {{type: 'desk', study: string, participant: string, language: string,
- *   languages: string[], item: string, progress?: Progress}} Always
+ *   languages: string[], item: string, again: number,
+ *   progress?: Progress}} Always  `again` tells how often the item has come anew
  * @typedef {Always & {show: 'language'|'elsewhere'}} PlainDocument
  * @typedef {Always & {show: 'wait', why: 'held'|'preparing'|'failed'}} WaitDocument
  * @typedef {Always & {show: 'over', how: 'done'|'declined'|'ended'}} OverDocument

@@ -19,6 +19,8 @@ import { button } from './page_view.js';
 export const MOVEMENTS = /** @type {Movement[]} */ (['left', 'right', 'throttle', 'brake']);
 // So much of its travel counts as moved.
 const MOVED = 0.6;
+// So far from where it was first seen an axis is moved by somebody.
+const TOUCHED = 0.4;
 const PREFIX = 'crgame.gamepad.';
 const KEYBOARD = 'keyboard';
 
@@ -37,6 +39,10 @@ export class DeviceCheck {
   #words;
   #finish;
   #chosen = KEYBOARD;
+  // Whether somebody has said with what they drive: then nothing that is touched says it.
+  #told = false;
+  /** @type {Map<string, number[]>} where the axes were first, by the device */
+  #rest = new Map();
   /** @type {Set<Movement>} */
   #moved = new Set();
   #frame = 0;
@@ -86,6 +92,7 @@ export class DeviceCheck {
       this.#ids = ids;
       this.#showDevices(pads);
     }
+    this.#chooseTouched(pads);
     const pad = pads.find(({ index }) => `${index}` === this.#chosen);
     if (pad) {
       const { profile } = loadProfile(pad);
@@ -99,12 +106,41 @@ export class DeviceCheck {
     this.#frame = requestAnimationFrame(() => this.#poll());
   }
 
+  /**
+   * Who moves a wheel or presses its button drives with it, unless the keys are through already.
+   *
+   * @param {Gamepad[]} pads
+   */
+  #chooseTouched(pads) {
+    for (const pad of pads) {
+      const key = `${pad.index} ${pad.id}`;
+      const rest = this.#rest.get(key) ?? pad.axes.map(Number);
+      this.#rest.set(key, rest);
+      const touched = pad.buttons.some(({ pressed }) => pressed)
+        || pad.axes.some((value, i) => Math.abs(value - rest[i]) > TOUCHED);
+      if (touched && !this.#told && this.#chosen === KEYBOARD
+          && this.#moved.size < MOVEMENTS.length) {
+        this.#choose(`${pad.index}`);
+        this.#markChosen();
+      }
+    }
+  }
+
+  #markChosen() {
+    for (const input of this.#devices.querySelectorAll('input')) {
+      input.checked = input.value === this.#chosen;
+    }
+  }
+
   /** @param {Gamepad[]} pads */
   #showDevices(pads) {
     /** @type {(value: string, label: string) => HTMLElement} */
     const option = (value, label) => {
       const input = element('input', { type: 'radio', name: 'device', value,
-        on: { change: () => this.#choose(value) } });
+        on: { change: () => {
+          this.#told = true;
+          this.#choose(value);
+        } } });
       input.checked = value === this.#chosen;
       return element('label', { class: 'option' }, input, element('span', { text: label }));
     };

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What has been answered but is not kept by the server yet: a reload loses nothing of it. */
 
-/** @import { Answer } from './desk_messages.js' */
+/** @import { Answer, DeskDocument } from './desk_messages.js' */
 
 const PREFIX = 'crgame.draft.';
 
@@ -19,19 +19,12 @@ export class Draft {
   #state;
 
   /**
-   * @param {string} participant
-   * @param {string} item
+   * @param {string} name of it, see draftName
    * @param {() => number} clock_s seconds since 1970
    */
-  constructor(participant, item, clock_s) {
-    this.#key = `${PREFIX}${participant}.${item}`;
+  constructor(name, clock_s) {
+    this.#key = PREFIX + name;
     this.#clock_s = clock_s;
-    for (const key of Object.keys(sessionStorage)) {
-      // What was asked before is with the server.
-      if (key.startsWith(PREFIX) && key !== this.#key) {
-        sessionStorage.removeItem(key);
-      }
-    }
     this.#state = read(this.#key) ?? { shown_at: clock_s(), answers: {}, after_s: {} };
     this.#write();
   }
@@ -67,6 +60,28 @@ export class Draft {
 
   #write() {
     sessionStorage.setItem(this.#key, JSON.stringify(this.#state));
+  }
+}
+
+/**
+ * Name the draft of what is shown: an item that comes again is asked anew.
+ *
+ * @param {DeskDocument} shown
+ */
+export function draftName({ study, participant, item, again }) {
+  return `${study}.${participant}.${item}.${again}`;
+}
+
+/**
+ * Forget all drafts but one: what was asked before is with the server.
+ *
+ * @param {string} name of the one that stays
+ */
+export function forgetOtherDrafts(name) {
+  for (const key of Object.keys(sessionStorage)) {
+    if (key.startsWith(PREFIX) && key !== PREFIX + name) {
+      sessionStorage.removeItem(key);
+    }
   }
 }
 

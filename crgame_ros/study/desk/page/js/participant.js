@@ -6,7 +6,7 @@ import { element, part, setAttribute, setText } from '../../../../cockpit/page/j
 import { breakView } from './break_view.js';
 import { DeskConnection } from './desk_connection.js';
 import { DeviceCheck } from './device_check.js';
-import { Draft } from './draft.js';
+import { Draft, draftName, forgetOtherDrafts } from './draft.js';
 import { DriveFrame } from './drive_frame.js';
 import { PadNavigation } from './pad_navigation.js';
 import { button, pageView } from './page_view.js';
@@ -15,6 +15,7 @@ import { Words } from './words.js';
 
 /** @import { DeskDocument, Told } from './desk_messages.js' */
 
+const ANSWERED = ['questions', 'page', 'break', 'device'];
 const PAGE_KEY = 'crgame.desk.page';
 
 /** The whole page. */
@@ -92,6 +93,10 @@ class ParticipantPage {
     document.body.dataset.show = shown.show;
     setText(part(document.body, 'study'), shown.study);
     this.#showProgress(shown);
+    // Without an item, as where another tab is used, it may be the same one that comes back.
+    if (shown.item !== '' || shown.show === 'over') {
+      forgetOtherDrafts(draftName(shown));
+    }
     if (shown.show === 'drive') {
       this.#clear();
       this.#drive.show(shown);
@@ -146,8 +151,9 @@ class ParticipantPage {
    */
   #view(shown) {
     const words = this.#words;
-    const draft = shown.item === '' ? null
-      : new Draft(`${shown.study}.${shown.participant}`, shown.item, () => this.#connection.now_s);
+    // What is only waited for has not been shown yet.
+    const draft = !ANSWERED.includes(shown.show) ? null
+      : new Draft(draftName(shown), () => this.#connection.now_s);
     /** @param {Partial<Told>} told */
     const finish = (told) => {
       if (draft && this.#sent !== shown.item) {

@@ -32,11 +32,14 @@ export function sliderControls({ low, high, step, left, right }, words, id, chan
   };
   input.addEventListener('input', mark);
   // A click at the very middle changes no value, and yet it is an answer; so are these keys.
-  input.addEventListener('click', () => {
-    if (!marked) {
-      mark();
-    }
-  });
+  // A finger's tap there is no click.
+  for (const kind of ['click', 'pointerup']) {
+    input.addEventListener(kind, () => {
+      if (!marked) {
+        mark();
+      }
+    });
+  }
   input.addEventListener('keydown', ({ key }) => {
     if (!marked && (key === 'Enter' || key === ' ')) {
       mark();
