@@ -36,7 +36,7 @@ LIGHTS = {'day': {'light': 'day'}, 'dusk': {'light': 'dusk'},
           'fog': {'light': 'day', 'visibility': 80.0}}
 # Until the others have come near [s].
 DRIVEN_S = 2.0
-COST = 'const { calls, triangles } = crgame.view3d.stats; return [calls, triangles];'
+COST = 'const { draw_calls, triangles } = crgame.view3d.stats; return [draw_calls, triangles];'
 
 
 def look(person: Person, where: Path, size: str) -> None:
