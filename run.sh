@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Copyright 2026 The crgame_ros authors
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 #
 # Run a game: ./run.sh [GAME.yaml] [options]; ./run.sh --help tells all.

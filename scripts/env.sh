@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Copyright 2026 The crgame_ros authors
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 #
 # The environment of every command: `source scripts/env.sh` from bash, as run.sh and test.sh do.

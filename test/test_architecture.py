@@ -1,17 +1,5 @@
-# Copyright 2026 The crgame_ros authors
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 """The order of the folders: who may import whom, and the document that shows it."""
 
 import ast
@@ -19,10 +7,36 @@ from pathlib import Path
 import subprocess
 import sys
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'scripts'))
 
-import architecture  # noqa: E402
+import architecture  # noqa: E402, I100
+
+# These may import ROS; everything else is the core.
+ROS_FOLDERS = ('ros', 'nodes', 'launcher', 'study/conduct')
+ROS_FILES = {'cli', 'doctor'}
+BLOCKED_IMPORTS = """
+import importlib, sys
+
+class NoRos:
+    def find_spec(self, name, path=None, target=None):
+        top = name.partition('.')[0]
+        if top in ('rclpy', 'std_srvs', 'builtin_interfaces', 'rcl_interfaces', 'launch',
+                   'launch_ros', 'ament_index_python') or top.endswith('_msgs'):
+            raise ImportError(f'the core imports {name}')
+
+sys.meta_path.insert(0, NoRos())
+failed = 0
+for name in sys.argv[1:]:
+    try:
+        importlib.import_module(name)
+    except ImportError as error:
+        failed += 1
+        print(f'{name}: {error}')
+sys.exit(failed)
+"""
 
 
 def test_every_folder_imports_from_those_above_it_alone() -> None:
@@ -38,32 +52,47 @@ def test_every_folder_has_its_place_and_says_what_it_is() -> None:
     assert len({architecture.sentence(folder) for folder in folders}) == len(folders)
 
 
-def test_the_core_imports_no_ros() -> None:
-    core = architecture.FOLDERS[:architecture.FOLDERS.index('ros')]
+@pytest.fixture(scope='module')
+def core() -> list[str]:
+    """Return the names of the modules that may not import ROS when they are imported."""
+    return [name for name, path in architecture.modules().items()
+            if not architecture.folder_of(path).startswith(ROS_FOLDERS)
+            and path.stem not in ROS_FILES]
+
+
+def _import_without_ros(*modules: str) -> 'subprocess.CompletedProcess[str]':
+    return subprocess.run([sys.executable, '-c', BLOCKED_IMPORTS, *modules], cwd=ROOT,
+                          capture_output=True, text=True)
+
+
+def test_the_core_runs_without_ros(core: list[str]) -> None:
+    """Every module of the core imports where rclpy and all messages are blocked."""
+    assert len(core) > 20
+    done = _import_without_ros(*core)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_no_function_of_the_core_imports_ros(core: list[str]) -> None:
+    """Imports within functions count, too."""
+    lower = architecture.FOLDERS[:architecture.FOLDERS.index('ros')]
     ros = ('rclpy', '_msgs', '_interfaces', 'ament_index_python')
-    for path in architecture.modules().values():
-        if architecture.folder_of(path) not in core:
+    paths = architecture.modules()
+    for module in core:
+        if architecture.folder_of(paths[module]) not in lower:
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(ast.parse(paths[module].read_text())):
             names = [item.name for item in node.names] if isinstance(node, ast.Import) else [
                 node.module or ''] if isinstance(node, ast.ImportFrom) else []
             assert not [name for name in names
-                        if name.split('.')[0].endswith(ros)], f'{path}: {names}'
+                        if name.split('.')[0].endswith(ros)], f'{module}: {names}'
+
+
+def test_blocked_imports_fail() -> None:
+    """The test above does notice an import of ROS."""
+    assert _import_without_ros('rclpy', 'sensor_msgs.msg').returncode == 2
 
 
 def test_list_and_picture_are_up_to_date() -> None:
     done = subprocess.run([sys.executable, ROOT / 'scripts' / 'architecture.py', '--check'],
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
-
-
-def test_no_two_modules_or_public_classes_have_one_name() -> None:
-    names: dict[str, list[str]] = {}
-    for dotted, path in architecture.modules().items():
-        if path.stem == '__init__':
-            continue
-        names.setdefault(path.stem, []).append(dotted)
-        for node in ast.parse(path.read_text()).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith('_'):
-                names.setdefault(node.name, []).append(dotted)
-    assert not {name: where for name, where in names.items() if len(where) > 1}

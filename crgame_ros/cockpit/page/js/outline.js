@@ -1,4 +1,4 @@
-// Copyright 2026 The crgame_ros authors
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /** Outlines of lanelets, what they hold, and boxes around points: flat lists x0, y0, … [m]. */
 

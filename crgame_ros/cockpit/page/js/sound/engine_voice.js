@@ -1,4 +1,4 @@
-// Copyright 2026 The crgame_ros authors
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /** The engine of one's own vehicle: two waves, calm and harsh, mixed by the load. */
 

@@ -1,4 +1,4 @@
-// Copyright 2026 The crgame_ros authors
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /** One stimulus or request on this page: when it was first in a picture, and when answered. */
 

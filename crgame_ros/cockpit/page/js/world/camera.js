@@ -1,4 +1,4 @@
-// Copyright 2026 The crgame_ros authors
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /** Where the world is looked at from: a point, a scale, and the direction that is up. */
 

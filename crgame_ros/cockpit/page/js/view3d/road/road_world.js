@@ -1,4 +1,4 @@
-// Copyright 2026 The crgame_ros authors
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /** The world of the vehicles in the 3D view: roads and what stands at them, land, sky. */
 
